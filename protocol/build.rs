@@ -1,10 +1,11 @@
 //! Generates the MAVLink dialect from its XML, and records which build this is, so that every log can name it.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use sha2::Digest as _;
 
 fn main() -> Result<()> {
@@ -19,8 +20,56 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     for file in ["minimal", "standard", "common", "touchdown"] {
         println!("cargo:rerun-if-changed=dialect/{file}.xml");
     }
-    mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec!["dialect/touchdown.xml"]), out_dir)
-        .context("dialect/touchdown.xml")?;
+    // Only the messages: their numbers, fields and checksums are the same.
+    let folder = if env::var_os("CARGO_FEATURE_STD").is_some() {
+        PathBuf::from("dialect")
+    } else {
+        let folder = out_dir.join("dialect");
+        only_messages_of_a_vehicle(&folder)?;
+        folder
+    };
+    let file = folder.join("touchdown.xml");
+    mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec![&file]), out_dir)
+        .with_context(|| file.display().to_string())?;
+    Ok(())
+}
+
+/// What a vehicle says and hears. The code of all 254 messages would not fit into a flight computer's flash.
+const OF_A_VEHICLE: &str = "
+    HEARTBEAT SYS_STATUS SYSTEM_TIME PING PARAM_REQUEST_READ PARAM_REQUEST_LIST PARAM_VALUE PARAM_SET GPS_RAW_INT ATTITUDE
+    ATTITUDE_QUATERNION LOCAL_POSITION_NED GLOBAL_POSITION_INT MISSION_WRITE_PARTIAL_LIST MISSION_ITEM MISSION_REQUEST
+    MISSION_REQUEST_LIST MISSION_COUNT MISSION_CLEAR_ALL MISSION_ACK MISSION_REQUEST_INT MISSION_ITEM_INT VFR_HUD COMMAND_INT
+    COMMAND_LONG COMMAND_ACK HIGHRES_IMU RADIO_STATUS FILE_TRANSFER_PROTOCOL TIMESYNC LOG_REQUEST_LIST LOG_ENTRY
+    LOG_REQUEST_DATA LOG_DATA BATTERY_STATUS AUTOPILOT_VERSION ESTIMATOR_STATUS HOME_POSITION MESSAGE_INTERVAL
+    EXTENDED_SYS_STATE STATUSTEXT STORAGE_INFORMATION PROTOCOL_VERSION PARAM_ERROR ACTUATOR_OUTPUT_STATUS AVAILABLE_MODES
+    CURRENT_MODE TD_FLIGHT_STATUS TD_FINS TD_GIMBAL TD_CONTROLLER TD_TOUCHDOWN_PREDICTION TD_PREDICTED_PATH
+    TD_LANDING_VERDICT TD_TOUCHDOWN_LIMITS TD_DESCENT TD_UPLINK TD_CREW TD_OPERATOR TD_MISSION TD_BOOK_HEAD TD_BOOK_KEPT
+    TD_PAD_CHECK";
+
+/// Writes the dialect's files without all other messages.
+fn only_messages_of_a_vehicle(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let mut missing: BTreeSet<&str> = OF_A_VEHICLE.split_whitespace().collect();
+    for file in ["minimal.xml", "standard.xml", "common.xml", "touchdown.xml"] {
+        let (mut kept, mut leaves_out) = (String::new(), false);
+        for line in fs::read_to_string(Path::new("dialect").join(file)).context(file)?.lines() {
+            let name = line.trim_start().strip_prefix("<message ").and_then(|rest| {
+                let (_, name) = rest.split_once("name=\"")?;
+                name.split('"').next()
+            });
+            if let Some(name) = name {
+                leaves_out = !OF_A_VEHICLE.split_whitespace().any(|known| known == name);
+                missing.remove(name);
+            }
+            if !leaves_out {
+                kept += line;
+                kept.push('\n');
+            }
+            leaves_out &= !line.contains("</message>");
+        }
+        fs::write(folder.join(file), kept).context(file)?;
+    }
+    ensure!(missing.is_empty(), "the dialect has no {missing:?}");
     Ok(())
 }
 

@@ -1,7 +1,9 @@
 //! Detects a frame that arrives over several links, so that it is handled once.
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use crate::frame::Frame;
 use crate::identity::Address;

@@ -60,7 +60,14 @@
 //!
 //! With a key, the caller must pass the time of day, as far as it is known, and must store
 //! [`hub::Hub::signing_memory`] so that it survives a power cycle.
+//!
+//! Without the feature `std` the crate needs a heap and no operating system; then it has no log, no book and no files, and its
+//! dialect has the messages that a vehicle says and hears.
+#![cfg_attr(not(any(feature = "std", test)), no_std)]
 
+extern crate alloc;
+
+#[cfg(feature = "std")]
 pub mod book;
 pub mod command;
 #[cfg(feature = "transport")]
@@ -69,12 +76,14 @@ pub mod dialect;
 pub mod duplicate;
 pub mod frame;
 pub mod ftp;
+#[cfg(feature = "std")]
 pub mod hostile;
 pub mod hub;
 pub mod identity;
 #[cfg(feature = "transport")]
 pub mod key_file;
 pub mod link_stats;
+#[cfg(feature = "std")]
 pub mod log;
 pub mod mission;
 pub mod parameter;

@@ -1,8 +1,9 @@
 //! Measures one link: the rates, the loss and the age of what arrived over the last ten seconds, in total and for
 //! each component.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::time::Duration;
+use alloc::collections::{BTreeMap, VecDeque};
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use crate::frame::Frame;
 use crate::identity::Address;

@@ -1,6 +1,6 @@
 //! Which mission is meant: a short name for its text, for vehicle and ground to compare.
 
-use std::fmt;
+use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
@@ -49,7 +49,7 @@ impl Expected {
         }
         let mut hash = [0; 8];
         for (pair, param) in hash.chunks_exact_mut(2).zip(params) {
-            if !((1.0..=65_536.0).contains(&param) && param.fract().abs() <= 0.0) {
+            if !((1.0..=65_536.0).contains(&param) && libm::truncf(param).to_bits() == param.to_bits()) {
                 return Self::Unreadable;
             }
             pair.copy_from_slice(&((param - 1.0) as u16).to_le_bytes());

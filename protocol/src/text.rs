@@ -2,10 +2,13 @@
 //!
 //! <https://mavlink.io/en/messages/common.html#STATUSTEXT>
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
 
-use mavlink::types::CharArray;
+use mavlink_core::types::CharArray;
 
 use crate::dialect::{MavSeverity, STATUSTEXT_DATA};
 use crate::identity::Address;

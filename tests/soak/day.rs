@@ -11,7 +11,7 @@ use ground::update::{Msg, update};
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::{LoadedFlight, load_flight};
 use simulated_vehicle::vehicle::Vehicle;
 
@@ -73,7 +73,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             &[]
         };
         let own: Vec<Request> = asked.iter().copied().map(Request::of_the_programme).collect();
-        drop(endpoint.step(&mut vehicle, &own, &mut || Duration::ZERO));
+        drop(step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO));
         for outgoing in endpoint.poll(&vehicle) {
             drop(update(model, Msg::Frame(outgoing.frame), now));
         }

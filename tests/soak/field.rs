@@ -124,7 +124,8 @@ impl Field {
                 self.station.signal(Signal::SIGCONT);
             }
         }
-        let how = vehicle.wait_for_line("it stands");
+        // One in a hundred hits the ground: the station has to live through that, too.
+        let how = vehicle.wait_for_line("limits of the legs");
         vehicle.wait_for_line("disarmed");
         self.proxy.impair(IDEAL);
         for terminal in [&*screen, &*watching, &*distant] {

@@ -19,7 +19,7 @@ use protocol::identity::GROUND;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
-use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::DeadlinePolicy;
 use simulated_vehicle::fly::load_flight;
 
@@ -56,7 +56,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let (mut tick_at, mut over_at) = (Duration::ZERO, None);
     loop {
         let now = Duration::from_secs_f64(vehicle.time_s());
-        endpoint.step(&mut vehicle, &[], &mut || Duration::ZERO);
+        step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
         let mut msgs = Vec::new();
         for leaving in endpoint.poll(&vehicle) {
             let frame = leaving.frame;

@@ -9,7 +9,7 @@ use ground::model::dead_reckoning::{Basis, PredictedPosition, predict_position};
 use ground::model::judgement::{Compliance, LEGS, Standard, TABLE_2, overall};
 use ground::update::{Msg, update};
 use protocol::frame::Frame;
-use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::{LoadedFlight, load_flight};
 use simulated_vehicle::vehicle::Vehicle;
 
@@ -38,7 +38,7 @@ fn mk2(number: u64) -> (Vec<(Duration, Frame)>, bool) {
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {
         let ready = rocket.phase().on_pad() && rocket.snapshot().checks_failed == 0;
         let own = if ready { &[Asked::Arm, Asked::Start].map(Request::of_the_programme)[..] } else { &[] };
-        endpoint.step(&mut rocket, own, &mut || Duration::ZERO);
+        step(&mut endpoint, &mut rocket, own, &mut || Duration::ZERO);
         if rocket.is_over() {
             stands_s += rocket.frame_s();
         }

@@ -11,7 +11,7 @@ use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::DeadlinePolicy;
 use simulated_vehicle::fly::load_flight;
 
@@ -85,7 +85,7 @@ fn run(seed: u64) -> Run {
             for frame in up.arrived(now) {
                 endpoint.on_frame(0, &frame, &vehicle);
             }
-            endpoint.step(&mut vehicle, &[], &mut || Duration::ZERO);
+            step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
             for leaving in endpoint.poll(&vehicle) {
                 down.send(leaving.frame, now);
             }

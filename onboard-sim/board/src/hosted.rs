@@ -3,11 +3,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Write as _};
+use std::io::{self, BufReader, BufWriter, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
+use std::thread;
 
 use anyhow::{Context as _, Result, ensure};
+use board::radio::Radio;
 use board::recorded::fly;
 use board::stream::{Answer, Link, receive};
 use clap::{Parser, Subcommand};
@@ -25,7 +28,11 @@ struct Cli {
 enum Command {
     /// Fly a recorded flight: frames from standard input, answers to standard output
     #[command(after_help = "Example: board fly < frames > answers")]
-    Fly,
+    Fly {
+        /// Serial device of the radio, if the flight has a crew
+        #[arg(long, value_name = "DEVICE")]
+        radio: Option<PathBuf>,
+    },
     /// Compare what machines answered in recorded flights with what was recorded, frame by frame
     ///
     /// Each folder is a flight: the file `recorded`, and a file for each machine, with its name. Exit codes: 0 all
@@ -48,7 +55,7 @@ enum Command {
 
 pub(super) fn main() -> ExitCode {
     let done = match Cli::parse().command {
-        Command::Fly => fly_standard_input().map(|()| ExitCode::SUCCESS),
+        Command::Fly { radio } => fly_standard_input(radio.as_deref()).map(|()| ExitCode::SUCCESS),
         Command::Compare { machine, folders } => compare(&machine, &folders),
         Command::Costs { folders } => costs(&folders).map(|()| ExitCode::SUCCESS),
     };
@@ -57,6 +64,9 @@ pub(super) fn main() -> ExitCode {
         ExitCode::FAILURE
     })
 }
+
+/// Most bytes that may wait for the next frame: a second of a fast radio.
+const MOST_WAITING_BYTES: usize = 8 * 1024;
 
 /// Two streams of bytes as a link.
 struct Pipes<R, W>(R, W);
@@ -69,14 +79,56 @@ impl<R: io::Read, W: io::Write> Link for Pipes<R, W> {
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.1.write_all(bytes)
+        self.1.write_all(bytes)?;
+        // A world waits for it.
+        self.1.flush()
     }
 }
 
-fn fly_standard_input() -> Result<()> {
+/// A serial device that a thread reads.
+struct Serial {
+    arrived: Receiver<u8>,
+    device: File,
+}
+
+impl Serial {
+    fn open(path: &Path) -> io::Result<Self> {
+        let device = File::options().read(true).write(true).open(path)?;
+        let (sender, arrived) = sync_channel(MOST_WAITING_BYTES);
+        let reading = device.try_clone()?;
+        thread::Builder::new().name("radio".into()).spawn(move || {
+            for byte in BufReader::new(reading).bytes() {
+                let Ok(byte) = byte else { return };
+                // Bytes without room are lost.
+                if let Err(TrySendError::Disconnected(_)) = sender.try_send(byte) {
+                    return;
+                }
+            }
+        })?;
+        Ok(Self { arrived, device })
+    }
+}
+
+impl Radio for Serial {
+    fn read(&mut self, into: &mut [u8]) -> usize {
+        into.iter_mut().zip(self.arrived.try_iter()).map(|(place, byte)| *place = byte).count()
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        // What cannot be sent is lost.
+        let _ = self.device.write_all(bytes);
+    }
+}
+
+fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
     let mut link = Pipes(BufReader::new(io::stdin().lock()), BufWriter::new(io::stdout().lock()));
-    let frames = fly(&mut link, &mut ())?;
-    link.1.flush()?;
+    let frames = match radio {
+        None => fly(&mut link, &mut (), &mut ()),
+        Some(path) => {
+            let mut radio = Serial::open(path).with_context(|| path.display().to_string())?;
+            fly(&mut link, &mut radio, &mut ())
+        }
+    }?;
     eprintln!("{frames} frames");
     Ok(())
 }

@@ -2,11 +2,13 @@
 //!
 //! * [`port`]: what a board must offer, and the loop that flies it.
 //! * [`stream`]: a recorded flight as bytes for a board, and the board's answers.
+//! * [`radio`]: the crew on the board's own radio, between the frames.
 //! * [`recorded`]: flies a recorded flight, frame by frame, and answers each frame.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
 
 pub mod port;
+pub mod radio;
 pub mod recorded;
 pub mod stream;

@@ -1,5 +1,5 @@
 //! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and `costs` in the folder of
-//! the emulator or debugger. The files `saved-0` and `saved-1` are its memory that outlasts a reset: where a recorded flight's
+//! the emulator or debugger. Its radio is the serial device `radio` there, if a flight has a crew. The files `saved-0` and `saved-1` are its memory that outlasts a reset: where a recorded flight's
 //! computer was dead, this program resets its processor and goes on from them.
 
 use core::ffi::CStr;
@@ -7,6 +7,7 @@ use core::fmt::Write as _;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use board::radio::Radio;
 use board::recorded::{Watch, fly};
 use board::stream::Link;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -20,7 +21,7 @@ use semihosting::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use semihosting::{eprintln, println, process};
 
 /// Heap, bytes: what the memory map leaves beside the static data.
-const HEAP_BYTES: usize = 920 * 1024;
+const HEAP_BYTES: usize = 888 * 1024;
 
 #[global_allocator]
 static HEAP: LockedHeap = LockedHeap::empty();
@@ -76,7 +77,7 @@ fn fly_the_files() -> io::Result<()> {
     let file = written(c"costs")?;
     let mut costs =
         Costs { file, begun: 0, set_up_bytes: 0, most_bytes: 0, saved, save: Cost::default(), failed: None };
-    let flown = fly(&mut files, &mut costs);
+    let flown = fly(&mut files, &mut Serial::default(), &mut costs);
     if let Some(error) = costs.failed {
         return Err(error);
     }
@@ -115,6 +116,33 @@ impl Link for Files {
 
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), io::Error> {
         self.answers.write_all(bytes)
+    }
+}
+
+/// The serial device `radio`: a pseudo-terminal that is set to return what it has, and not to wait (`stty min 0 time 0`).
+#[derive(Default)]
+struct Serial {
+    /// Opened with the first byte that it is asked for; `Some(None)` if there is none.
+    device: Option<Option<File>>,
+}
+
+impl Serial {
+    fn device(&mut self) -> Option<&mut File> {
+        let open = || File::options().read(true).write(true).open(c"radio").ok();
+        self.device.get_or_insert_with(open).as_mut()
+    }
+}
+
+impl Radio for Serial {
+    fn read(&mut self, into: &mut [u8]) -> usize {
+        self.device().and_then(|device| device.read(into).ok()).unwrap_or(0)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        if let Some(device) = self.device() {
+            // What has no room is lost.
+            let _ = device.write_all(bytes);
+        }
     }
 }
 

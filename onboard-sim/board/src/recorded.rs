@@ -11,6 +11,7 @@ use tick_log::again::{FrameError, RecordedComputer, mission_flown};
 use tick_log::computer::output_to_log;
 use tick_log::pilot;
 
+use crate::radio::{Crewed, Radio};
 use crate::stream::{Answer, Begin, Frame, Link, StreamError, receive, send};
 
 /// What looks at the computer while it flies, without changing anything. A machine that counts its instructions counts
@@ -51,14 +52,19 @@ pub enum FlyError<E> {
     Frame(#[from] FrameError),
 }
 
-/// Flies the flight that comes over the link. Returns the number of its frames.
+/// Flies the flight that comes over the link. If it says who the board is on the air, the crew is heard over the radio.
+/// Returns the number of its frames.
 ///
 /// # Errors
 /// See [`FlyError`]; every frame before the error was answered.
-pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyError<L::Error>> {
+pub fn fly<L: Link>(
+    link: &mut L,
+    radio: &mut impl Radio,
+    watch: &mut impl Watch,
+) -> Result<u64, FlyError<L::Error>> {
     let mut buffer = Vec::new();
     let begin: Begin = receive(link, &mut buffer)?.ok_or(FlyError::Empty)?;
-    let mut computer = power_up(&begin).map_err(FlyError::Begin)?;
+    let (mut computer, mut crewed) = power_up(&begin).map_err(FlyError::Begin)?;
     drop(begin);
     watch.is_set_up();
     let mut frames = 0;
@@ -76,14 +82,20 @@ pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyErro
         let answer = match (&frame.from_power_up, &frame.in_the_air) {
             (Some(input), None) => {
                 let read = computer.read(input)?;
+                let read = match &crewed {
+                    Some(crewed) => crewed.hear(read),
+                    None => read,
+                };
                 watch.begins();
                 let output = computer.step(&read);
                 watch.ended(input.frame, &output);
                 let computer = computer.computer();
+                let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
                 Answer {
                     from_power_up: Some(output_to_log(&output, computer)),
                     in_the_air: None,
                     state_digest: computer.digest(),
+                    heard: crewed.as_mut().map(speak),
                 }
             }
             (None, Some(input)) => {
@@ -96,6 +108,7 @@ pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyErro
                     from_power_up: None,
                     in_the_air: computer.piloted().map(|(_, output)| pilot::output_to_log(output)),
                     state_digest: computer.flight_digest(),
+                    heard: None,
                 }
             }
             _ => return Err(FlyError::TwoInputs { after: frames }),
@@ -109,23 +122,30 @@ pub fn fly<L: Link>(link: &mut L, watch: &mut impl Watch) -> Result<u64, FlyErro
     Ok(frames)
 }
 
-/// The flight computer before its first frame, or why there is none.
-fn power_up(begin: &Begin) -> Result<RecordedComputer, String> {
+/// The flight computer before its first frame, and the crew's end of it; or why there is none.
+fn power_up(begin: &Begin) -> Result<(RecordedComputer, Option<Crewed>), String> {
     let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
     let mission = |start| {
         let mission = vehicles::mission::from_toml(&begin.toml, "mission");
         mission.map_err(|error| error.to_string()).map(|mission| mission_flown(mission, start))
     };
-    match (&begin.at_power_up, &begin.in_the_air) {
-        (Some(ComputerStart { in_space: Some(start), in_plane: None }), None) => {
-            Ok(RecordedComputer::in_space(&mission(start)?, start, controller))
+    match (&begin.at_power_up, &begin.in_the_air, &begin.on_the_air) {
+        (Some(ComputerStart { in_space: Some(start), in_plane: None }), None, on_the_air) => {
+            let mission = mission(start)?;
+            let computer = RecordedComputer::in_space(&mission, start, controller);
+            let crewed = on_the_air.as_ref().map(|on_the_air| Crewed::new(on_the_air, mission, &begin.toml));
+            Ok((computer, crewed))
         }
-        (Some(ComputerStart { in_space: None, in_plane: Some(release) }), None) => {
+        (Some(ComputerStart { in_space: None, in_plane: Some(release) }), None, None) => {
             let profile =
                 vehicles::profile::from_toml(&begin.toml, "profile").map_err(|error| error.to_string())?;
-            RecordedComputer::in_plane(&profile, release).map_err(|error| error.to_string())
+            let computer =
+                RecordedComputer::in_plane(&profile, release).map_err(|error| error.to_string())?;
+            Ok((computer, None))
         }
-        (None, Some(start)) => Ok(RecordedComputer::in_the_air(&mission(start)?, start, controller)),
-        _ => Err("must name one start, of one vehicle".into()),
+        (None, Some(start), None) => {
+            Ok((RecordedComputer::in_the_air(&mission(start)?, start, controller), None))
+        }
+        _ => Err("must name one start, of one vehicle, with a radio only from power-up on in space".into()),
     }
 }

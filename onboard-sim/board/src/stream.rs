@@ -4,13 +4,16 @@
 //! record, a protocol buffer. To the board: one [`Begin`], then one [`Frame`] for each frame. From the board: one
 //! [`Answer`] for each frame. A length of zero, or the end of the bytes, ends the flight.
 //!
+//! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander and requests in a frame, and
+//! its answer has them for the next one, so that a world that flies the same computer beside it can compare.
+//!
 //! Inputs and answers are the records of the flight log, byte for byte. There are two kinds of flights in logs: from
 //! power-up on, and, as in a campaign, released at once in the air.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use log_records::computer_v1::{ComputerInput, ComputerOutput, ComputerStart};
+use log_records::computer_v1::{Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink};
 use log_records::flight_v1::{PilotInput, PilotOutput, PilotStart};
 use prost::{DecodeError, Message};
 
@@ -32,6 +35,40 @@ pub struct Begin {
     /// The start of a flight that was released at once.
     #[prost(message, optional, tag = "4")]
     pub in_the_air: Option<PilotStart>,
+    /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are in the frames.
+    #[prost(message, optional, tag = "5")]
+    pub on_the_air: Option<OnTheAir>,
+}
+
+/// A board with a radio.
+#[derive(Clone, PartialEq, Message)]
+pub struct OnTheAir {
+    /// Name of the mission.
+    #[prost(string, required, tag = "1")]
+    pub mission: String,
+    /// MAVLink system id.
+    #[prost(uint32, required, tag = "2")]
+    pub system_id: u32,
+    /// Another one at each power-up.
+    #[prost(uint32, required, tag = "3")]
+    pub boot_number: u32,
+    /// Bytes per second that the radio carries.
+    #[prost(uint32, required, tag = "4")]
+    pub budget_bytes_s: u32,
+}
+
+/// What a board has heard over its radio for its next frame.
+#[derive(Clone, PartialEq, Message)]
+pub struct Heard {
+    /// `None`: nobody has to be heard.
+    #[prost(message, optional, tag = "1")]
+    pub uplink: Option<Uplink>,
+    /// The station that armed the vehicle, if one did.
+    #[prost(message, optional, tag = "2")]
+    pub commander: Option<Commander>,
+    /// In order.
+    #[prost(message, repeated, tag = "3")]
+    pub requests: Vec<Request>,
 }
 
 /// The input of a frame, of the one kind or the other.
@@ -61,12 +98,16 @@ pub struct Answer {
     /// The digest of the memory after the frame: the computer's, or that of its pilot in the air.
     #[prost(fixed64, required, tag = "3")]
     pub state_digest: u64,
+    /// What the next frame is told and asked, of a board with a radio.
+    #[prost(message, optional, tag = "4")]
+    pub heard: Option<Heard>,
 }
 
 impl Answer {
-    /// Whether both are the same in every bit. Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
+    /// Whether both have decided the same in every bit. Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
     pub fn is_same_as(&self, other: &Self) -> bool {
-        self.encode_to_vec() == other.encode_to_vec()
+        let decided = |answer: &Self| Self { heard: None, ..answer.clone() }.encode_to_vec();
+        decided(self) == decided(other)
     }
 }
 

@@ -50,6 +50,7 @@ fn begin(sortie: &Sortie) -> Begin {
         controller: recipe().controller.name().to_owned(),
         at_power_up: None,
         in_the_air: Some(tick_log::sortie::pilot_start(sortie)),
+        on_the_air: None,
     }
 }
 
@@ -63,6 +64,7 @@ fn flown(sortie: &mut Sortie) -> Vec<(PilotInput, Answer)> {
             from_power_up: None,
             in_the_air: Some(output_to_log(output)),
             state_digest: sortie.computer().flight_digest(),
+            heard: None,
         };
         frames.push((*input, answer));
     }
@@ -88,7 +90,7 @@ fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     let begin = begin(&sortie);
     let frames = flown(&mut sortie);
     let mut link = stream(&begin, frames.iter().map(|(input, _)| in_the_air(input)));
-    assert_eq!(fly(&mut link, &mut ()).unwrap(), frames.len() as u64);
+    assert_eq!(fly(&mut link, &mut (), &mut ()).unwrap(), frames.len() as u64);
     let (mut answers, mut buffer) = (Memory { to_read: link.written, ..Memory::default() }, Vec::new());
     for (_, expected) in &frames {
         let answer: Answer = receive(&mut answers, &mut buffer).unwrap().unwrap();
@@ -188,11 +190,14 @@ fn after_the_second_plan_only_frames_with_news_allocate() {
 fn what_is_wrong_with_a_stream_is_said() {
     let sortie = Sortie::new(&recipe(), 0).unwrap();
     let begin = begin(&sortie);
-    let said = |mut link: Memory| fly(&mut link, &mut ()).unwrap_err().to_string();
+    let said = |mut link: Memory| fly(&mut link, &mut (), &mut ()).unwrap_err().to_string();
 
-    assert!(matches!(fly(&mut Memory::default(), &mut ()), Err(FlyError::Empty)));
+    assert!(matches!(fly(&mut Memory::default(), &mut (), &mut ()), Err(FlyError::Empty)));
     let nothing = Begin { in_the_air: None, ..begin.clone() };
-    assert_eq!(said(stream(&nothing, [])), "the first record: must name one start, of one vehicle");
+    assert_eq!(
+        said(stream(&nothing, [])),
+        "the first record: must name one start, of one vehicle, with a radio only from power-up on in space"
+    );
     let unknown = Begin { controller: "luck".to_owned(), ..begin.clone() };
     assert_eq!(
         said(stream(&unknown, [])),
@@ -211,7 +216,7 @@ fn what_is_wrong_with_a_stream_is_said() {
     let mut long = Memory::default();
     long.to_read.extend((LONGEST_BYTES as u32 + 1).to_le_bytes());
     assert!(matches!(
-        fly(&mut long, &mut ()),
+        fly(&mut long, &mut (), &mut ()),
         Err(FlyError::Stream(StreamError::TooLong { bytes })) if bytes == LONGEST_BYTES + 1
     ));
 }

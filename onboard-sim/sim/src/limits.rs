@@ -21,16 +21,8 @@ pub struct Limits {
 
 impl Limits {
     pub fn of(mission: &Mission) -> Self {
-        let (legs, table_2) = (&mission.leg_limits, TouchdownLimits::from(&mission.touchdown_limits));
-        let legs = TouchdownLimits {
-            x_m: mission.gate.fence_radius_m,
-            pitch_error_rad: legs.tilt_deg.to_radians(),
-            u_m_s: legs.vertical_m_s,
-            w_m_s: legs.lateral_m_s,
-            pitch_rate_rad_s: legs.rate_deg_s.to_radians(),
-            ..table_2
-        };
-        Self { legs, table_2 }
+        let table_2 = TouchdownLimits::from(&mission.touchdown_limits);
+        Self { legs: TouchdownLimits::of_the_legs(mission), table_2 }
     }
 
     /// Judges by the limits of the legs: vertical and horizontal velocity over the ground, and the total rotation rate.

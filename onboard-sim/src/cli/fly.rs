@@ -91,8 +91,9 @@ pub(crate) struct FlyArguments {
     #[arg(long)]
     stay: bool,
     /// Missions: the flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
-    /// folder (onboard-sim/board/emulate). A frame that it decides otherwise ends the flight.
-    #[arg(long, value_name = "FOLDER")]
+    /// folder, and speaks MAVLink on its own radio (onboard-sim/board/emulate). A frame that it decides otherwise ends the
+    /// flight.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto_start"])]
     board: Option<PathBuf>,
     /// Drop a controller output that took longer than one sample period, as hardware would.
     #[arg(long)]
@@ -170,7 +171,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let options = FlyOptions {
         on_the_wire,
         profile,
-        auto_start: arguments.auto_start || arguments.mavlink.is_empty(),
+        auto_start: arguments.auto_start || (arguments.mavlink.is_empty() && arguments.board.is_none()),
         system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,

@@ -43,6 +43,12 @@ impl LoggedInput {
     pub fn input(&self) -> Input<'_> {
         Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
     }
+
+    /// The same input with what a board has heard itself.
+    #[must_use]
+    pub fn hearing(self, uplink: Uplink, commander: Option<Commander>, requests: Vec<Request>) -> Self {
+        Self { requests, rest: Input { uplink, commander, ..self.rest }, ..self }
+    }
 }
 
 /// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded in one frame only:
@@ -83,14 +89,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         log_running: input.log.running,
         log_space_bytes: input.log.space_bytes,
         uplink: uplink_to_log(input.uplink),
-        commander: input.commander.map(|Commander { station: (system, component), age_s, by }| {
-            v1::Commander {
-                system: u32::from(system),
-                component: u32::from(component),
-                age_s,
-                by: by.as_ref().map(operator_to_log),
-            }
-        }),
+        commander: input.commander.as_ref().map(commander_to_log),
         requests: input.requests.iter().map(request_to_log).collect(),
         rehearsed: input.rehearsed.map(|rehearsed| v1::Rehearsed {
             warm: rehearsed.warm,
@@ -119,12 +118,7 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
         (None, None, Some(sensed)) => Feeling::InPlane(plane_from_log(sensed)),
         _ => return Err(PilotLogError::Sensed { frame }),
     };
-    let commander = input.commander.as_ref().map(|commander| {
-        let station =
-            (byte(commander.system, frame, "system")?, byte(commander.component, frame, "component")?);
-        let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
-        Ok(Commander { station, age_s: commander.age_s, by })
-    });
+    let commander = input.commander.as_ref().map(|commander| commander_from_log(commander, frame));
     let rest = Input {
         frame,
         time_s: input.time_s,
@@ -209,7 +203,29 @@ fn plane_from_log(sensed: &v1::PlaneSensed) -> PlaneSensed {
     }
 }
 
-fn uplink_to_log(uplink: Uplink) -> Option<v1::Uplink> {
+/// The station that armed the vehicle as a record.
+pub fn commander_to_log(commander: &Commander) -> v1::Commander {
+    let Commander { station: (system, component), age_s, by } = commander;
+    v1::Commander {
+        system: u32::from(*system),
+        component: u32::from(*component),
+        age_s: *age_s,
+        by: by.as_ref().map(operator_to_log),
+    }
+}
+
+/// A recorded station that armed the vehicle.
+///
+/// # Errors
+/// This build does not know some value of it.
+pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, PilotLogError> {
+    let station = (byte(commander.system, frame, "system")?, byte(commander.component, frame, "component")?);
+    let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
+    Ok(Commander { station, age_s: commander.age_s, by })
+}
+
+/// How well a station is heard, as a record; `None` where nobody has to be heard.
+pub fn uplink_to_log(uplink: Uplink) -> Option<v1::Uplink> {
     match uplink {
         Uplink::NotNeeded => None,
         Uplink::NeverHeard => Some(v1::Uplink { age_s: None }),
@@ -217,7 +233,8 @@ fn uplink_to_log(uplink: Uplink) -> Option<v1::Uplink> {
     }
 }
 
-fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
+/// How well a station was heard.
+pub fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
     match uplink {
         None => Uplink::NotNeeded,
         Some(v1::Uplink { age_s: None }) => Uplink::NeverHeard,
@@ -225,7 +242,8 @@ fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
     }
 }
 
-fn request_to_log(request: &Request) -> v1::Request {
+/// A request of the crew as a record.
+pub fn request_to_log(request: &Request) -> v1::Request {
     // Every kind is in the list; a test checks that.
     let asked = ASKED.iter().position(|known| *known == request.asked).unwrap_or(ASKED.len());
     v1::Request {
@@ -238,7 +256,11 @@ fn request_to_log(request: &Request) -> v1::Request {
     }
 }
 
-fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotLogError> {
+/// A recorded request of the crew.
+///
+/// # Errors
+/// This build does not know some value of it.
+pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotLogError> {
     let unknown =
         PilotLogError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
     let station = request.system.zip(request.component).map(|(system, component)| {

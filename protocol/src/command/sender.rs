@@ -1,7 +1,8 @@
 //! The sender's side of the command protocol: decides when to send a command again, and which answer belongs to which
 //! command.
 
-use std::time::Duration;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use super::CommandAnswer;
 use crate::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
@@ -278,7 +279,7 @@ impl CommandSender {
 
     /// Returns the events since the last call.
     pub fn take_events(&mut self) -> Vec<CommandEvent> {
-        std::mem::take(&mut self.events)
+        core::mem::take(&mut self.events)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Turns messages into frames.
 
-use mavlink::{MavlinkVersion, Message as _};
+use alloc::vec::Vec;
+use mavlink_core::{MavlinkVersion, Message as _};
 
 use super::{CRC_LEN, Frame, HEADER_LEN, MAGIC, crc_extra};
 use crate::dialect::MavMessage;
@@ -55,7 +56,7 @@ impl Encoder {
             id[2],
         ]);
         bytes.extend_from_slice(payload);
-        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra);
+        let crc = mavlink_core::calculate_crc(&bytes[1..], crc_extra);
         bytes.extend_from_slice(&crc.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
         Frame { bytes }

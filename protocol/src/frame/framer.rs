@@ -1,6 +1,7 @@
 //! Finds frames with a correct checksum in bytes, however the bytes are split into pieces.
 
-use std::ops::Range;
+use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::{CRC_LEN, Frame, FrameView, HEADER_LEN, INCOMPAT_SIGNED, MAGIC, SIGNATURE_LEN, crc_extra};
 
@@ -21,7 +22,7 @@ pub struct FramerCounters {
     pub garbage_bytes: u64,
 }
 
-impl std::ops::AddAssign for FramerCounters {
+impl core::ops::AddAssign for FramerCounters {
     fn add_assign(&mut self, other: Self) {
         self.frames += other.frames;
         self.crc_errors += other.crc_errors;
@@ -152,7 +153,7 @@ fn examine(candidate: &[u8]) -> Candidate {
         return Candidate::Incomplete;
     }
     let found = u16::from_le_bytes([candidate[crc_at], candidate[crc_at + 1]]);
-    if mavlink::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
+    if mavlink_core::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
         Candidate::Whole(len)
     } else {
         Candidate::BadCrc

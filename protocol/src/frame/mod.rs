@@ -8,7 +8,9 @@
 mod encoder;
 mod framer;
 
-use mavlink::{MavlinkVersion, Message as _};
+use alloc::string::{String, ToString as _};
+use alloc::vec::Vec;
+use mavlink_core::{MavlinkVersion, Message as _};
 
 use crate::dialect::MavMessage;
 use crate::identity::Address;
@@ -120,7 +122,7 @@ impl Frame {
         let mut bytes = self.bytes[..crc_at].to_vec();
         bytes[2] = flags;
         // The id of a frame is always in the dialect; the framer checks it.
-        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
+        let crc = mavlink_core::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
         bytes.extend_from_slice(&crc.to_le_bytes());
         Self { bytes }
     }

@@ -3,6 +3,8 @@
 use crate::dialect::{FILE_TRANSFER_PROTOCOL_DATA, MavMessage};
 use crate::frame::Frame;
 use crate::identity::Address;
+use alloc::vec;
+use alloc::vec::Vec;
 
 /// The message that carries the packets.
 pub(crate) const FILE_TRANSFER_PROTOCOL_ID: u32 = 110;
@@ -198,7 +200,7 @@ impl Packet {
     /// A path in a request, without the zeros behind it; bytes that are no UTF-8 name no file.
     pub fn path(&self) -> &str {
         let end = self.data.iter().position(|byte| *byte == 0).unwrap_or(self.data.len());
-        std::str::from_utf8(&self.data[..end]).unwrap_or("")
+        core::str::from_utf8(&self.data[..end]).unwrap_or("")
     }
 
     /// The first four bytes of the data as a number.

@@ -1,6 +1,9 @@
 //! What is remembered of an unfinished download, as a text in a file beside the pieces.
 
-use std::fmt::Write as _;
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
+use core::fmt::Write as _;
 
 use super::ranges::Ranges;
 

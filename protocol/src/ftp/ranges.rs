@@ -1,7 +1,7 @@
 //! Which bytes of a file are there.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
+use alloc::collections::BTreeMap;
+use core::ops::Range;
 
 /// A set of bytes, kept as ranges that neither touch nor overlap.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -40,7 +40,7 @@ impl Ranges {
     /// The ranges of a file of this length that are not there, in order.
     pub fn missing(&self, len: u32) -> impl Iterator<Item = Range<u32>> {
         let mut from = 0;
-        let ends = self.iter().chain(std::iter::once(len..len));
+        let ends = self.iter().chain(core::iter::once(len..len));
         ends.map(move |there| {
             let gap = from.min(len)..there.start.min(len);
             from = there.end;

@@ -6,8 +6,11 @@
 
 mod received;
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use crate::duplicate::Duplicates;
 use crate::frame::{Frame, Framer, FramerCounters};
@@ -112,7 +115,7 @@ impl HubLink {
                 return Taken::News(News::Down(why));
             }
         };
-        let frames: Vec<Frame> = std::iter::from_fn(|| framer.next_frame()).collect();
+        let frames: Vec<Frame> = core::iter::from_fn(|| framer.next_frame()).collect();
         if bytes > 0 {
             self.stats.on_rx_bytes(bytes, now);
         }

@@ -1,6 +1,8 @@
 //! Defines what a transport hands to the hub.
 
-use std::net::SocketAddr;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::net::SocketAddr;
 
 /// The number of one stream of a link. A TCP server has a stream for each client. Numbers are not used twice.
 pub type StreamId = u64;

@@ -1,6 +1,10 @@
 //! The timestamps that must survive a restart, as lines of text to which further lines may be appended.
 
-use std::collections::BTreeMap;
+use alloc::borrow::ToOwned as _;
+use alloc::collections::BTreeMap;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 use super::timestamp::{MAX_STAMP, STAMPS_PER_S};
 use crate::identity::Address;

@@ -9,8 +9,9 @@
 mod memory;
 mod timestamp;
 
-use std::collections::BTreeMap;
-use std::fmt;
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
@@ -75,6 +76,7 @@ impl Key {
     }
 
     /// The bytes of the key.
+    #[cfg(feature = "std")]
     pub(crate) fn secret(&self) -> &[u8; Self::LEN] {
         &self.0
     }
@@ -149,7 +151,7 @@ impl SigningCounters {
 }
 
 /// Operators have keys with these numbers; 0 is the key that vehicle and stations share.
-pub const OPERATORS: std::ops::RangeInclusive<u8> = 1..=15;
+pub const OPERATORS: core::ops::RangeInclusive<u8> = 1..=15;
 /// The bits of a signature's link id that select the key; the others are the number of the link.
 const KEY_BITS: u32 = 4;
 

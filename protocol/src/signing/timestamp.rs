@@ -1,6 +1,6 @@
 //! The timestamps of MAVLink signatures, which count 10 us units since 2015-01-01 UTC.
 
-use std::time::Duration;
+use core::time::Duration;
 
 /// 2015-01-01 00:00 UTC after the Unix epoch: 16,436 days.
 const EPOCH: Duration = Duration::from_hours(24 * 16_436);

@@ -11,7 +11,7 @@ use flight::rules::phase::Phase;
 use protocol::dialect::MavMessage;
 use replay::shadow::{Check, Flag, Shadow};
 use sim::recipe::Recipe;
-use simulated_vehicle::endpoint::VehicleEndpoint;
+use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::vehicle::{RocketFlight, Vehicle};
 
 use crate::command_line::run;
@@ -100,7 +100,7 @@ fn flown(mission: &str, number: u64, Trouble { fault, impulse_share }: Trouble<'
         } else {
             Vec::new()
         };
-        endpoint.step(&mut vehicle, &own, &mut || Duration::ZERO);
+        step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO);
         let now_s = vehicle.time_s();
         for sent in endpoint.poll(&vehicle) {
             let message = sent.frame.decode().unwrap();

@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use core::f64::consts::FRAC_PI_2;
 
 use crate::vehicle::dynamics::PlanarState;
+use crate::vehicle::mission::Mission;
 use crate::vehicle::profile::{Profile, TouchdownBox};
 
 /// What counts as a landing.
@@ -34,6 +35,19 @@ impl TouchdownLimits {
     /// The limits of a profile.
     pub fn from_profile(profile: &Profile) -> Self {
         Self::from(&profile.touchdown_limits)
+    }
+
+    /// The limits of a mission's legs, anywhere inside its fence.
+    pub fn of_the_legs(mission: &Mission) -> Self {
+        let legs = &mission.leg_limits;
+        Self {
+            x_m: mission.gate.fence_radius_m,
+            pitch_error_rad: legs.tilt_deg.to_radians(),
+            u_m_s: legs.vertical_m_s,
+            w_m_s: legs.lateral_m_s,
+            pitch_rate_rad_s: legs.rate_deg_s.to_radians(),
+            ..Self::from(&mission.touchdown_limits)
+        }
     }
 }
 

@@ -1,7 +1,9 @@
-//! A flight computer on a board that decides every frame of a flight beside the one in this process.
+//! A flight computer on a board that decides every frame of a flight beside the one in this process, and hears the crew on a
+//! radio of its own.
 //!
-//! The vehicle's frame is over when the board has answered it with the same output and the same digest of its memory, bit for bit;
-//! otherwise the flight ends with an error. So what moves the vehicle is what the board has decided.
+//! What the crew asks for comes from the board with its answer to the frame before. The vehicle's frame is over when the board has
+//! answered it with the same output and the same digest of its memory, bit for bit; otherwise the flight ends with an error. So
+//! what moves the vehicle is what the board has decided, from what the board has heard.
 //!
 //! The board is at the other end of two pipes in a folder, `frames` and `answers`, and reads a flight as
 //! [`board::stream`] describes it. A board that was dead in some frames finds that out from the number of the next one, and
@@ -14,11 +16,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-use board::stream::{Answer, Begin, Frame, Link, StreamError, receive, send};
-use protocol::log::computer_v1::ComputerFrame;
+use board::stream::{self, Answer, Begin, Frame, Link, OnTheAir, StreamError, receive, send};
+use flight::rules::arming::Uplink;
+use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::record::Record;
+use tick_log::computer::{commander_from_log, request_from_log, uplink_from_log};
+use tick_log::pilot::PilotLogError;
 
-use crate::vehicle::Vehicle;
+use crate::endpoint::Heard;
+use crate::vehicle::{Vehicle, VehicleEvent};
 
 /// A board that is silent for longer has stopped. An emulated one plans a landing in a second or two.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -36,6 +42,8 @@ pub enum BoardError {
     Gone { frame: u64 },
     #[error("frame {frame}: the board has decided something else than the computer in this process")]
     Differs { frame: u64 },
+    #[error("what the board has heard: {0}")]
+    Heard(#[from] PilotLogError),
 }
 
 /// The pipe to the board as a link that is only written.
@@ -75,12 +83,18 @@ pub(super) struct OnBoard {
     begin: Begin,
     /// The number of the last frame.
     last: Option<u64>,
+    /// For the next frame; `None` of a board that has not answered the last one: it has heard nobody yet.
+    heard: Option<stream::Heard>,
     buffer: Vec<u8>,
 }
 
 impl OnBoard {
     /// Opens the pipes in a folder; waits until the board has opened them, too.
-    pub(super) fn open(folder: &Path, mission_toml: &str, controller: &str) -> Result<Self, BoardError> {
+    pub(super) fn open(
+        folder: &Path,
+        (mission_toml, controller): (&str, &str),
+        on_the_air: OnTheAir,
+    ) -> Result<Self, BoardError> {
         let opened = |name: &str, options: &OpenOptions| {
             let path = folder.join(name);
             options.open(&path).map_err(|source| BoardError::Pipe { path, source })
@@ -100,13 +114,44 @@ impl OnBoard {
             }
         });
         reading.map_err(|source| BoardError::Pipe { path: folder.join("answers"), source })?;
-        let begin =
-            Begin { toml: mission_toml.to_owned(), controller: controller.to_owned(), ..Begin::default() };
-        Ok(Self { frames, answers, begin, last: None, buffer: Vec::new() })
+        let begin = Begin {
+            toml: mission_toml.to_owned(),
+            controller: controller.to_owned(),
+            on_the_air: Some(on_the_air),
+            ..Begin::default()
+        };
+        Ok(Self { frames, answers, begin, last: None, heard: None, buffer: Vec::new() })
+    }
+
+    /// Steps the vehicle by one frame with what the board has heard; the board decides it, too.
+    pub(super) fn step(
+        &mut self,
+        vehicle: &mut Vehicle,
+        stopwatch: &mut dyn FnMut() -> Duration,
+    ) -> Result<Vec<VehicleEvent>, BoardError> {
+        let Heard { uplink, commander, requests } = self.heard()?;
+        vehicle.set_uplink(uplink, commander);
+        let events = vehicle.step(&requests, stopwatch).events;
+        self.heard = None;
+        self.decide(vehicle)?;
+        Ok(events)
+    }
+
+    fn heard(&self) -> Result<Heard, PilotLogError> {
+        let Some(stream::Heard { uplink, commander, requests }) = &self.heard else {
+            return Ok(Heard { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
+        };
+        let next = self.last.map_or(0, |last| last + 1);
+        let requests = requests.iter().map(|request| request_from_log(request, next));
+        Ok(Heard {
+            uplink: uplink_from_log(uplink.as_ref()),
+            commander: commander.as_ref().map(|commander| commander_from_log(commander, next)).transpose()?,
+            requests: requests.collect::<Result<_, _>>()?,
+        })
     }
 
     /// Has the board decide the vehicle's last frame, if its computer lived in it, and compares.
-    pub(super) fn decide(&mut self, vehicle: &Vehicle) -> Result<(), BoardError> {
+    fn decide(&mut self, vehicle: &Vehicle) -> Result<(), BoardError> {
         for record in vehicle.computer_records() {
             match record {
                 Record::ComputerStart(start) => {
@@ -122,7 +167,10 @@ impl OnBoard {
 
     fn compare(&mut self, frame: &ComputerFrame) -> Result<(), BoardError> {
         let number = frame.input.frame;
-        let sent = Frame { from_power_up: Some(frame.input.clone()), in_the_air: None };
+        // The board knows itself what it has heard.
+        let input =
+            ComputerInput { uplink: None, commander: None, requests: Vec::new(), ..frame.input.clone() };
+        let sent = Frame { from_power_up: Some(input), in_the_air: None };
         send(&mut self.frames, &sent, &mut self.buffer)?;
         if self.last.is_some_and(|last| number > last + 1) {
             send(&mut self.frames, &self.begin, &mut self.buffer)?;
@@ -138,8 +186,12 @@ impl OnBoard {
             from_power_up: Some(frame.output.clone()),
             in_the_air: None,
             state_digest: frame.state_digest,
+            heard: None,
         };
-        let same = answer.is_same_as(&expected);
-        if same { Ok(()) } else { Err(BoardError::Differs { frame: number }) }
+        if !answer.is_same_as(&expected) {
+            return Err(BoardError::Differs { frame: number });
+        }
+        self.heard = answer.heard;
+        Ok(())
     }
 }

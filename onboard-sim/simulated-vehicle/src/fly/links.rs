@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use mavlink::MessageData as _;
+use mavlink_core::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA};

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use ::board::stream::OnTheAir;
 use flight::rules::phase::Phase;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
 use protocol::key_file::KeyFileError;
@@ -23,6 +24,7 @@ use protocol::log::v1::LandingVerdict;
 use protocol::transport::LinkAddress;
 use sim::recipe::RecipeError;
 use tokio::sync::watch;
+use vehicle_link::streams::Standard;
 use vehicles::file_error::FileError;
 
 pub use self::board::BoardError;
@@ -36,9 +38,8 @@ pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
 pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
-use crate::endpoint::VehicleEndpoint;
+use crate::endpoint::{self, VehicleEndpoint};
 use crate::solve_times::SolveTimes;
-use crate::streams::Standard;
 use crate::vehicle::{Judged, Vehicle, VehicleEvent};
 use flight::computer::plane::PlaneError;
 pub use flight::vehicle::profile::StartPoint;
@@ -95,7 +96,8 @@ pub struct FlyOptions {
     pub exit_when_safed: bool,
     /// What happens to a late controller output.
     pub deadline_policy: DeadlinePolicy,
-    /// Folder with the pipes of a board whose flight computer decides every frame, too.
+    /// Folder with the pipes of a board whose flight computer decides every frame, too, and that hears the crew on its own
+    /// radio; then there are no links and no start by itself.
     pub board: Option<PathBuf>,
     /// Receives the vehicle's time every frame, for other writers of the same log.
     pub log_clock: Option<LogClock>,
@@ -276,11 +278,18 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
     Ok(vehicle)
 }
 
-fn on_board(folder: &Path, profile: &LoadedFlight) -> Result<OnBoard, FlyError> {
-    let LoadedFlight::InSpace(flight) = profile else {
-        return Err(FlyError::NotOnABoard { name: profile.name().to_owned() });
+fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
+    let LoadedFlight::InSpace(flight) = &options.profile else {
+        return Err(FlyError::NotOnABoard { name: options.profile.name().to_owned() });
     };
-    Ok(OnBoard::open(folder, &flight.recipe.mission_toml, flight.recipe.controller.name())?)
+    let on_the_air = OnTheAir {
+        mission: options.profile.name().to_owned(),
+        system_id: u32::from(options.system_id),
+        boot_number: options.on_the_wire.boot_number.get(),
+        budget_bytes_s: options.on_the_wire.serial_bytes_s,
+    };
+    let recipe = &flight.recipe;
+    Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
 }
 
 /// How a flight has ended.
@@ -317,9 +326,10 @@ pub async fn fly_observed(
     )
     .await?;
     let mut endpoint = endpoint_of(&options, vehicle.standard());
-    let mut on_board =
-        options.board.as_deref().map(|folder| on_board(folder, &options.profile)).transpose()?;
-    let crewed = !options.links.is_empty() && !options.auto_start;
+    let mut on_board = options.board.as_deref().map(|folder| on_board(folder, &options)).transpose()?;
+    // Somebody may be heard: here, or on the board's own radio.
+    let served = !options.links.is_empty() || on_board.is_some();
+    let crewed = served && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false };
@@ -341,10 +351,11 @@ pub async fn fly_observed(
         }
         let own = own_start.requests(&vehicle);
         let stopwatch = pace.clock();
-        let (events, answers) = endpoint.step(&mut vehicle, &own, &mut || stopwatch.elapsed());
-        if let Some(on_board) = &mut on_board {
-            on_board.decide(&vehicle)?;
-        }
+        let mut elapsed = || stopwatch.elapsed();
+        let (events, answers) = match &mut on_board {
+            Some(on_board) => (on_board.step(&mut vehicle, &mut elapsed)?, Vec::new()),
+            None => endpoint::step(&mut endpoint, &mut vehicle, &own, &mut elapsed),
+        };
         own_start.on_answers(&answers);
         let time_s = vehicle.time_s();
         if let Some(clock) = &options.log_clock {
@@ -371,12 +382,8 @@ pub async fn fly_observed(
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
         let over = vehicle.is_over() || own_start.refused.is_some();
-        let aborted_on_the_pad = vehicle.phase().on_pad() && vehicle.aborted() && !options.links.is_empty();
-        if over
-            && !aborted_on_the_pad
-            && options.exit_when_safed
-            && pace.has_lingered(!options.links.is_empty())
-        {
+        let aborted_on_the_pad = vehicle.phase().on_pad() && vehicle.aborted() && served;
+        if over && !aborted_on_the_pad && options.exit_when_safed && pace.has_lingered(served) {
             break false;
         }
         let waiting = match () {

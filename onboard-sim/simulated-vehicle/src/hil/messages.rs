@@ -14,7 +14,7 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 
-use crate::telemetry::td_phase;
+use vehicle_link::telemetry::td_phase;
 
 /// Length of a frame, us.
 pub const FRAME_US: u64 = FRAME_MS as u64 * 1000;

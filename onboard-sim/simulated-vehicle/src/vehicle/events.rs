@@ -5,7 +5,7 @@ use flight::computer::plane::PlanarTick;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::LandingVerdict;
 
-use sim::plane::plant::Impact;
+use super::Impact;
 
 /// One tick of the planar vehicle's landing controller, and its solve time.
 #[derive(Debug, Clone, PartialEq)]

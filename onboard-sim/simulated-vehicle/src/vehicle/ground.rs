@@ -6,11 +6,10 @@ use flight::rules::phase::Phase;
 use sim::limits::Limits;
 use sim::outcome::Outcome;
 use sim::plane::PlanarFlight;
-use sim::plane::plant::Impact;
 use sim::sortie::Sortie;
 use world::RestOutcome;
 
-use super::{Judged, VehicleEvent};
+use super::{Impact, Judged, VehicleEvent};
 
 /// A flight computer that does not notice within this time that it lies on the ground is waited for no longer, s.
 const UNNOTICED_S: f64 = 15.0;
@@ -82,6 +81,7 @@ impl Ground {
         self.contacts = flight.impacts().len();
         let down = flight.computer().mode().phase == Phase::Touchdown;
         if let (true, None, Some((impact, verdict))) = (down, self.judged, flight.judge()) {
+            let impact = Impact { time_s: impact.time_s, state: impact.state };
             self.judged = Some(Judged { impact, verdict, landed: verdict.landed() });
             events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
         }

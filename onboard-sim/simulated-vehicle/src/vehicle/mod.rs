@@ -9,8 +9,8 @@
 mod events;
 mod ground;
 mod log;
-mod sensed;
-mod snapshot;
+mod plane;
+mod space;
 #[cfg(test)]
 mod tests;
 
@@ -32,12 +32,14 @@ use sim::sortie::{Radio, SetUpError, Sortie};
 
 pub use self::events::{Tick, VehicleEvent};
 use self::ground::Ground;
-use self::sensed::SensorWatch;
-pub use self::snapshot::{
+use vehicle_link::sensed::SensorWatch;
+use vehicle_link::snapshot::Known;
+pub use vehicle_link::snapshot::{
     AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
-    Judged, Motion, PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
+    Impact, Judged, Motion, PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
 };
-use crate::streams::{FROM_APOGEE, STANDARD, Standard};
+use vehicle_link::streams::{FROM_APOGEE, STANDARD, Standard};
+pub use vehicle_link::vehicle::MissionName;
 
 /// A flight of a rocket in space, by recipe and number.
 #[derive(Debug, Clone)]
@@ -60,19 +62,6 @@ struct InSpace {
     took_s: f64,
     /// A frame of the flight computer was flown in the air just now.
     flown: bool,
-}
-
-/// Which mission or profile a vehicle flies.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MissionName {
-    pub name: String,
-    pub hash: MissionHash,
-}
-
-impl Default for MissionName {
-    fn default() -> Self {
-        Self { name: String::new(), hash: MissionHash::of("") }
-    }
 }
 
 /// One vehicle, one flight.
@@ -316,6 +305,28 @@ impl Vehicle {
         }
     }
 
+    /// The state now.
+    pub fn snapshot(&self) -> Snapshot {
+        match &self.flight {
+            Flight::Space(space) => self.snapshot_in_space(space),
+            Flight::Plane(flight) => self.snapshot_in_plane(flight),
+        }
+    }
+
+    fn known(&self) -> Known<'_> {
+        Known {
+            computer: self.computer(),
+            time_s: self.time_s(),
+            deadline_s: self.deadline_s(),
+            judged: self.judged(),
+            people: self.people,
+            operators: &self.operators,
+            commander: self.commander,
+            mission: &self.mission,
+            log: self.log,
+        }
+    }
+
     /// Phase, latches and countdown.
     pub fn mode(&self) -> &Mode {
         self.computer().mode()
@@ -385,5 +396,35 @@ impl Vehicle {
             }
             Flight::Plane(_) => Radio::default(),
         }
+    }
+}
+
+impl vehicle_link::vehicle::Vehicle for Vehicle {
+    fn computer(&self) -> &Computer {
+        Self::computer(self)
+    }
+
+    fn time_s(&self) -> f64 {
+        Self::time_s(self)
+    }
+
+    fn mission(&self) -> &MissionName {
+        Self::mission(self)
+    }
+
+    fn operators(&self) -> &[Operator] {
+        Self::operators(self)
+    }
+
+    fn people(&self) -> Option<People> {
+        Self::people(self)
+    }
+
+    fn weights(&self) -> StateWeights {
+        Self::weights(self)
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        Self::snapshot(self)
     }
 }

@@ -6,8 +6,11 @@
 
 mod pieces;
 
-use std::collections::VecDeque;
-use std::time::Duration;
+use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use self::pieces::Pieces;
 use super::LOG_DIRECTORY;
@@ -179,7 +182,7 @@ impl Download {
             self.turn_to(Phase::Closing);
             return None;
         }
-        if std::mem::replace(&mut self.again, true) {
+        if core::mem::replace(&mut self.again, true) {
             self.phase = Phase::Over(Some(Failure::Damaged));
             return None;
         }
@@ -296,7 +299,7 @@ impl Download {
     fn opened(&mut self, crc: Option<u32>) -> Option<News> {
         let path = self.path.clone()?;
         // A session that was opened again goes on with what is there.
-        let so_far = (self.bytes > 0).then(|| std::mem::take(&mut self.have));
+        let so_far = (self.bytes > 0).then(|| core::mem::take(&mut self.have));
         let so_far = so_far.map(|have| Part { path: path.clone(), len: self.len, crc: self.crc, have });
         let kept = so_far.or_else(|| self.kept.take());
         let same = |part: &Part| part.path == path && part.len == self.len && part.crc == crc;

@@ -1,9 +1,10 @@
 //! Decides which pieces to ask for: a burst where much is missing, and meanwhile single pieces for the gaps that it
 //! has left. So the line always has something to carry, also while a lost request is noticed.
 
-use std::collections::VecDeque;
-use std::ops::Range;
-use std::time::Duration;
+use alloc::collections::VecDeque;
+use alloc::vec::Vec;
+use core::ops::Range;
+use core::time::Duration;
 
 use crate::ftp::packet::{DATA_LEN, Opcode, Packet};
 use crate::ftp::ranges::Ranges;

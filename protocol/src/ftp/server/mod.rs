@@ -6,8 +6,13 @@
 
 mod session;
 
-use std::collections::VecDeque;
-use std::time::Duration;
+use alloc::borrow::ToOwned as _;
+use alloc::collections::VecDeque;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::time::Duration;
 
 use super::crc;
 use super::packet::{DATA_LEN, FileRequest, Opcode, Packet, Refusal};

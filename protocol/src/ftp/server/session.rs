@@ -1,7 +1,7 @@
 //! One open file of one client: what it has asked for and was not yet sent.
 
-use std::collections::VecDeque;
-use std::time::Duration;
+use alloc::collections::VecDeque;
+use core::time::Duration;
 
 use crate::ftp::packet::{DATA_LEN, Opcode, Packet, Refusal};
 use crate::ftp::server::Files;
@@ -99,7 +99,7 @@ impl Session {
 
     /// The next packet. Single pieces and a burst take turns, so that neither waits for the other.
     pub(super) fn next(&mut self, piece: &mut [u8; DATA_LEN], files: &mut dyn Files) -> Option<Packet> {
-        let burst_first = std::mem::replace(&mut self.burst_next, false);
+        let burst_first = core::mem::replace(&mut self.burst_next, false);
         if let Some(request) =
             (!burst_first || self.burst.is_none()).then(|| self.reads.pop_front()).flatten()
         {

@@ -72,7 +72,7 @@ fn an_interval_is_for_the_link_that_asked_and_a_fast_link_carries_more() {
 fn texts_of_the_vehicle_go_over_every_link() {
     let mut wire = two_links();
     assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
-    wire.endpoint.on_event(&VehicleEvent::Text { severity: Severity::Notice, text: "a word".to_owned() });
+    wire.endpoint.say(Severity::Notice, "a word");
     let sent = wire.run_links(0.1);
     assert!(sent.iter().all(|frames| texts(frames) == ["a word"]));
 }

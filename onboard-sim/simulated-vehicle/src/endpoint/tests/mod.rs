@@ -2,16 +2,24 @@
 
 use std::time::Duration;
 
-use proptest::prelude::*;
-use protocol::command::CommandAnswer;
-use protocol::dialect::{ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, MavCmd, TD_FINS_DATA};
-use protocol::identity::GROUND;
-use protocol::text::Reassembler;
-
-use super::*;
-use crate::vehicle::Vehicle;
 use flight::computer::LogState;
-use flight::computer::crew::Request;
+use flight::computer::crew::{Asked, Request};
+use flight::computer::news::Severity;
+use flight::rules::phase::Phase;
+use mavlink_core::MessageData as _;
+use proptest::prelude::*;
+use protocol::command::{CommandAnswer, CommandRequest};
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, AVAILABLE_MODES_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage,
+    MavResult, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TIMESYNC_DATA, TdCheck,
+};
+use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
+use protocol::identity::{Address, GROUND, RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::text::Reassembler;
+use vehicle_link::streams::{STANDARD, Streams};
+
+use super::{Outgoing, VehicleEndpoint, step};
+use crate::vehicle::{Vehicle, VehicleEvent};
 use sim::plane::draw::draw;
 use sim::plane::{DeadlinePolicy, PlanarFlight};
 
@@ -31,7 +39,7 @@ fn frame(
     own: &[Asked],
 ) -> (Vec<VehicleEvent>, Vec<Outgoing>) {
     let own: Vec<Request> = own.iter().copied().map(Request::of_the_programme).collect();
-    let (events, _) = endpoint.step(vehicle, &own, &mut || Duration::ZERO);
+    let (events, _) = step(endpoint, vehicle, &own, &mut || Duration::ZERO);
     (events, endpoint.poll(vehicle))
 }
 
@@ -92,7 +100,7 @@ impl Wire {
         };
         payload.param3 = f32::NAN;
         let mut bytes = [0; 255];
-        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
+        let len = mavlink_core::MessageData::ser(&payload, mavlink_core::MavlinkVersion::V1, &mut bytes);
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
         let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
         self.endpoint.on_frame(0, &frame, &self.vehicle);
@@ -358,6 +366,27 @@ proptest! {
         // None of these payloads is the arm command with exactly 1: nothing was armed or started.
         prop_assert!(!wire.vehicle.mode().interlocks.armed);
         prop_assert!(wire.vehicle.phase() == Phase::PadIdle);
+    }
+}
+
+/// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the start of its
+/// check's name.
+#[test]
+fn the_dialect_names_the_arming_checks_in_their_order() {
+    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
+    let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
+    let vehicle = Vehicle::in_plane(flight);
+    let checks = vehicle.arming_checks();
+    let bits: Vec<_> = TdCheck::all().iter_names().collect();
+    assert_eq!(bits.len(), checks.len());
+    for (place, (check, (name, bit))) in checks.iter().zip(bits).enumerate() {
+        assert_eq!(bit.bits(), 1 << place);
+        let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+        assert!(
+            check.name.replace('-', " ").starts_with(&words),
+            "bit {place}: {name} is not {}",
+            check.name
+        );
     }
 }
 

@@ -1,13 +1,13 @@
 //! Tests questions about parameters, files and versions, as other clients ask them.
 
-use mavlink::types::CharArray;
+use mavlink_core::types::CharArray;
 use protocol::dialect::{
     FILE_TRANSFER_PROTOCOL_DATA, MavParamError, MavParamType, PARAM_REQUEST_LIST_DATA,
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 use super::*;
-use crate::parameters;
+use vehicle_link::parameters;
 
 fn name(text: &str) -> CharArray<16> {
     let mut bytes = [0; 16];

@@ -11,7 +11,7 @@ use sim::dispersion::Dispersion;
 
 use super::*;
 use crate::fly::{Delayed, LoadedFlight, load_flight};
-use crate::streams::FROM_APOGEE;
+use vehicle_link::streams::FROM_APOGEE;
 
 struct Airborne {
     rocket: Vehicle,

@@ -3,11 +3,12 @@
 use flight::rules::arming::{UPLINK_CHECK, all_passed};
 use flight::rules::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
 use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdMotor};
+use protocol::signing::Rejection;
 use sim::dispersion::Dispersion;
 
 use super::*;
 use crate::fly::{LoadedFlight, load_flight};
-use crate::streams::FROM_APOGEE;
+use vehicle_link::streams::FROM_APOGEE;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;

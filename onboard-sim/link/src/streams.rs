@@ -1,6 +1,9 @@
 //! The messages that are sent periodically, and their rates.
 
-use mavlink::MessageData;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+use mavlink_core::MessageData;
 use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA,
     CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
@@ -378,7 +381,7 @@ impl Streams {
     pub fn interval_of(&self, message_id: u32) -> MavMessage {
         let stream = self.each.iter().find(|stream| stream.message_id == message_id);
         let interval_us = match stream.map(|stream| stream.interval_s) {
-            Some(Some(interval_s)) => (1e6 * interval_s).round() as i32,
+            Some(Some(interval_s)) => libm::round(1e6 * interval_s) as i32,
             Some(None) => -1,
             // As the standard has it: 0 means the message is not available.
             None => 0,

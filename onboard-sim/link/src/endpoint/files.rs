@@ -1,6 +1,10 @@
 //! Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on the ground, disarmed.
 
-use std::time::Duration;
+use alloc::borrow::ToOwned as _;
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use core::time::Duration;
 
 use flight::computer::news::Severity;
 use flight::rules::operator::Operator;
@@ -42,7 +46,7 @@ impl FileService {
 }
 
 /// Whether the vehicle gives out its log: it is disarmed, and on its pad or safe on the ground.
-pub(crate) fn gives_out_its_log(vehicle: &Vehicle) -> bool {
+pub fn gives_out_its_log(vehicle: &dyn Vehicle) -> bool {
     let phase = vehicle.phase();
     !vehicle.mode().interlocks.armed && (phase.on_pad() || matches!(phase, Phase::Touchdown | Phase::Safed))
 }
@@ -61,7 +65,7 @@ impl VehicleEndpoint {
         link: usize,
         request: &FileRequest,
         by: Option<Operator>,
-        vehicle: &Vehicle,
+        vehicle: &dyn Vehicle,
     ) {
         let forbidden = why_forbidden(by, vehicle);
         if forbidden.is_none() && request.packet.opcode == Opcode::OpenFileRo {
@@ -76,7 +80,7 @@ impl VehicleEndpoint {
     }
 
     /// Continues with what takes long, and closes every file when the vehicle must not give them out any more.
-    pub(super) fn serve_files(&mut self, vehicle: &Vehicle) {
+    pub(super) fn serve_files(&mut self, vehicle: &dyn Vehicle) {
         let FileService { server, files } = &mut self.files;
         if gives_out_its_log(vehicle) {
             server.work(&mut **files);
@@ -87,7 +91,7 @@ impl VehicleEndpoint {
 }
 
 /// Why this client may not read now, if so.
-fn why_forbidden(by: Option<Operator>, vehicle: &Vehicle) -> Option<String> {
+fn why_forbidden(by: Option<Operator>, vehicle: &dyn Vehicle) -> Option<String> {
     if !vehicle.operators().is_empty() && by.is_none() {
         return Some("log refused: only an operator with a key of their own fetches it".to_owned());
     }

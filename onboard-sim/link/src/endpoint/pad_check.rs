@@ -28,7 +28,7 @@ pub(super) struct CheckTeller {
 
 impl CheckTeller {
     /// The message to send now.
-    pub(super) fn due(&mut self, vehicle: &Vehicle, now_s: f64) -> Option<MavMessage> {
+    pub(super) fn due(&mut self, vehicle: &dyn Vehicle, now_s: f64) -> Option<MavMessage> {
         let check = vehicle.computer().pad_check();
         let mode = vehicle.mode();
         let now = (check.run(), check.state());

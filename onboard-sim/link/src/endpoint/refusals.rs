@@ -1,7 +1,11 @@
 //! Limits how often refusals are explained: the reason is sent once and then counted, so that a flood of refused
 //! requests fills neither the radio nor the crew's screen.
 
-use std::collections::BTreeMap;
+use alloc::borrow::ToOwned as _;
+use alloc::collections::BTreeMap;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 
 use protocol::identity::Address;
 
@@ -88,7 +92,7 @@ impl Warnings {
             if now_s - said.at_s < SAID_FOR_S {
                 return true;
             }
-            let more = std::mem::take(&mut said.more);
+            let more = core::mem::take(&mut said.more);
             if more > 0 {
                 said.at_s = now_s;
                 words.push(format!("{} ({more} more)", said.words));
@@ -96,7 +100,7 @@ impl Warnings {
             more > 0
         });
         if self.others > 0 && now_s - self.others_since_s >= SAID_FOR_S {
-            words.push(format!("{} other warnings", std::mem::take(&mut self.others)));
+            words.push(format!("{} other warnings", core::mem::take(&mut self.others)));
         }
         words
     }

@@ -1,14 +1,14 @@
 //! Battery and storage.
 
-use mavlink::MessageData as _;
-use mavlink::types::CharArray;
+use mavlink_core::MessageData as _;
+use mavlink_core::types::CharArray;
 use protocol::dialect::{
     BATTERY_STATUS_DATA, MavBatteryFault, MavMessage, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
     StorageStatus, StorageType, StorageUsageFlag, TdCheck,
 };
 
 use super::boot_ms;
-use crate::vehicle::Snapshot;
+use crate::snapshot::Snapshot;
 
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
     match message_id {
@@ -37,17 +37,19 @@ pub(super) fn failing(snapshot: &Snapshot) -> MavSysStatusSensor {
 
 /// mV; `UINT16_MAX`: not known.
 pub(super) fn millivolts(snapshot: &Snapshot) -> u16 {
-    snapshot.battery.map_or(u16::MAX, |battery| (1000.0 * battery.volts).round() as u16)
+    snapshot.battery.map_or(u16::MAX, |battery| libm::round(1000.0 * battery.volts) as u16)
 }
 
 /// cA; -1: not known.
 pub(super) fn centiamperes(snapshot: &Snapshot) -> i16 {
-    snapshot.battery.map_or(-1, |battery| (100.0 * battery.current_a).round() as i16)
+    let current_a = snapshot.battery.and_then(|battery| battery.current_a);
+    current_a.map_or(-1, |current_a| libm::round(100.0 * current_a) as i16)
 }
 
 /// Percent; -1: not known.
 pub(super) fn percent(snapshot: &Snapshot) -> i8 {
-    snapshot.battery.map_or(-1, |battery| (100.0 * battery.left).round() as i8)
+    let left = snapshot.battery.and_then(|battery| battery.left);
+    left.map_or(-1, |left| libm::round(100.0 * left) as i8)
 }
 
 fn battery(snapshot: &Snapshot) -> MavMessage {

@@ -4,7 +4,10 @@
 //! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock. A forced *disarm* is what
 //! other ground stations call an emergency stop: it always stops what can still be stopped.
 
-use mavlink::MessageData as _;
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
+use mavlink_core::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
@@ -111,7 +114,8 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
 /// their command is an ask.
 pub fn confirmed_ask(request: &CommandRequest) -> Option<u16> {
     let param3 = request.params[2];
-    let confirms = (1.0..=f32::from(u16::MAX)).contains(&param3) && param3.fract() == 0.0;
+    let confirms =
+        (1.0..=f32::from(u16::MAX)).contains(&param3) && libm::truncf(param3).to_bits() == param3.to_bits();
     confirms.then_some(param3 as u16)
 }
 
@@ -139,7 +143,7 @@ pub fn mav_result(ending: Ending) -> MavResult {
 /// A message id sent as a float.
 fn message_id(param: f32) -> Result<u32, Unfit> {
     let largest = 0x00FF_FFFF_u32 as f32;
-    if (0.0..=largest).contains(&param) && param.fract() == 0.0 {
+    if (0.0..=largest).contains(&param) && libm::truncf(param).to_bits() == param.to_bits() {
         return Ok(param as u32);
     }
     let reason = format!("message id {param}: must be a whole number from 0 to 16777215");

@@ -1,8 +1,7 @@
 //! Keeps the stations' requests until the vehicle has decided. A command is acknowledged by the frame that carried it
 //! out.
 
-use std::time::Duration;
-
+use alloc::vec::Vec;
 use flight::computer::Commander;
 use flight::computer::crew::{Answer, Asked, Ending, People, Request};
 use flight::rules::arming::Uplink;
@@ -13,10 +12,21 @@ use protocol::identity::Address;
 
 use super::VehicleEndpoint;
 use crate::commands;
-use crate::vehicle::{Frame, Vehicle, VehicleEvent};
+use crate::vehicle::Vehicle;
 
 /// Most commands that may wait for one frame (some milliseconds); more are ignored.
 const MAX_WAITING: usize = 64;
+
+/// What a frame of the vehicle is told of its links, and asked by its crew.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heard {
+    /// How well the best station is heard.
+    pub uplink: Uplink,
+    /// The station that armed the vehicle, if one did.
+    pub commander: Option<Commander>,
+    /// In order.
+    pub requests: Vec<Request>,
+}
 
 /// A command that the vehicle decides in its next frame.
 #[derive(Debug, Clone)]
@@ -40,7 +50,7 @@ impl VehicleEndpoint {
         link: usize,
         (command, by): (&CommandRequest, Option<Operator>),
         asked: Asked,
-        vehicle: &Vehicle,
+        vehicle: &dyn Vehicle,
     ) {
         // Other commands never displace an abort.
         if self.waiting.len() >= MAX_WAITING && asked != Asked::Abort {
@@ -66,34 +76,16 @@ impl VehicleEndpoint {
         self.waiting.push(Waiting { link, command: *command, request });
     }
 
-    /// Steps the vehicle by one frame with the requests from the links and from its own programme. Returns the events
-    /// and the answers to its own programme. Answers to the links come out of [`VehicleEndpoint::poll`].
-    pub fn step(
-        &mut self,
-        vehicle: &mut Vehicle,
-        own: &[Request],
-        stopwatch: &mut dyn FnMut() -> Duration,
-    ) -> (Vec<VehicleEvent>, Vec<Answer>) {
-        let (uplink, commander) = self.uplink(vehicle.time_s());
-        vehicle.set_uplink(uplink, commander);
-        let requests = [self.requests().as_slice(), own].concat();
-        let Frame { events, mut answers } = vehicle.step(&requests, stopwatch);
-        let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
-        self.on_answers(&answers, vehicle);
-        for event in &events {
-            self.on_event(event);
-        }
-        (events, to_itself)
+    /// What the vehicle's next frame is told of its links and asked by its crew.
+    pub fn heard(&self, time_s: f64) -> Heard {
+        let (uplink, commander) = self.uplink(time_s);
+        let requests = self.waiting.iter().map(|waiting| waiting.request).collect();
+        Heard { uplink, commander, requests }
     }
 
-    /// The requests for the next frame, in order.
-    fn requests(&self) -> Vec<Request> {
-        self.waiting.iter().map(|waiting| waiting.request).collect()
-    }
-
-    /// Takes the vehicle's answers to `requests`; `vehicle` has just decided. A dead flight computer gives no answers,
-    /// and its requests are dropped.
-    fn on_answers(&mut self, answers: &[Answer], vehicle: &Vehicle) {
+    /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has just decided. A dead
+    /// flight computer gives no answers, and its requests are dropped.
+    pub fn on_answers(&mut self, answers: &[Answer], vehicle: &dyn Vehicle) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
             self.note_commander(&command, &request, answer, vehicle);
@@ -115,7 +107,7 @@ impl VehicleEndpoint {
         command: &CommandRequest,
         request: &Request,
         answer: &Answer,
-        vehicle: &Vehicle,
+        vehicle: &dyn Vehicle,
     ) {
         if answer.ending != Ending::Accepted {
             return;

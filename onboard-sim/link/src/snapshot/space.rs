@@ -8,55 +8,68 @@ use flight::rules::phase::Phase;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
-use sim::limits::Limits;
 
 use super::{
-    AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Motion, Path,
-    Prediction, Snapshot, violations,
+    AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, DescentFacts, EstimatorFacts, Known, Motion,
+    Path, Prediction, SensorFacts, Snapshot, violations,
 };
-use crate::vehicle::{InSpace, Vehicle};
 
 /// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
 /// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.
 const CARRIED_M_S: f64 = 10.0;
 const CARRIED_WEIGHTS: f64 = 0.5;
 
-impl Vehicle {
-    pub(super) fn snapshot_in_space(&self, space: &InSpace) -> Snapshot {
-        let sortie = &space.sortie;
-        let mission = sortie.mission();
-        let limits = Limits::of(mission).legs;
-        let mass = MassModel::new(&mission.airframe.mass, sortie.pilot().curve().propellant_mass_kg());
+/// A rocket in space: what is known of it beside its computer's memory.
+#[derive(Debug, Clone, Copy)]
+pub struct InSpace<'a> {
+    pub known: Known<'a>,
+    pub mission: &'a Mission,
+    /// Where the gimbal is (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Where the fins are, rad.
+    pub fins_rad: [f64; 4],
+    pub sensors: Option<SensorFacts>,
+    /// `None` where its voltage is not measured.
+    pub battery: Option<BatteryFacts>,
+    /// What the rehearsal found, where there was one.
+    pub rehearsed: Option<&'a PoweredReport>,
+    /// The parachute was thrown out, in this phase or before it.
+    pub parachute_ejected: bool,
+    /// How long the last plan took, s.
+    pub took_s: f64,
+}
+
+impl InSpace<'_> {
+    /// The state now. The computer must be that of a rocket in space: `None` otherwise.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        let (computer, mission) = (self.known.computer, self.mission);
+        let pilot = computer.pilot()?;
+        let limits = TouchdownLimits::of_the_legs(mission);
+        let mass = MassModel::new(&mission.airframe.mass, pilot.curve().propellant_mass_kg());
         let cg_m = mission.airframe.above_feet_m(mass.at(0.0).cg_station_m);
-        let hanging_m = sortie.computer().stance().hanging_m.filter(|height_m| height_m.is_finite());
+        let hanging_m = computer.stance().hanging_m.filter(|height_m| height_m.is_finite());
         let believed = RigidState {
             position_m: Vector3::z() * hanging_m.unwrap_or(cg_m),
-            ..sortie.computer().believed_on_the_pad().unwrap_or_else(|| RigidState::upright(cg_m))
+            ..computer.believed_on_the_pad().unwrap_or_else(|| RigidState::upright(cg_m))
         };
-        let (commands, world) = (sortie.computer().commands(), sortie.world());
-        let gimbal_rad = world.gimbal_rad();
-        let rehearsed = sortie.rehearsed();
+        let commands = computer.commands();
         let standing = Snapshot {
-            gimbal_rad: core::array::from_fn(|axis| (commands.gimbal_rad[axis], gimbal_rad[axis])),
-            fins_rad: (commands.fins_rad, world.fins_rad()),
-            controller: rehearsed.map(|(_, report)| facts(0, ControlLevel::Rehearsal, report)),
+            gimbal_rad: core::array::from_fn(|axis| (commands.gimbal_rad[axis], self.gimbal_rad[axis])),
+            fins_rad: (commands.fins_rad, self.fins_rad),
+            controller: self.rehearsed.map(|report| facts(0, ControlLevel::Rehearsal, report)),
             gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
-            sensors: space.sensors.facts(sortie.frame()),
+            sensors: self.sensors,
             site: mission.site,
             pad_altitude_m: mission.pad_altitude_m,
-            battery: Some(BatteryFacts {
-                volts: sortie.battery().volts(),
-                current_a: sortie.battery().current_a(),
-                left: sortie.battery().charge(),
-            }),
-            ..self.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
+            battery: self.battery,
+            ..self.known.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
         };
-        let computer = sortie.computer();
-        let flying = computer.released_at_s().zip(computer.piloted()).zip(sortie.pilot().estimate());
-        match flying {
+        let flying = computer.released_at_s().zip(computer.piloted()).zip(pilot.estimate());
+        Some(match flying {
             None => standing,
             Some(((released_at_s, (input, output)), estimate)) => {
                 let since = Airborne {
@@ -67,24 +80,24 @@ impl Vehicle {
                     estimate,
                     mass: &mass,
                 };
-                self.flying(space, &since, &standing)
+                self.flying(pilot, &since, &standing)
             }
-        }
+        })
     }
 
-    fn flying(&self, space: &InSpace, since: &Airborne<'_>, standing: &Snapshot) -> Snapshot {
+    fn flying(&self, pilot: &Pilot, since: &Airborne<'_>, standing: &Snapshot) -> Snapshot {
         let &Airborne { released_at_s, frame, flight_s, output, estimate, mass } = since;
-        let pilot = space.sortie.pilot();
         let motor = pilot.motor();
         let burn = motor.burn(pilot.curve());
         let burning_s = pilot.burning_s(flight_s);
         let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
-        let feet_m = space.sortie.mission().airframe.above_feet_m(mass.at(burnt_kg).cg_station_m);
-        let planned = pilot.powered().planned().filter(|_| self.phase().in_landing_burn());
-        let until_s = self.judged().map_or(flight_s, |judged| judged.impact.time_s - released_at_s);
+        let feet_m = self.mission.airframe.above_feet_m(mass.at(burnt_kg).cg_station_m);
+        let planned =
+            pilot.powered().planned().filter(|_| self.known.computer.mode().phase.in_landing_burn());
+        let until_s = self.known.judged.map_or(flight_s, |judged| judged.impact.time_s - released_at_s);
         let sigmas = &estimate.sigmas;
         Snapshot {
-            since_zero_s: match space.sortie.mission().start.at {
+            since_zero_s: match self.mission.start.at {
                 // The clock of a launch starts with the ascent motor, and runs to the end.
                 StartPoint::Pad => Some(until_s),
                 _ => pilot.ignited_at_s().map(|ignited_at_s| until_s - ignited_at_s),
@@ -93,13 +106,13 @@ impl Vehicle {
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
             controller: Some(facts(frame / FRAMES_PER_PLAN, output.level, pilot.report())),
             prediction: planned.and_then(|planned| {
-                let landing_miss = space.sortie.mission().powered.landing_miss;
+                let landing_miss = self.mission.powered.landing_miss;
                 prediction(pilot, estimate, planned, flight_s, landing_miss, &standing.limits)
             }),
             path: planned.and_then(|planned| path_from_the_east(pilot, estimate, planned)),
-            solve_time_s: space.took_s,
+            solve_time_s: self.took_s,
             thrust_scale: motor.impulse_scale(),
-            descent: Some(self.descent(space, estimate, feet_m)),
+            descent: Some(self.descent(pilot, estimate, feet_m)),
             // Where the truth is the estimate there is no estimator to speak of.
             estimator: standing.sensors.map(|_| EstimatorFacts {
                 health: estimate.health,
@@ -110,22 +123,20 @@ impl Vehicle {
         }
     }
 
-    fn descent(&self, space: &InSpace, estimate: &Estimate, feet_m: f64) -> DescentFacts {
-        let pilot = space.sortie.pilot();
+    fn descent(&self, pilot: &Pilot, estimate: &Estimate, feet_m: f64) -> DescentFacts {
+        let phase = self.known.computer.mode().phase;
         let outlook = pilot.outlook();
         let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
         let height_m = place.z - feet_m;
-        let rising = self.phase().before_apogee();
+        let rising = phase.before_apogee();
         let touchdown = if rising {
             touchdown_from_below_m(place, velocity)
         } else {
             touchdown_m(place, velocity, height_m)
         };
         let motor = pilot.motor();
-        let deciding = self.phase().in_descent();
-        // Also on the ground, after a descent under it.
-        let fired = space.sortie.world().parachute_ejected();
-        let weights_felt = estimate.specific_force_m_s2.norm() / space.sortie.mission().gravity_m_s2;
+        let deciding = phase.in_descent();
+        let weights_felt = estimate.specific_force_m_s2.norm() / self.mission.gravity_m_s2;
         let carried = velocity.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS;
         DescentFacts {
             height_m,
@@ -139,34 +150,31 @@ impl Vehicle {
             drag_scale: motor.air_scale(),
             thrust_scale: motor.impulse_scale(),
             touchdown_m: [touchdown.x, -touchdown.y],
-            chute: match self.phase() {
+            chute: match phase {
                 Phase::Chute if carried => Chute::Open,
                 Phase::Chute => Chute::Fired,
-                _ if fired => Chute::Open,
+                // Also on the ground, after a descent under it.
+                _ if self.parachute_ejected => Chute::Open,
                 _ => Chute::Stowed,
             },
-            ascent: ascent(space, self.phase()),
+            ascent: self.ascent(pilot, phase),
         }
     }
-}
 
-/// The way up of a flight from the pad.
-fn ascent(space: &InSpace, phase: Phase) -> Option<AscentFacts> {
-    let computer = space.sortie.computer();
-    if space.sortie.mission().start.at != StartPoint::Pad {
-        return None;
+    /// The way up of a flight from the pad.
+    fn ascent(&self, pilot: &Pilot, phase: Phase) -> Option<AscentFacts> {
+        if self.mission.start.at != StartPoint::Pad {
+            return None;
+        }
+        let computer = self.known.computer;
+        let attached = computer.piloted().is_some_and(|(input, _)| input.booster_attached);
+        let booster = match (attached, computer.commands().booster.separate) {
+            (true, false) => Booster::Attached,
+            (true, true) => Booster::Separating,
+            (false, _) => Booster::Separated,
+        };
+        Some(AscentFacts { booster, apogee: pilot.apogee_ahead(phase), over: !phase.before_apogee() })
     }
-    let attached = computer.piloted().is_some_and(|(input, _)| input.booster_attached);
-    let booster = match (attached, computer.commands().booster.separate) {
-        (true, false) => Booster::Attached,
-        (true, true) => Booster::Separating,
-        (false, _) => Booster::Separated,
-    };
-    Some(AscentFacts {
-        booster,
-        apogee: space.sortie.pilot().apogee_ahead(phase),
-        over: !phase.before_apogee(),
-    })
 }
 
 /// A rocket in the air, or on the ground after its flight.

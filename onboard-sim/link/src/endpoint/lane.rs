@@ -3,7 +3,10 @@
 //! All links begin in one lane, so that a ground station that hears several of them can recognise copies by their
 //! sequence numbers. A link with different message intervals gets its own lane with its own sequence numbers.
 
-use std::collections::VecDeque;
+use alloc::boxed::Box;
+use alloc::collections::VecDeque;
+use alloc::vec;
+use alloc::vec::Vec;
 
 use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
@@ -13,9 +16,10 @@ use protocol::identity::Address;
 use super::budget::{BRIEFLY_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::files::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
+use crate::snapshot::Snapshot;
 use crate::stations::MAX_STATIONS;
 use crate::streams::{Due, Streams, WINDOW_S, kept_free_bytes, share_bytes_s};
-use crate::vehicle::{Snapshot, Vehicle};
+use crate::vehicle::Vehicle;
 use crate::{parameters, telemetry};
 
 /// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
@@ -159,7 +163,7 @@ impl Lane {
     pub(super) fn poll(
         &mut self,
         context: &Context,
-        vehicle: &Vehicle,
+        vehicle: &dyn Vehicle,
         snapshot: &mut Option<Snapshot>,
         files: &mut FileService,
     ) -> Vec<Outgoing> {
@@ -267,7 +271,7 @@ impl Lane {
         &mut self,
         due: &Due,
         context: &Context,
-        vehicle: &Vehicle,
+        vehicle: &dyn Vehicle,
         snapshot: &mut Option<Snapshot>,
         frames: &mut Vec<Frame>,
     ) {
@@ -285,7 +289,7 @@ impl Lane {
     }
 
     /// The next requested message: single messages first, then the list of parameters.
-    fn next_requested(&mut self, vehicle: &Vehicle) -> Option<MavMessage> {
+    fn next_requested(&mut self, vehicle: &dyn Vehicle) -> Option<MavMessage> {
         if let Some(message) = self.requested.front() {
             return Some(message.clone());
         }

@@ -2,7 +2,7 @@
 
 use flight::estimation::estimator::Measurements;
 
-use super::SensorFacts;
+use crate::snapshot::SensorFacts;
 
 /// A barometer that has been silent for so many frames does not report: a quarter of a second.
 const BAROMETER_FRAMES: u64 = 50;
@@ -13,7 +13,7 @@ const LIDAR_FRAMES: u64 = 20;
 
 /// Remembers the last samples.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct SensorWatch {
+pub struct SensorWatch {
     last: Option<Measurements>,
     pressure_altitude_m: f64,
     barometer: Option<u64>,
@@ -23,7 +23,7 @@ pub(super) struct SensorWatch {
 
 impl SensorWatch {
     /// Takes a frame's measurements.
-    pub(super) fn take(&mut self, measurements: &Measurements, frame: u64) {
+    pub fn take(&mut self, measurements: &Measurements, frame: u64) {
         self.last = Some(*measurements);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.pressure_altitude_m = altitude_m;
@@ -38,7 +38,7 @@ impl SensorWatch {
     }
 
     /// The facts at a frame; `None` where no sensors are modelled.
-    pub(super) fn facts(&self, frame: u64) -> Option<SensorFacts> {
+    pub fn facts(&self, frame: u64) -> Option<SensorFacts> {
         let last = self.last.as_ref()?;
         let within = |at: Option<u64>, frames: u64| at.is_some_and(|at| frame.saturating_sub(at) <= frames);
         Some(SensorFacts {

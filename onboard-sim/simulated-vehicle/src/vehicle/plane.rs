@@ -3,8 +3,9 @@
 use flight::rules::verdict::LandingVerdict;
 use sim::plane::PlanarFlight;
 
-use super::{ControllerFacts, Motion, Path, Prediction, Snapshot, violations};
-use crate::vehicle::Vehicle;
+use vehicle_link::snapshot::violations;
+
+use super::{ControllerFacts, Motion, Path, Prediction, Snapshot, Vehicle};
 
 impl Vehicle {
     pub(super) fn snapshot_in_plane(&self, flight: &PlanarFlight) -> Snapshot {
@@ -45,7 +46,7 @@ impl Vehicle {
             gimbal_limit_rad: plane.profile().gimbal.limit_rad(),
             site: plane.profile().site,
             // Its air has one density: it says no altitude.
-            ..self.standing(Motion::from(&plant.state()), *plane.limits())
+            ..self.known().standing(Motion::from(&plant.state()), *plane.limits())
         }
     }
 }

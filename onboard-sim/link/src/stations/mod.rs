@@ -4,9 +4,11 @@
 //! A working downlink does not prove a working uplink. So the vehicle tells every station the age of the last frame it
 //! accepted from that station, and why the last frame from anybody was refused. Pure: times are vehicle times, s.
 
+use alloc::vec;
+use alloc::vec::Vec;
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
-use mavlink::MessageData as _;
+use mavlink_core::MessageData as _;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
 use protocol::frame::Frame;
 use protocol::identity::Address;
@@ -177,7 +179,7 @@ impl Stations {
         let refused = self.refused;
         let from = refused.map_or(EVERYBODY, |refused| refused.from);
         MavMessage::TD_UPLINK(TD_UPLINK_DATA {
-            time_boot_ms: (1000.0 * time_s).round() as u32,
+            time_boot_ms: libm::round(1000.0 * time_s) as u32,
             accepted_age_ms: age_ms(accepted_at_s),
             refused_age_ms: age_ms(refused.map(|refused| refused.at_s)),
             refused_count: self.refused_count,

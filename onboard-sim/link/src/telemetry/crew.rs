@@ -3,12 +3,12 @@
 use flight::computer::crew::People;
 use flight::rules::operator::{Operator, Role};
 use flight::rules::two_person::Act;
-use mavlink::MessageData as _;
-use mavlink::types::CharArray;
+use mavlink_core::MessageData as _;
+use mavlink_core::types::CharArray;
 use protocol::dialect::{MavMessage, TD_CREW_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TdAct, TdRole};
 
 use super::{boot_ms, characters};
-use crate::vehicle::{CrewFacts, Snapshot};
+use crate::snapshot::{CrewFacts, Snapshot};
 
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
     match message_id {

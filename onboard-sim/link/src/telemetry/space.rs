@@ -2,14 +2,14 @@
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
-use mavlink::MessageData as _;
+use mavlink_core::MessageData as _;
 use protocol::dialect::{
     ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, HIGHRES_IMU_DATA, HighresImuUpdatedFlags, MavMessage,
     MavSysStatusSensor, TD_DESCENT_DATA, TdBooster, TdChute,
 };
 
 use super::boot_ms;
-use crate::vehicle::{Booster, Chute, DescentFacts, Snapshot};
+use crate::snapshot::{Booster, Chute, DescentFacts, Snapshot};
 
 /// The message of this id, or `None` if the vehicle has no such message or no data for it.
 pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {

@@ -1,10 +1,12 @@
 //! Who commands, what is asked and what is waited for, for telemetry.
 
+use alloc::vec::Vec;
+
 use flight::computer::crew::People;
 use flight::rules::operator::Operator;
 use flight::rules::two_person::{Act, Station};
 
-use super::Vehicle;
+use super::Known;
 
 /// What the crew is told of itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,14 +23,14 @@ pub struct CrewFacts {
     pub held_by: Option<Operator>,
 }
 
-impl Vehicle {
+impl Known<'_> {
     pub(super) fn crew_facts(&self) -> Option<CrewFacts> {
-        let (memory, time_s) = (self.computer().crew(), self.time_s());
+        let (memory, time_s) = (self.computer.crew(), self.time_s);
         let ask = memory.two_person.waiting(time_s);
         let tap = memory.two_person.tapping();
         Some(CrewFacts {
             people: self.people?,
-            operators: self.operators.clone(),
+            operators: self.operators.to_vec(),
             ask: ask.map(|ask| (ask.act, ask.number, ask.by, ask.left_s(time_s))),
             tap: tap.map(|tapping| (tapping.by, tapping.left_s(time_s))),
             commander: self.commander.map(|commander| (commander.station, commander.by)),

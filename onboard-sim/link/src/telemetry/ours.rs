@@ -11,7 +11,7 @@ use protocol::dialect::{
 use super::{boot_ms, centidegrees, centimetres};
 use flight::computer::AbortEffect;
 
-use crate::vehicle::{PATH_POINTS, Snapshot};
+use crate::snapshot::{PATH_POINTS, Snapshot};
 
 pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
@@ -19,11 +19,11 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
     let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        countdown_ms: seconds.map_or(i32::MAX, |s| (1000.0 * s).round() as i32),
+        countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
         interlocks: interlocks(locks),
         checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
-        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| s.ceil() as u16),
-        approach_wait_s: snapshot.approach_wait_s.map_or(u16::MAX, |s| s.ceil() as u16),
+        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| libm::ceil(s) as u16),
+        approach_wait_s: snapshot.approach_wait_s.map_or(u16::MAX, |s| libm::ceil(s) as u16),
         motor: td_motor(snapshot.motor),
         hold: match snapshot.held {
             None => TdHold::TD_HOLD_NONE,
@@ -31,7 +31,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
             Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
             Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
         },
-        hold_left_s: snapshot.held.map_or(0, |(_, left_s)| left_s.ceil() as u8),
+        hold_left_s: snapshot.held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
         phase: td_phase(snapshot.phase),
         abort_effect,
         abort_impact_m_s,
@@ -74,7 +74,8 @@ fn td_motor(status: MotorStatus) -> TdMotor {
     }
 }
 
-pub(crate) fn td_phase(phase: Phase) -> TdPhase {
+/// A phase as it is sent.
+pub fn td_phase(phase: Phase) -> TdPhase {
     match phase {
         Phase::Safe => TdPhase::TD_PHASE_SAFE,
         Phase::PadIdle => TdPhase::TD_PHASE_PAD_IDLE,
@@ -114,7 +115,7 @@ pub(super) fn gimbal(snapshot: &Snapshot) -> MavMessage {
 
 pub(super) fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
     let controller = snapshot.controller.as_ref()?;
-    let microseconds = |s: f64| (1e6 * s).round();
+    let microseconds = |s: f64| libm::round(1e6 * s);
     Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
         tick: controller.tick as u32,
@@ -160,7 +161,7 @@ pub(super) fn touchdown_prediction(snapshot: &Snapshot) -> Option<MavMessage> {
     let end = &prediction.state;
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
-        time_to_go_ms: (1000.0 * prediction.time_to_go_s).round() as i32,
+        time_to_go_ms: libm::round(1000.0 * prediction.time_to_go_s) as i32,
         x_m: end.x_m as f32,
         altitude_m: end.z_m as f32,
         pitch_rad: end.theta_rad as f32,
@@ -219,30 +220,6 @@ mod tests {
     use nmpc::SolveStatus as S;
 
     use super::*;
-    use crate::vehicle::Vehicle;
-    use sim::plane::draw::draw;
-    use sim::plane::{DeadlinePolicy, PlanarFlight};
-
-    /// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the start of its
-    /// check's name.
-    #[test]
-    fn the_dialect_names_the_arming_checks_in_their_order() {
-        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
-        let vehicle = Vehicle::in_plane(flight);
-        let checks = vehicle.arming_checks();
-        let bits: Vec<_> = TdCheck::all().iter_names().collect();
-        assert_eq!(bits.len(), checks.len());
-        for (place, (check, (name, bit))) in checks.iter().zip(bits).enumerate() {
-            assert_eq!(bit.bits(), 1 << place);
-            let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
-            assert!(
-                check.name.replace('-', " ").starts_with(&words),
-                "bit {place}: {name} is not {}",
-                check.name
-            );
-        }
-    }
 
     #[test]
     fn only_an_impact_is_sent_with_its_speed() {

@@ -5,7 +5,7 @@
 //!
 //! What is not modelled is sent as MAVLink's "unknown" and never invented: the planar vehicle has no battery.
 //!
-//! [`Motion`]: crate::vehicle::Motion
+//! [`Motion`]: crate::snapshot::Motion
 
 mod crew;
 mod global;
@@ -15,8 +15,8 @@ mod power;
 mod space;
 
 use flight::rules::phase::Phase;
-use mavlink::MessageData as _;
-use mavlink::types::CharArray;
+use mavlink_core::MessageData as _;
+use mavlink_core::types::CharArray;
 #[expect(deprecated, reason = "only [`protocol_version`] uses it")]
 use protocol::dialect::PROTOCOL_VERSION_DATA;
 use protocol::dialect::{
@@ -28,9 +28,9 @@ use protocol::dialect::{
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 
-pub(crate) use self::ours::td_phase;
+pub use self::ours::td_phase;
 pub(crate) use self::pad_check::pad_check;
-use crate::vehicle::Snapshot;
+use crate::snapshot::Snapshot;
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
@@ -181,7 +181,7 @@ fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
         alt: -motion.position_m[2] as f32,
         climb: -down_m_s as f32,
-        heading: global::heading_deg(&motion.ned_from_body).round() as i16 % 360,
+        heading: libm::round(global::heading_deg(&motion.ned_from_body)) as i16 % 360,
         throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
     })
 }
@@ -235,15 +235,15 @@ fn actuators(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn boot_ms(time_s: f64) -> u32 {
-    (1000.0 * time_s).round() as u32
+    libm::round(1000.0 * time_s) as u32
 }
 
 fn centidegrees(angle_rad: f64) -> i16 {
-    (100.0 * angle_rad.to_degrees()).round() as i16
+    libm::round(100.0 * angle_rad.to_degrees()) as i16
 }
 
 fn centimetres(length_m: f64) -> i16 {
-    (100.0 * length_m).round() as i16
+    libm::round(100.0 * length_m) as i16
 }
 
 fn characters<const N: usize>(text: &str) -> CharArray<N> {

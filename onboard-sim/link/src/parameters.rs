@@ -5,6 +5,8 @@
 //! read-only: they come from the profile, which the log holds, so that a replay uses the same ones. Safety limits are
 //! not parameters. The list of names never changes.
 
+use alloc::format;
+use alloc::string::String;
 use flight::vehicle::profile::StateWeights;
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::parameter::{ParamId, ParamKey, is_real32, value_message};

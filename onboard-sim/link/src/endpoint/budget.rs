@@ -1,6 +1,6 @@
 //! Tracks how much a link has carried recently and how much room it has left.
 
-use std::collections::VecDeque;
+use alloc::collections::VecDeque;
 
 /// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
 /// Otherwise a burst could spend the whole budget, and even vital messages would wait.

@@ -1,5 +1,8 @@
 //! Whether a station that arms is prepared for the mission that this vehicle flies.
 
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::String;
 use flight::computer::crew::Asked;
 use protocol::command::CommandRequest;
 use protocol::mission::Expected;
@@ -8,7 +11,7 @@ use crate::commands::Command;
 use crate::vehicle::Vehicle;
 
 /// Why the station expects another mission; `None` if it expects this one or says nothing of it.
-pub(super) fn why_other(request: &CommandRequest, asked: &Command, vehicle: &Vehicle) -> Option<String> {
+pub(super) fn why_other(request: &CommandRequest, asked: &Command, vehicle: &dyn Vehicle) -> Option<String> {
     if *asked != Command::Vehicle(Asked::Arm) {
         return None;
     }

@@ -1,13 +1,13 @@
 //! Attitude as angles and the position on the globe, for the maps and instruments of other clients.
 
-use mavlink::MessageData as _;
+use mavlink_core::MessageData as _;
 use protocol::dialect::{
     ATTITUDE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, GpsFixType, HOME_POSITION_DATA, MavMessage,
     SYSTEM_TIME_DATA,
 };
 
 use super::boot_ms;
-use crate::vehicle::Snapshot;
+use crate::snapshot::Snapshot;
 
 /// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees from upright) single
 /// precision cannot separate them.
@@ -77,16 +77,16 @@ fn attitude(snapshot: &Snapshot) -> MavMessage {
 /// Latitude and longitude, 1e-7 degrees, of a point at this distance north and east of the pad, m.
 fn degrees_e7(snapshot: &Snapshot, north_m: f64, east_m: f64) -> (i32, i32) {
     let (latitude_deg, longitude_deg) = snapshot.site.at_deg(north_m, east_m);
-    ((1e7 * latitude_deg).round() as i32, (1e7 * longitude_deg).round() as i32)
+    (libm::round(1e7 * latitude_deg) as i32, libm::round(1e7 * longitude_deg) as i32)
 }
 
 fn millimetres(length_m: f64) -> i32 {
-    (1000.0 * length_m).round() as i32
+    libm::round(1000.0 * length_m) as i32
 }
 
 fn position(snapshot: &Snapshot) -> MavMessage {
     let [north_m, east_m, down_m] = snapshot.motion.position_m;
-    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed_m_s| (100.0 * speed_m_s).round() as i16);
+    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
     let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
     MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
         time_boot_ms: boot_ms(snapshot.time_s),
@@ -97,7 +97,7 @@ fn position(snapshot: &Snapshot) -> MavMessage {
         vx,
         vy,
         vz,
-        hdg: (100.0 * heading_deg(&snapshot.motion.ned_from_body)).round() as u16 % 36_000,
+        hdg: libm::round(100.0 * heading_deg(&snapshot.motion.ned_from_body)) as u16 % 36_000,
     })
 }
 
@@ -146,8 +146,8 @@ fn gps(snapshot: &Snapshot) -> MavMessage {
             lat,
             lon,
             alt: millimetres(snapshot.pad_altitude_m - down_m),
-            vel: (100.0 * libm::hypot(north_m_s, east_m_s)).round() as u16,
-            cog: (100.0 * if course_deg < 0.0 { course_deg + 360.0 } else { course_deg }).round() as u16
+            vel: libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16,
+            cog: libm::round(100.0 * if course_deg < 0.0 { course_deg + 360.0 } else { course_deg }) as u16
                 % 36_000,
             ..unknown
         }

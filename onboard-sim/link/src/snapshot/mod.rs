@@ -1,12 +1,13 @@
 //! A vehicle's state at one instant, for telemetry: what its flight computer believes.
 
 mod crew;
-mod plane;
 mod space;
 
+use flight::computer::crew::People;
 use flight::computer::pilot::ApogeeAhead;
-use flight::computer::{AbortEffect, LogState};
+use flight::computer::{AbortEffect, Commander, Computer, LogState};
 use flight::guidance::controller::ControlLevel;
+use flight::rules::operator::Operator;
 use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::dynamics::PlanarState;
@@ -15,10 +16,9 @@ use flight::vehicle::site::Site;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use nmpc::SolveStatus;
 
-use sim::plane::plant::Impact;
-
 pub use self::crew::CrewFacts;
-use super::{Flight, MissionName, Vehicle};
+pub use self::space::InSpace;
+use crate::vehicle::MissionName;
 
 /// Points of a predicted path, at most.
 pub const PATH_POINTS: usize = 12;
@@ -96,9 +96,10 @@ pub struct Snapshot {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatteryFacts {
     pub volts: f64,
-    pub current_a: f64,
-    /// What is left of its charge, 0 to 1.
-    pub left: f64,
+    /// `None` where it is not measured.
+    pub current_a: Option<f64>,
+    /// What is left of its charge, 0 to 1; `None` where it is not known.
+    pub left: Option<f64>,
 }
 
 /// Position, velocity, attitude and rotation, north-east-down. Body axes: x towards the nose.
@@ -199,7 +200,16 @@ impl Path {
     }
 }
 
-/// A touchdown and its judgement.
+/// The contact that a landing is judged by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// Time since power-up, s.
+    pub time_s: f64,
+    /// State just before it.
+    pub state: PlanarState,
+}
+
+/// A touchdown and its judgement, which only a simulation knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
     /// The contact that was judged.
@@ -303,18 +313,31 @@ pub struct SensorFacts {
     pub lidar: bool,
 }
 
-impl Vehicle {
-    /// The state now.
-    pub fn snapshot(&self) -> Snapshot {
-        match &self.flight {
-            Flight::Space(space) => self.snapshot_in_space(space),
-            Flight::Plane(flight) => self.snapshot_in_plane(flight),
-        }
-    }
+/// What every snapshot is made of, whatever flies.
+#[derive(Debug, Clone, Copy)]
+pub struct Known<'a> {
+    pub computer: &'a Computer,
+    /// Time since power-up, s.
+    pub time_s: f64,
+    /// How long the controller may take, s.
+    pub deadline_s: f64,
+    /// `None` before the landing is judged, and on a vehicle that nobody simulates.
+    pub judged: Option<Judged>,
+    /// How many people an arming and a start take; `None` without operators.
+    pub people: Option<People>,
+    /// Who may command; empty without operators.
+    pub operators: &'a [Operator],
+    /// The station that armed the vehicle, if one did.
+    pub commander: Option<Commander>,
+    pub mission: &'a MissionName,
+    /// Where the log is written.
+    pub log: LogState,
+}
 
-    /// What the phase table and the checks say, whatever flies: everything else is left at nothing.
-    fn standing(&self, motion: Motion, limits: TouchdownLimits) -> Snapshot {
-        let (computer, time_s) = (self.computer(), self.time_s());
+impl Known<'_> {
+    /// What the phase table and the checks say: everything else is left at nothing.
+    pub fn standing(&self, motion: Motion, limits: TouchdownLimits) -> Snapshot {
+        let (computer, time_s) = (self.computer, self.time_s);
         let mode = computer.mode();
         let on_pad = mode.phase.on_pad();
         let failing = on_pad.then(|| bits(computer.arming_checks().iter().map(|check| !check.passed)));
@@ -338,11 +361,11 @@ impl Vehicle {
             prediction: None,
             path: None,
             solve_time_s: 0.0,
-            deadline_s: self.deadline_s(),
+            deadline_s: self.deadline_s,
             thrust_scale: 1.0,
             limits,
             gimbal_limit_rad: 0.0,
-            judged: self.judged(),
+            judged: self.judged,
             descent: None,
             estimator: None,
             sensors: None,
@@ -357,11 +380,11 @@ impl Vehicle {
 }
 
 /// One bit per broken limit, in the verdict's order.
-pub(super) fn violations(verdict: &LandingVerdict) -> u16 {
+pub fn violations(verdict: &LandingVerdict) -> u16 {
     bits(verdict.results.iter().map(|result| !result.passed))
 }
 
 /// Flags as bits, the first in bit 0.
-pub(super) fn bits(flags: impl Iterator<Item = bool>) -> u16 {
+fn bits(flags: impl Iterator<Item = bool>) -> u16 {
     flags.take(16).enumerate().fold(0, |bits, (place, set)| bits | (u16::from(set) << place))
 }

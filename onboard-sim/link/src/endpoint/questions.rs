@@ -1,5 +1,6 @@
 //! Answers messages that are not commands: questions about parameters, files and lists.
 
+use alloc::vec;
 use protocol::dialect::MavParamError;
 use protocol::frame::Frame;
 use protocol::ftp::FileRequest;
@@ -13,7 +14,7 @@ use flight::computer::news::Severity;
 
 impl VehicleEndpoint {
     /// Answers a question about parameters, files or lists; returns whether the frame was one.
-    pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &Vehicle) -> bool {
+    pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &dyn Vehicle) -> bool {
         if let Some(request) = FileRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
                 self.on_file_request(link, &request, operator_of(frame, vehicle), vehicle);

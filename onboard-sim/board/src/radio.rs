@@ -1,0 +1,195 @@
+//! The crew on a board's own radio: MAVLink in and out, between the frames of the flight computer.
+
+use alloc::vec::Vec;
+
+use flight::computer::crew::People;
+use flight::computer::news::News;
+use flight::computer::pilot::Sensed;
+use flight::computer::{Computer, FRAME_S, Feeling, Input, Output};
+use flight::rules::operator::Operator;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StateWeights;
+use protocol::frame::Framer;
+use protocol::mission::MissionHash;
+use tick_log::computer::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
+use vehicle_link::endpoint::{Heard, VehicleEndpoint};
+use vehicle_link::sensed::SensorWatch;
+use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};
+use vehicle_link::streams::FROM_APOGEE;
+use vehicle_link::vehicle::{MissionName, Vehicle};
+
+use crate::stream::{self, OnTheAir};
+
+/// The line to a radio: a UART, a serial device.
+pub trait Radio {
+    /// Takes what has arrived, and returns how much; 0 if nothing. It does not wait.
+    fn read(&mut self, into: &mut [u8]) -> usize;
+
+    /// Sends. It does not wait: what has no room is lost, as in the air.
+    fn write(&mut self, bytes: &[u8]);
+}
+
+/// Nobody is there.
+impl Radio for () {
+    fn read(&mut self, _: &mut [u8]) -> usize {
+        0
+    }
+
+    fn write(&mut self, _: &[u8]) {}
+}
+
+/// Frames without a byte after which a frame that has begun will not go on: 0.1 s. The longest frame takes half of that at 57,600 baud.
+const SILENT_FRAMES: u32 = 20;
+
+/// A board's end of the link.
+pub(crate) struct Crewed {
+    endpoint: VehicleEndpoint,
+    framer: Framer,
+    silent_frames: u32,
+    vehicle: Known,
+    /// For the next frame.
+    heard: Heard,
+}
+
+/// What is known of a vehicle beside its flight computer.
+struct Known {
+    mission: Mission,
+    name: MissionName,
+    sensors: SensorWatch,
+    parachute_ejected: bool,
+}
+
+/// A vehicle after a frame.
+struct Flown<'a> {
+    vehicle: &'a Known,
+    computer: &'a Computer,
+    input: &'a Input<'a>,
+}
+
+impl Crewed {
+    /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml` its text.
+    pub(crate) fn new(on_the_air: &OnTheAir, mission: Mission, toml: &str) -> Self {
+        let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
+        let endpoint = VehicleEndpoint::sending(&FROM_APOGEE)
+            .booted(on_the_air.boot_number)
+            .over_links(&[on_the_air.budget_bytes_s])
+            .of_system(system_id);
+        let name = MissionName { name: on_the_air.mission.clone(), hash: MissionHash::of(toml) };
+        Self {
+            heard: endpoint.heard(0.0),
+            endpoint,
+            framer: Framer::new(),
+            silent_frames: 0,
+            vehicle: Known { mission, name, sensors: SensorWatch::default(), parachute_ejected: false },
+        }
+    }
+
+    /// A frame's input, with what the crew has asked for.
+    pub(crate) fn hear(&self, input: LoggedInput) -> LoggedInput {
+        let Heard { uplink, commander, requests } = self.heard.clone();
+        input.hearing(uplink, commander, requests)
+    }
+
+    /// Speaks with the ground after a frame; returns what the next one is told and asked. Never inline: what it keeps on the stack
+    /// would lie below the flight computer's, whose own is the largest.
+    #[inline(never)]
+    pub(crate) fn flown(
+        &mut self,
+        input: &Input<'_>,
+        output: &Output,
+        computer: &Computer,
+        radio: &mut impl Radio,
+    ) -> stream::Heard {
+        if let Feeling::InSpace(Sensed::Measured(measured)) = &input.feeling {
+            self.vehicle.sensors.take(measured, input.frame);
+        }
+        self.vehicle.parachute_ejected |= output.commands.parachute;
+        let flown = Flown { vehicle: &self.vehicle, computer, input };
+        self.endpoint.on_answers(&output.answers, &flown);
+        for news in &output.news {
+            match news {
+                News::Said { severity, words } => self.endpoint.say(*severity, words),
+                // Seen by the endpoint itself.
+                News::PhaseChanged { .. } => {}
+            }
+        }
+        let mut buffer = [0; 512];
+        let count = radio.read(&mut buffer);
+        if count > 0 {
+            self.framer.push(&buffer[..count]);
+            self.silent_frames = 0;
+        } else {
+            self.silent_frames = self.silent_frames.saturating_add(1);
+            if self.silent_frames == SILENT_FRAMES {
+                self.framer.on_silence();
+            }
+        }
+        while let Some(frame) = self.framer.next_frame() {
+            self.endpoint.on_frame(0, &frame, &flown);
+        }
+        let leaving = self.endpoint.poll(&flown);
+        let bytes: Vec<u8> = leaving.iter().flat_map(|outgoing| outgoing.frame.as_bytes()).copied().collect();
+        if !bytes.is_empty() {
+            radio.write(&bytes);
+        }
+        self.heard = self.endpoint.heard(input.time_s);
+        stream::Heard {
+            uplink: uplink_to_log(self.heard.uplink),
+            commander: self.heard.commander.as_ref().map(commander_to_log),
+            requests: self.heard.requests.iter().map(request_to_log).collect(),
+        }
+    }
+}
+
+impl Vehicle for Flown<'_> {
+    fn computer(&self) -> &Computer {
+        self.computer
+    }
+
+    fn time_s(&self) -> f64 {
+        self.input.time_s
+    }
+
+    fn mission(&self) -> &MissionName {
+        &self.vehicle.name
+    }
+
+    fn operators(&self) -> &[Operator] {
+        &[]
+    }
+
+    fn people(&self) -> Option<People> {
+        None
+    }
+
+    fn weights(&self) -> StateWeights {
+        self.vehicle.mission.powered.weights
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let Input { frame, time_s, gimbal_rad, fins_rad, battery_v, log, commander, .. } = *self.input;
+        let known = snapshot::Known {
+            computer: self.computer,
+            time_s,
+            deadline_s: FRAME_S,
+            judged: None,
+            people: None,
+            operators: &[],
+            commander,
+            mission: &self.vehicle.name,
+            log,
+        };
+        let seen = InSpace {
+            known,
+            mission: &self.vehicle.mission,
+            gimbal_rad,
+            fins_rad,
+            sensors: self.vehicle.sensors.facts(frame),
+            battery: battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
+            rehearsed: None,
+            parachute_ejected: self.vehicle.parachute_ejected,
+            took_s: 0.0,
+        };
+        seen.snapshot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
+    }
+}

@@ -1,0 +1,26 @@
+//! The vehicle's end of MAVLink: what it says, how often, and how it takes what a ground station asks for.
+//!
+//! The crate is pure and needs no operating system: frames, times and the vehicle are arguments. A simulated vehicle and
+//! a board's program use the same code.
+//!
+//! * [`vehicle`]: what the links read of a vehicle.
+//! * [`endpoint`]: frames in and frames out, within a radio's budget.
+//! * [`commands`]: translates MAVLink commands to requests for the vehicle.
+//! * [`stations`]: how well the vehicle hears each ground station.
+//! * [`snapshot`]: the vehicle's state at one instant, as its flight computer believes it.
+//! * [`telemetry`] and [`streams`]: that state as MAVLink messages, and their rates.
+//! * [`sensed`]: what the sensors said last.
+//! * [`parameters`]: values that a ground station may read by name, and the few that it may set.
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+pub mod commands;
+pub mod endpoint;
+pub mod parameters;
+pub mod sensed;
+pub mod snapshot;
+pub mod stations;
+pub mod streams;
+pub mod telemetry;
+pub mod vehicle;

@@ -1,0 +1,81 @@
+//! The program of a board, as a process: it speaks MAVLink itself, over a serial radio, with the ordinary ground station, and
+//! decides every frame of a simulated world, which is another process. `benches/chain.rs` does the same with the image of a
+//! Cortex-M7.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
+use std::path::Path;
+use std::process::Command;
+
+use e2e::{Ended, Program, Running, SerialLine, Terminal, auto_ground, expect_identical_replay, program};
+use nix::sys::stat::Mode;
+use nix::unistd::mkfifo;
+
+/// World and board of one flight, and the board's radio.
+struct Chain {
+    world: Running,
+    board: Running,
+    radio: SerialLine,
+}
+
+impl Chain {
+    fn start(folder: &Path) -> Self {
+        let radio = SerialLine::new(57_600);
+        for pipe in ["frames", "answers"] {
+            mkfifo(&folder.join(pipe), Mode::S_IRUSR | Mode::S_IWUSR).unwrap();
+        }
+        // The shell opens the pipes in the order in which the world opens them.
+        let mut board = Command::new("sh");
+        board.args(["-c", "exec \"$0\" fly --radio \"$1\" <frames >answers"]);
+        board.arg(program(Program::Board).get_program()).arg(&radio.near).current_dir(folder);
+        let board = Running::start(&mut board);
+        let mut world = program(Program::OnboardSim);
+        world.args(["fly", "--profile", "mk2", "--start", "pad", "--speed", "4", "--board", "."]);
+        let world = Running::start(world.args(["--log", "vehicle.mcap"]).current_dir(folder));
+        Self { world, board, radio }
+    }
+
+    /// Waits for the end of the world, and of the board, which ends with it. Returns the world's.
+    fn wait(self) -> Ended {
+        let (world, board) = (self.world.wait(), self.board.wait());
+        assert_eq!(board.code, Some(0), "{}\n{}", board.output, world.output);
+        world
+    }
+}
+
+#[test]
+fn a_board_with_a_radio_of_its_own_is_armed_started_and_lands() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = Chain::start(folder.path());
+    let mut ground = Running::start(&mut auto_ground(folder.path(), &[&chain.radio.far_link()]));
+    for phase in ["PAD_ARMED", "BOOST", "AERO_DESCENT", "POWERED", "TOUCHDOWN"] {
+        ground.wait_for_line(phase);
+    }
+    let world = chain.wait();
+    assert_eq!(world.code, Some(0), "{}", world.output);
+    assert!(world.output.contains("LANDED"), "{}", world.output);
+    expect_identical_replay(folder.path(), "vehicle.mcap");
+}
+
+#[test]
+fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = Chain::start(folder.path());
+    let mut ground = program(Program::Ground);
+    ground.args(["--connect", &chain.radio.far_link(), "--log", "ground.mcap"]).current_dir(folder.path());
+    ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
+    let mut screen = Terminal::start(&ground, (100, 40), false);
+    screen.wait_for("GO: every arming check passes");
+    screen.type_until(b"AARM\r", " ARMED ");
+    screen.type_until(b"SSTART\r", "START  commanded");
+    screen.wait_for("AERO_DESCENT");
+    screen.type_bytes(b"\x18\r");
+    screen.wait_for("CHUTE");
+    screen.wait_for("TOUCHDOWN");
+    let world = chain.wait();
+    assert_eq!(world.code, Some(4), "{}", world.output);
+    for words in ["ABORTED", "parachute deployed"] {
+        assert!(world.output.contains(words), "no {words} in:\n{}", world.output);
+    }
+    assert!(!world.output.contains("IGNITION"), "{}", world.output);
+    expect_identical_replay(folder.path(), "vehicle.mcap");
+}
