@@ -202,11 +202,7 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    if let Some(name) = &model.settings.vehicle_name {
-        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
-        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
-        model.info(clock.now(), text);
-    }
+    announce(&mut model, auto, clock.now());
     let mut signatures = None;
     if let Some((list, file, told)) = checklist {
         model.checklist = Some(list);
@@ -253,6 +249,15 @@ async fn start(
     station.publish_checklist(&model, clock.now());
     station.publish_place(&model, clock.now());
     Ok((station, model, wire))
+}
+
+/// Says what the demonstration is, before anything else.
+fn announce(model: &mut Model, auto: bool, now: Duration) {
+    if let Some(name) = &model.settings.vehicle_name {
+        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        model.info(now, text);
+    }
 }
 
 /// The folder of the log.
