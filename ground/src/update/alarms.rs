@@ -11,8 +11,8 @@ use crate::model::alarm::AlarmKind;
 use crate::model::command::{Acknowledgement, CommandKind};
 use crate::model::events::Speaker;
 use crate::model::link_state::{LinkState, RED_AFTER};
-use crate::model::pad_check::PadCheck;
 use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::pad_check::PadCheck;
 use crate::model::{Model, Role};
 
 /// An abort without an answer raises an alarm after this time.

@@ -25,7 +25,8 @@ pub(super) struct Ask {
 
 impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
-        let written = write_frames(&self.file, &self.frames, &self.answers, Overwrite::if_forced(self.force))?;
+        let written =
+            write_frames(&self.file, &self.frames, &self.answers, Overwrite::if_forced(self.force))?;
         answer(|output| writeln!(output, "{written} frames"))?;
         Ok(Answer::Given)
     }

@@ -111,7 +111,9 @@ fn a_gate_overwrites_nothing() {
     let log = season.logs().join("week-2/mk2.mcap");
     let baseline = season.beside("foreign.json");
     std::fs::write(&baseline, "{\n  \"flights\": {}\n}\n").unwrap();
-    for (option, file) in [("--junit", &log), ("--junit", &baseline), ("--state", &log), ("--state", &baseline)] {
+    for (option, file) in
+        [("--junit", &log), ("--junit", &baseline), ("--state", &log), ("--state", &baseline)]
+    {
         let before = std::fs::read(file).unwrap();
         let (code, stdout, stderr) = season.gate(&["--accept", option, &file.display().to_string()]);
         assert!(code == 2 && stderr.contains(&file.display().to_string()), "{option}: {stdout}{stderr}");

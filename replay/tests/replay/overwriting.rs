@@ -60,7 +60,7 @@ fn no_existing_file_is_overwritten_without_force() {
 #[test]
 fn what_a_board_gets_is_whole_or_absent() {
     let (directory, log) = copied(&WITH_FRAMES.log);
-    let asked = |log: &Path, names: [&str; 2], more: &[&str]| {
+    let asked = |log: &PathBuf, names: [&str; 2], more: &[&str]| {
         run(replay("frames", log).args(names).args(more).current_dir(directory.path()))
     };
     let bytes = std::fs::read(&log).unwrap();
@@ -84,7 +84,7 @@ fn what_a_board_gets_is_whole_or_absent() {
 fn a_shadow_of_nothing_leaves_no_log() {
     let directory = tempfile::tempdir().unwrap();
     for connect in ["no-file.mcap", "udpin:192.0.2.1:5"] {
-        let mut command = replay("shadow", Path::new("--profile"));
+        let mut command = replay("shadow", &PathBuf::from("--profile"));
         command.args(["mk2", "--connect", connect]).current_dir(directory.path());
         let (code, stdout, stderr) = run(&mut command);
         assert!(code == 2 && stderr.contains(connect), "{stdout}{stderr}");

@@ -1,6 +1,8 @@
 //! The engineer's recipes for campaigns over many machines, run by the programs they are for: GNU parallel, and Slurm with a
 //! cluster of this one machine. What is merged from their parts must be one machine's campaign, byte for byte.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
