@@ -122,6 +122,7 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
     agreed((ann, b"0AARM\r", "RANGE SAFETY Ann asks to arm"), (bob, b"0ACONFIRM\r", " ARMED "));
     launch.ann.wait_for(" ARMED ");
     // The start is shared in the same way; whoever confirms must tap.
+    let [ann, bob] = [&mut launch.ann, &mut launch.bob];
     agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
     launch.bob.wait_for("no tap of RANGE SAFETY Ann for 2 s");
     launch.ann.wait_for("start anew");

@@ -106,13 +106,23 @@ pub fn write_frames(
             Entry::ComputerFrame(frame) if from_power_up => {
                 inputs.send(&Frame { from_power_up: Some(frame.input), in_the_air: None })?;
                 let (output, state_digest) = (Some(frame.output), frame.state_digest);
-                expected.send(&Answer { from_power_up: output, in_the_air: None, state_digest, heard: None })?;
+                expected.send(&Answer {
+                    from_power_up: output,
+                    in_the_air: None,
+                    state_digest,
+                    heard: None,
+                })?;
                 written += 1;
             }
             Entry::PilotTick(tick) if started && !from_power_up => {
                 inputs.send(&Frame { from_power_up: None, in_the_air: Some(tick.input) })?;
                 let (output, state_digest) = (Some(tick.output), tick.state_digest);
-                expected.send(&Answer { from_power_up: None, in_the_air: output, state_digest, heard: None })?;
+                expected.send(&Answer {
+                    from_power_up: None,
+                    in_the_air: output,
+                    state_digest,
+                    heard: None,
+                })?;
                 written += 1;
             }
             // Its part of a frame from power-up.
