@@ -245,7 +245,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
             Standing::JustEnded => {
-                model.info(now, "the check has just ended; press again in 3 s for another one")
+                model.info(now, "the check has just ended; press again in 3 s for another one");
             }
             Standing::Rests => match why_not_check(model, now) {
                 None => {
