@@ -11,7 +11,7 @@ use crate::commands::Command;
 use crate::vehicle::Vehicle;
 
 /// Why the station expects another mission; `None` if it expects this one or says nothing of it.
-pub(super) fn why_other(request: &CommandRequest, asked: &Command, vehicle: &dyn Vehicle) -> Option<String> {
+pub fn why_other(request: &CommandRequest, asked: &Command, vehicle: &dyn Vehicle) -> Option<String> {
     if *asked != Command::Vehicle(Asked::Arm) {
         return None;
     }

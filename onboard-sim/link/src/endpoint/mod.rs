@@ -7,7 +7,7 @@ mod budget;
 mod files;
 mod lane;
 mod lists;
-mod mission;
+pub mod mission;
 mod pad_check;
 mod questions;
 mod refusals;

@@ -138,7 +138,7 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     let mut snapshot = wire.vehicle.snapshot();
     let half_rad = 0.5 * 120f64.to_radians();
     snapshot.motion.ned_from_body = [libm::cos(half_rad), 0.0, 0.0, libm::sin(half_rad)];
-    let turned = telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
+    let turned = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
     assert!(matches!(&turned, Some(MavMessage::VFR_HUD(hud)) if hud.heading == 120), "{turned:?}");
 }
 
