@@ -104,9 +104,26 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     rig.answer(CHECK, 0);
     tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_STOPPED, 2);
     assert!(rig.screen(80, 24).contains("CHECK 1 STOPPED early"));
+    rig.keys(&[Key::Char('X'), Key::Enter]);
+    assert!(checks(&mut rig).is_empty(), "pressed to end it, a moment too late");
+    rig.run(3.0);
     rig.keys(&[Key::Char('E'), Key::Enter]);
     assert_eq!(checks(&mut rig), [2.0], "without motion");
     assert!(alarms(&rig.model).is_empty(), "{:?}", rig.model.alarms.list());
+}
+
+#[test]
+fn the_letter_ends_a_check_of_which_nothing_was_heard() {
+    let mut rig = Rig::crewed();
+    rig.keys(&[Key::Char('X'), Key::Enter]);
+    assert_eq!(checks(&mut rig), [1.0]);
+    assert!(
+        rig.screen(80, 24).contains("HANDS OFF: a check of the vehicle may run"),
+        "{}",
+        rig.screen(80, 24)
+    );
+    rig.key(Key::Char('X'));
+    assert_eq!(checks(&mut rig), [0.0], "no dialog, and no second start");
 }
 
 #[test]
