@@ -20,7 +20,7 @@ const SIZE: (u16, u16) = (100, 40);
 /// machine without a free processor core takes several times as long.
 const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
 
-/// What `emulate chain` needs, and the status of its `--ready` when it is not there.
+/// The status of `emulate ready` when something that `emulate chain` needs is not there.
 const NOT_HERE: i32 = 2;
 
 fn main() -> Result<(), Failure> {

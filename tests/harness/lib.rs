@@ -28,7 +28,7 @@ pub use keys::{keygen, signing_with_key_in};
 pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
 pub use nix::sys::signal::Signal;
 pub use ports::{Bound, unshared_address};
-pub use process::{Ended, Running};
+pub use process::{Ended, Running, resident_bytes, status_of};
 pub use programs::{Program, program};
 pub use random::Random;
 pub use serial_line::SerialLine;

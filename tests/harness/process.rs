@@ -108,9 +108,7 @@ impl Running {
 
     /// The program's resident memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
-        let statm = std::fs::read_to_string(format!("/proc/{}/statm", self.child.id())).expect("it runs");
-        let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
-        pages * 4096
+        resident_bytes(self.child.id()).expect("it runs")
     }
 
     /// Waits until the program has bound a loopback port, and returns the port.
@@ -151,4 +149,16 @@ pub(crate) fn processor_time_of(process: u32) -> Duration {
     let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
     // Linux counts 100 clock ticks a second.
     Duration::from_millis(10 * clock_ticks)
+}
+
+/// Resident memory of a process, bytes; `None` if it is gone.
+pub fn resident_bytes(process: u32) -> Option<u64> {
+    Some(1024 * status_of(process, "VmRSS:")?)
+}
+
+/// A number of `/proc/PID/status`; `None` if the process is gone.
+pub fn status_of(process: u32, name: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
 }

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use e2e::resident_bytes;
 use flight::computer::LogState;
 use flight::computer::crew::{Asked, Request};
 use flight::rules::phase::Phase;
@@ -15,7 +16,7 @@ use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::{LoadedFlight, load_flight};
 use simulated_vehicle::vehicle::Vehicle;
 
-use crate::footprint::{GROWTH_MAX_BYTES, resident_bytes};
+use crate::footprint::GROWTH_MAX_BYTES;
 use crate::{Failure, say};
 
 const HOUR: Duration = Duration::from_hours(1);

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use e2e::{resident_bytes, status_of};
+
 use crate::SAMPLE_EVERY;
 
 /// Growth of resident memory that is called flat: what the `long` test of `ground` allows for its allocator in nine hours.
@@ -99,18 +101,6 @@ impl Watched {
             .map(|(from, to)| format!("{:.1}", at(to).saturating_sub(at(from)) as f64 / 1e6));
         grown.join(" ")
     }
-}
-
-/// Resident memory of a process, bytes; `None` if it is gone.
-pub(crate) fn resident_bytes(process: u32) -> Option<u64> {
-    Some(1024 * status_of(process, "VmRSS:")?)
-}
-
-/// A number of `/proc/PID/status`.
-fn status_of(process: u32, name: &str) -> Option<u64> {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix(name))?;
-    line.split_whitespace().next()?.parse().ok()
 }
 
 /// `None` if the process is gone.

@@ -79,14 +79,9 @@ impl LogGuard {
 
     /// Deletes the log again, because the run has failed before it began.
     pub fn discard(mut self) {
-        let Some(recorder) = self.recorder.take() else { return };
-        let tlog = recorder.tlog_path().map(Path::to_owned);
-        // The files belong to this run, and whether they were written completely does not matter any more.
-        if let Ok(path) = recorder.finish() {
-            let _ = std::fs::remove_file(path);
-        }
-        if let Some(tlog) = tlog {
-            let _ = std::fs::remove_file(tlog);
+        if let Some(recorder) = self.recorder.take() {
+            // Why the run has failed is being reported.
+            let _ = recorder.discard();
         }
     }
 

@@ -35,18 +35,17 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
         return Standing::Runs;
     }
     let asked = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
-    let ended_at = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
+    let ended = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
     let may_run = asked.into_iter().flatten().any(|asked| {
         let is_refused = matches!(asked.acknowledged, Acknowledgement::Answered(_)) && !asked.accepted();
         let is_told = told.is_some_and(|told| told.told_at > asked.commanded_at + LATE);
-        let is_ended = ended_at.is_some_and(|end| end.commanded_at > asked.commanded_at);
+        let is_ended = ended.is_some_and(|end| end.commanded_at > asked.commanded_at);
         !is_refused && !is_told && !is_ended && now.saturating_sub(asked.commanded_at) < LONGEST
     });
     if may_run {
         return Standing::MayRun;
     }
-    let ended_at = told.and_then(|told| told.ended_at);
-    match ended_at {
+    match told.and_then(|told| told.ended_at) {
         Some(at) if now.saturating_sub(at) < JUST_ENDED => Standing::JustEnded,
         _ => Standing::Rests,
     }

@@ -10,7 +10,6 @@ use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
-use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
@@ -152,9 +151,7 @@ impl FlyArguments {
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let mut profile = load_flight(&arguments.profile)?;
     arguments.choose(&mut profile)?;
-    // What can be refused comes before the log: a refusal leaves none behind.
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
-    arguments.key.as_deref().map(KeyFile::read_key).transpose()?;
     let recorder = match &arguments.log {
         None => None,
         Some(path) => {
@@ -199,11 +196,14 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         report_event(time_s, event);
     };
     let flown = Box::pin(fly_observed(options, stopped, observe)).await;
-    let log_path = recorder.as_ref().map(Recorder::finish).transpose();
-    // A link that cannot be opened: the log holds nothing, and its name is free for the next try.
-    if let (Err(_), false, Ok(Some(path))) = (&flown, began, &log_path) {
-        std::fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))?;
+    if flown.is_err()
+        && !began
+        && let Some(recorder) = &recorder
+    {
+        // A key or a link that cannot be opened.
+        recorder.discard().with_context(|| format!("{}: cannot be removed", recorder.path().display()))?;
     }
+    let log_path = recorder.as_ref().map(Recorder::finish).transpose();
     let summary = flown?;
     print_summary(&summary)?;
     if let Some(path) = log_path.context("the flight is over, but its log is incomplete")? {

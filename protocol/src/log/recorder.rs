@@ -6,7 +6,7 @@
 //! more than that. A second thread syncs the file to the disk, so that a slow disk does not lengthen the 200 ms.
 
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -205,6 +205,16 @@ impl Recorder {
             Ok(Err(source)) => Err(RecorderError::Write { path, source }),
             Err(_panic) => Err(RecorderError::Gone { path }),
         }
+    }
+
+    /// Ends the log and removes its files, because the run has failed before it began: their names are free for the next try.
+    ///
+    /// # Errors
+    /// A file cannot be removed. Whether it was written completely does not matter any more.
+    pub fn discard(&self) -> io::Result<()> {
+        let _ = self.finish();
+        let files = [Some(self.path()), self.tlog_path()];
+        files.into_iter().flatten().try_for_each(std::fs::remove_file)
     }
 }
 

@@ -126,9 +126,14 @@ impl Ask {
         };
         // Whatever happened, the log is finished.
         let finished = listener.recorder.as_ref().map(Recorder::finish).transpose();
-        if let (Err(_), 0, Ok(Some(path))) = (&heard, listener.frames, &finished) {
+        if heard.is_err()
+            && listener.frames == 0
+            && let Some(recorder) = &listener.recorder
+        {
             // No link: nothing was heard, so nothing stays.
-            std::fs::remove_file(path).with_context(|| format!("{}: cannot be removed", path.display()))?;
+            recorder
+                .discard()
+                .with_context(|| format!("{}: cannot be removed", recorder.path().display()))?;
         }
         heard?;
         let written = finished?;

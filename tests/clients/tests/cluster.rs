@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clients::{file, found, outside};
@@ -32,14 +32,22 @@ fn shell(line: &str, folder: &Path, variables: &[(&str, &Path)]) {
     assert_eq!(ended.code, Some(0), "{line}\n{}", ended.output);
 }
 
-/// The files of a campaign's folder.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = fs::read_dir(folder).expect("the folder of a campaign");
-    let named = entries.map(|entry| {
-        let entry = entry.expect("an entry");
-        (entry.file_name().to_string_lossy().into_owned(), fs::read(entry.path()).expect("a file"))
-    });
-    named.collect()
+/// The files of a campaign's folder and of the folders in it, by their paths in it.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(inner) = folders.pop() {
+        for entry in fs::read_dir(inner).expect("the folder of a campaign") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let bytes = fs::read(&path).expect("a file");
+                found.insert(path.strip_prefix(folder).expect("inside").to_owned(), bytes);
+            }
+        }
+    }
+    found
 }
 
 /// Merges the parts in a folder as the page says, and compares the whole with a campaign that was never cut.
@@ -50,11 +58,12 @@ fn expect_the_campaign_of_one_machine(folder: &Path) {
     shell(merge, folder, &[]);
     shell("onboard-sim campaign --flights 9 --out one", folder, &[]);
     let (whole, one) = (files(&folder.join("whole")), files(&folder.join("one")));
-    assert!(one.contains_key("flights.csv") && one.contains_key("summary.json"), "{:?}", one.keys());
-    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
-    assert_eq!(names(&whole), names(&one));
+    for name in ["flights.csv", "summary.json"] {
+        assert!(one.contains_key(Path::new(name)), "{:?}", one.keys());
+    }
+    assert!(whole.keys().eq(one.keys()), "{:?} and {:?}", whole.keys(), one.keys());
     for (name, bytes) in one {
-        assert!(whole[&name] == bytes, "{name} differs");
+        assert!(whole[&name] == bytes, "{} differs", name.display());
     }
 }
 

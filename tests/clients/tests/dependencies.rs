@@ -41,6 +41,16 @@ fn licences_are_weighed_as_their_expressions_say() {
     }
 }
 
+/// `cargo about` cannot read the list from here.
+#[test]
+fn a_release_accepts_the_same_licences() {
+    let settings =
+        std::fs::read_to_string(clients::file("../../ground/packaging/about.toml")).expect("settings");
+    let (list, _) = settings.split_once(']').expect("a list that ends");
+    let names: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
+    assert_eq!(names, ACCEPTED);
+}
+
 #[test]
 fn every_dependency_has_an_accepted_licence_and_comes_from_the_registry() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

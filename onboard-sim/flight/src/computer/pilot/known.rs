@@ -1,12 +1,16 @@
 //! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and drag.
 
+use nalgebra::{Vector2, Vector3};
+
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::MotorEstimate;
-use crate::guidance::powered::PoweredSituation;
+use crate::guidance::powered::{PoweredGuidance, PoweredSituation};
 use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
+use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
+use crate::vehicle::rigid::RigidState;
 
 /// The vehicle as the pilot knows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,6 +105,17 @@ impl Known {
 
     pub(super) fn feet_below_cg_m(&self, mass: &MassProperties) -> f64 {
         self.airframe().above_feet_m(mass.cg_station_m)
+    }
+
+    /// The guidance of the landing burn, with room for the longest plan: the one at ignition.
+    pub(super) fn guidance(&self) -> PoweredGuidance {
+        let state = RigidState::upright(self.mission.start.height_m);
+        let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
+        let density_kg_m3 = Air::at_height_m(self.mission.pad_altitude_m).density_kg_m3;
+        let burning = Burning { burning_s: 0.0, mass: self.mass.at(0.0), density_kg_m3, lands_here: false };
+        let fins_m2 = self.largest_fin_drag_area_m2();
+        let situation = self.powered_situation(&estimate, &burning, self.burn(), fins_m2);
+        PoweredGuidance::with_room(self.mission.powered, &state, &situation)
     }
 
     /// The burning vehicle with this motor, and with this drag area of the fins as certified.

@@ -134,6 +134,11 @@ impl Pilot {
     ) -> Self {
         let airframe = &mission.airframe;
         let frame_s = mission.estimator.frame_s;
+        let known = Known {
+            mission: mission.clone(),
+            mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
+            motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
+        };
         Self {
             estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
             estimate: None,
@@ -148,7 +153,7 @@ impl Pilot {
             },
             ignited_at_s: None,
             outlook: Outlook::default(),
-            powered: PoweredGuidance::new(mission.powered),
+            powered: known.guidance(),
             baseline: None,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
@@ -157,11 +162,7 @@ impl Pilot {
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
             gate_shut_since_s: None,
-            known: Known {
-                mission: mission.clone(),
-                mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
-                motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
-            },
+            known,
         }
     }
 

@@ -8,7 +8,7 @@ use crate::vehicle::dynamics::PlanarState;
 use nmpc::free_time::FreeTimeSolution;
 
 /// A plan being flown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Flown {
     pub(super) begins_s: f64,
     /// Rotational acceleration of a unit sine of the gimbal angle in each interval, rad/s^2.

@@ -41,7 +41,7 @@ use nalgebra::Vector3;
 use crate::control::aim::Aim;
 use crate::guidance::controller::ControlLevel;
 use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::profile::FinalBox;
+use crate::vehicle::profile::{FinalBox, SolverLimits};
 use crate::vehicle::rigid::RigidState;
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
 use nmpc::{Problem, SolveStatus};
@@ -55,6 +55,10 @@ const HOMING_ENDS_S: f64 = 1.5;
 const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that corrects the velocity when a plan is flown to its end, rad.
 const END_LEAN_MAX_RAD: f64 = 0.05;
+
+/// How much longer than as certified a motor may burn before its plans need more memory than at set-up, s: five standard
+/// deviations of mk2's motor. Beyond it they allocate.
+const LONGER_BURN_S: f64 = 0.5;
 
 /// Factor on the cost of tilt when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
@@ -84,10 +88,38 @@ pub struct PoweredGuidance {
     workspace: FreeTimeWorkspace,
     trial: FreeTimeSolution,
     set_aside: FreeTimeSolution,
+    /// Becomes the flown plan with the first plan.
+    unused: Flown,
     space: SpaceGuidance,
 }
 
 impl PoweredGuidance {
+    /// Guidance without a plan, whose plans from this state on need no more memory than it has.
+    ///
+    /// It plans that landing and forgets the plans, so that every buffer has its size.
+    pub fn with_room(
+        settings: PoweredSettings,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+    ) -> Self {
+        let solver = SolverLimits { max_iterations: 1, ..settings.solver };
+        let latest_after_s = settings.latest_after_s + LONGER_BURN_S;
+        let mut planned = Self::new(PoweredSettings { solver, max_solves: 1, latest_after_s, ..settings });
+        // Cold, warm, and cold again: the search swaps its buffers, and a warm plan is shorter.
+        planned.plan(0.0, state, situation, None);
+        planned.plan(0.0, state, situation, None);
+        planned.flown = None;
+        planned.space.forget();
+        planned.plan(0.0, state, situation, None);
+        planned.space.forget();
+        let Self { workspace, flown, space, .. } = planned;
+        let unused = flown.unwrap_or_default();
+        let set_aside =
+            FreeTimeSolution { solution: unused.plan.solution.clone(), ..FreeTimeSolution::default() };
+        let trial = set_aside.clone();
+        Self { workspace, trial, set_aside, unused, space, ..Self::new(settings) }
+    }
+
     /// Guidance without a plan.
     pub fn new(settings: PoweredSettings) -> Self {
         Self {
@@ -98,6 +130,7 @@ impl PoweredGuidance {
             workspace: FreeTimeWorkspace::default(),
             trial: FreeTimeSolution::default(),
             set_aside: FreeTimeSolution::default(),
+            unused: Flown::default(),
             space: SpaceGuidance::default(),
         }
     }
@@ -276,11 +309,7 @@ impl PoweredGuidance {
         let step_s = self.trial.final_time_s / problem.intervals as f64;
         let per_newton = situation.arm_m / situation.inertia_kg_m2;
         let ahead = Ahead(situation);
-        let flown = self.flown.get_or_insert_with(|| Flown {
-            begins_s: time_s,
-            turning_rad_s2: Vec::with_capacity(MOST_INTERVALS),
-            plan: FreeTimeSolution::default(),
-        });
+        let flown = self.flown.get_or_insert_with(|| core::mem::take(&mut self.unused));
         flown.begins_s = time_s;
         flown.turning_rad_s2.clear();
         flown.turning_rad_s2.extend(

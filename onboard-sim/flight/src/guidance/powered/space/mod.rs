@@ -52,14 +52,24 @@ pub(super) struct SpaceGuidance {
     found: SpacePlan,
     warm: SpacePlan,
     flown: Option<SpacePlan>,
+    /// Becomes the flown plan with the first plan.
+    unused: SpacePlan,
     /// The flown plan's motion in the plane of the report.
     projected: Vec<PlanarState>,
 }
 
 // The workspace and the plans beside the flown one are written before they are read; the projection is only reported.
-remembers!(SpaceGuidance { flown } but { workspace, problem, trial, found, warm, projected });
+remembers!(SpaceGuidance { flown } but { workspace, problem, trial, found, warm, unused, projected });
 
 impl SpaceGuidance {
+    /// Forgets its plans, and keeps their room.
+    pub(super) fn forget(&mut self) {
+        if let Some(flown) = self.flown.take() {
+            self.trial = flown.clone();
+            self.unused = flown;
+        }
+    }
+
     /// Time until the flown plan ends, s.
     pub(super) fn left_s(&self, time_s: f64) -> Option<f64> {
         self.flown.as_ref().map(|plan| plan.left_s(time_s))
@@ -106,7 +116,10 @@ impl SpaceGuidance {
             largest_tilt_rad: self.found.largest_tilt_rad(),
         };
         if usable {
-            core::mem::swap(self.flown.get_or_insert_with(SpacePlan::default), &mut self.found);
+            core::mem::swap(
+                self.flown.get_or_insert_with(|| core::mem::take(&mut self.unused)),
+                &mut self.found,
+            );
         }
         Some(report)
     }
