@@ -71,8 +71,12 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 }
 
 /// Both directions of the link, each with the age of its last frame: hearing the vehicle does not prove that it hears
-/// us. Whole seconds, because heartbeats come only once a second.
+/// us. Whole seconds, because heartbeats come only once a second. On an attached screen, that its station is silent.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(silence) = model.link.station_silence(now) {
+        let words = format!("STATION SILENT {}s", silence.as_secs());
+        return Line::styled(words, theme.style(TextRole::Alarm));
+    }
     let down = model.link.state(now);
     if down == LinkState::NeverHeard {
         return Line::styled("down: not heard", theme.style(TextRole::Caution));
