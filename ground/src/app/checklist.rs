@@ -84,14 +84,13 @@ impl SignatureFile {
     /// The file cannot be written.
     pub(super) fn add(&mut self, entry: &ChecklistEntry) -> anyhow::Result<()> {
         let signatures = || format!("the signatures {}", self.path.display());
-        let mut file = match self.file.take() {
-            Some(file) => file,
-            None => {
-                let file = File::options().append(true).create(true).open(&self.path);
-                let file = file.with_context(signatures)?;
-                lock(&file, &self.path)?;
-                file
-            }
+        let mut file = if let Some(file) = self.file.take() {
+            file
+        } else {
+            let file = File::options().append(true).create(true).open(&self.path);
+            let file = file.with_context(signatures)?;
+            lock(&file, &self.path)?;
+            file
         };
         let text = checklist_file::entry_text(&self.hash, entry);
         let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_data());

@@ -100,9 +100,10 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = vec![Line::styled(title, theme.style(TextRole::Title))];
     lines.extend(lost.map(|silence_s| {
         let unheard = model.vehicle.in_flight() && !model.link.state(now).carries();
-        let words = match unheard {
-            true => " link LOST before touchdown".to_owned(),
-            false => format!(" silent for {} s of the flight", fixed(silence_s, 1)),
+        let words = if unheard {
+            " link LOST before touchdown".to_owned()
+        } else {
+            format!(" silent for {} s of the flight", fixed(silence_s, 1))
         };
         Line::styled(words, theme.style(TextRole::Caution))
     }));
