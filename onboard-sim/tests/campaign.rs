@@ -48,6 +48,15 @@ fn a_map_overwrites_no_file_without_force() {
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2);
 }
 
+#[test]
+fn a_campaign_without_a_flight_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let refused = campaign(directory.path(), &["--flights", "0", "--out", "c"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("0 is not in 1.."), "{}", stderr(&refused));
+    assert!(!directory.path().join("c").exists());
+}
+
 /// With sensors, a fault that affects the estimator, and a restart in the middle.
 #[test]
 fn a_logged_flight_flies_again_bit_for_bit() {

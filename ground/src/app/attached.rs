@@ -114,6 +114,8 @@ pub async fn session(
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // If the lost station was repeating an abort, the next station must send it.
                     model.link.abort_unsent |= !viewer.watch && model.commands.is_aborting();
+                    // It is gone, not silent.
+                    model.link.station_at = None;
                     // If the station went away while sending the history, the history ends here.
                     model.history_ends();
                     let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());

@@ -15,6 +15,8 @@ pub enum AlarmKind {
     UplinkLost,
     /// The transport does not work.
     LinkDown,
+    /// An attached screen is told nothing any more. The station itself does not know this alarm.
+    StationSilent,
     /// The vehicle acknowledged the command, but its own state does not show the effect.
     Disagreement(CommandKind),
     /// The command was sent repeatedly and not answered.
@@ -48,6 +50,7 @@ pub enum AlarmKind {
 }
 
 impl AlarmKind {
+    /// The alarms that a station tells its screens about.
     pub fn all() -> impl Iterator<Item = Self> {
         let of_commands = [Self::Disagreement, Self::Unanswered, Self::Refused]
             .into_iter()
@@ -75,7 +78,15 @@ impl AlarmKind {
 
     /// Whether the alarm belongs to one boot of the vehicle and ends with it.
     fn ends_with_the_boot(self) -> bool {
-        !matches!(self, Self::LinkLost | Self::UplinkLost | Self::LinkDown | Self::Rebooted | Self::Log)
+        !matches!(
+            self,
+            Self::LinkLost
+                | Self::UplinkLost
+                | Self::LinkDown
+                | Self::StationSilent
+                | Self::Rebooted
+                | Self::Log
+        )
     }
 }
 

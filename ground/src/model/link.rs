@@ -14,6 +14,10 @@ use super::uplink::Uplink;
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
+/// An attached screen that was told nothing for longer than this has a silent station: twenty of its ticks. Less than the
+/// silence after which a vehicle is lost, so that the two are not mistaken for each other.
+const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
+
 /// The state of one of several links.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkReport {
@@ -56,6 +60,8 @@ pub struct Link {
     /// The crew has asked for an abort that reached no station. The screen sends it to the next station that it
     /// finds.
     pub abort_unsent: bool,
+    /// On an attached screen: the last tick of its station. `None` in the station itself, and while there is no station.
+    pub(crate) station_at: Option<Duration>,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
     /// The last frame of the vehicle, of any kind.
@@ -76,6 +82,17 @@ impl Link {
     pub fn heard_over(&self) -> Option<&str> {
         let report = self.heard_over.and_then(|number| self.reports.get(number));
         report.map(|report| report.name.as_str())
+    }
+
+    /// How long the station of this attached screen has been silent, if it is.
+    pub fn station_silence(&self, now: Duration) -> Option<Duration> {
+        let silence = now.saturating_sub(self.station_at?);
+        (silence > STATION_SILENT_AFTER).then_some(silence)
+    }
+
+    /// Until when it is known what the station hears: in an attached screen its last tick, otherwise now.
+    pub(crate) fn known_until(&self, now: Duration) -> Duration {
+        self.station_at.map_or(now, |at| at.min(now))
     }
 
     /// The state of the downlink: whether the vehicle is heard. It counts as a vehicle from its first heartbeat.

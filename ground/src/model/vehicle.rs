@@ -191,7 +191,7 @@ impl Vehicle {
         self.phase().is_some_and(|phase| is_flight(phase.value))
     }
 
-    /// Time to release, s (negative after ignition), if a countdown is known.
+    /// Time to release, s (negative after it), if a countdown is known.
     pub fn countdown_s(&self) -> Option<Sample<f64>> {
         let status = self.status.as_ref()?;
         let known = status.value.countdown_ms != i32::MAX;

@@ -39,7 +39,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     }
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
-        if alarm.kind == AlarmKind::UplinkLost {
+        if matches!(alarm.kind, AlarmKind::UplinkLost | AlarmKind::StationSilent) {
             model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
         }
         model.outbox.push(Action::Alarm(alarm.text));
@@ -47,6 +47,12 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 }
 
 fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+    if model.link.station_silence(now).is_some() {
+        let text = "STATION SILENT: it does not answer this screen, which shows the past".to_owned();
+        found.push((AlarmKind::StationSilent, text));
+    }
+    // A silent station says nothing about the link.
+    let now = model.link.known_until(now);
     if let LinkState::Lost(_) = model.link.state(now) {
         found.push((AlarmKind::LinkLost, "LINK LOST: the vehicle is not heard".to_owned()));
     }

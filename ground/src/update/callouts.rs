@@ -115,7 +115,7 @@ fn readiness(model: &mut Model, now: Duration) {
 }
 
 fn link(model: &mut Model, now: Duration) {
-    let lost = matches!(model.link.state(now), LinkState::Lost(_));
+    let lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
     if std::mem::replace(&mut model.called.lost, lost) == lost {
         return;
     }

@@ -430,7 +430,8 @@ fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<Strin
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
     let Some(kind) = model.pointed_at().map(|alarm| alarm.kind) else { return };
-    if model.settings.role == Role::Attached {
+    // The station does not know of its own silence.
+    if model.settings.role == Role::Attached && kind != AlarmKind::StationSilent {
         model.outbox.push(Action::Request(Request::Acknowledge(kind)));
     } else {
         acknowledge(model, kind, now);

@@ -201,11 +201,25 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.warn(now, format!("{signal}: ending; the vehicle is not affected"));
             model.outbox.push(Action::Quit);
         }
-        Msg::Tick => tick::on_tick(model, now),
+        Msg::Tick => {
+            on_station_tick(model, now);
+            tick::on_tick(model, now);
+        }
     }
     alarms::watch(model, now);
     callouts::watch(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+/// Notes on an attached screen that its station runs.
+fn on_station_tick(model: &mut Model, now: Duration) {
+    if !matches!(model.settings.role, Role::Attached | Role::Watching) {
+        return;
+    }
+    if model.link.station_silence(now).is_some() && !model.alarms.are_in_history() {
+        model.info(now, "the station answers again");
+    }
+    model.link.station_at = Some(now);
 }
 
 /// Whether SIGINT is ignored: a Ctrl-C may be a mistake while a live vehicle is armed or in flight.

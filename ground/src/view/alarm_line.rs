@@ -97,11 +97,33 @@ pub fn state(alarm: &Alarm, now: Duration) -> State {
     State { word, age, role }
 }
 
-/// Shortens a text to this many columns; a shortened text ends in `..`.
+/// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept, unless that would lose more
+/// than a third of what fits.
 pub fn cut(text: &str, columns: usize) -> String {
     if text.chars().count() <= columns {
         return text.to_owned();
     }
-    let kept: String = text.chars().take(columns.saturating_sub(2)).collect();
-    format!("{kept}..")
+    let room = columns.saturating_sub(2);
+    let fits: String = text.chars().take(room).collect();
+    let ends_a_word = text.chars().nth(room).is_none_or(|next| next == ' ');
+    let words = fits.rsplit_once(' ').map(|(words, _)| words).filter(|_| !ends_a_word);
+    let kept = words.filter(|words| 3 * words.chars().count() >= 2 * room).unwrap_or(&fits);
+    format!("{}..", kept.trim_end())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_cut_behind_a_whole_word() {
+        let text = "LINK LOST: the vehicle is not heard";
+        assert_eq!(cut(text, 35), text);
+        assert_eq!(cut(text, 34), "LINK LOST: the vehicle is not..");
+        assert_eq!(cut(text, 31), "LINK LOST: the vehicle is not..");
+        assert_eq!(cut(text, 30), "LINK LOST: the vehicle is..");
+        assert_eq!(cut("ABORT LATCHED on the vehicle", 12), "ABORT LATC..");
+        assert_eq!(cut("no-whole-word-fits", 12), "no-whole-w..");
+        assert_eq!(cut("a no-whole-word-fits", 12), "a no-whole..");
+    }
 }

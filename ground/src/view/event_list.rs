@@ -3,6 +3,7 @@
 use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
 
+use super::CUT_MARK;
 use super::theme::{TextRole, Theme};
 use crate::model::Model;
 use crate::model::events::Event;
@@ -33,11 +34,11 @@ fn chosen(
     rows: usize,
 ) -> Vec<Line<'static>> {
     let text_columns = columns.saturating_sub(BEFORE_TEXT);
-    let mut lines: Vec<Line> = model
+    let of_events: Vec<Vec<Line>> = model
         .events
         .newest(rows)
         .filter(|event| passes(event))
-        .flat_map(|event| {
+        .map(|event| {
             let role = match event.level {
                 EventLevel::Info => TextRole::Plain,
                 EventLevel::Warning => TextRole::Caution,
@@ -54,9 +55,28 @@ fn chosen(
             let rest = pieces.map(move |piece| {
                 Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), Span::styled(piece, theme.style(role))])
             });
-            std::iter::once(first).chain(rest).collect::<Vec<_>>()
+            std::iter::once(first).chain(rest).collect()
         })
         .collect();
+    newest_lines(of_events, columns, rows)
+}
+
+/// As many of the last lines as there are rows. If the newest event alone has more, its beginning stays, with a mark where it
+/// is cut.
+fn newest_lines(mut events: Vec<Vec<Line<'static>>>, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    if let Some(newest) = events.last_mut().filter(|newest| newest.len() > rows) {
+        newest.truncate(rows);
+        let cut = newest.last_mut().map(|line| (line.width(), line.spans.last_mut()));
+        if let Some((width, Some(text))) = cut {
+            let mut words = text.content.to_string();
+            if width >= columns {
+                words.pop();
+            }
+            words.push(CUT_MARK);
+            text.content = words.into();
+        }
+    }
+    let mut lines = events.concat();
     lines.drain(..lines.len().saturating_sub(rows));
     lines
 }
@@ -92,7 +112,31 @@ fn wrap(text: &str, columns: usize) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::model::Settings;
+    use crate::model::events::Speaker;
+    use crate::view::theme::Palette;
+
+    #[test]
+    fn the_newest_event_keeps_its_beginning() {
+        let mut model = Model::new(Settings::on_screen("udpin:127.0.0.1:14550"));
+        let at = Duration::from_secs(7);
+        model.events.push(at, Speaker::Vehicle, EventLevel::Info, "SAFED".to_owned());
+        let text = "arming refused: pin: found in the vehicle".to_owned();
+        model.events.push(at, Speaker::Vehicle, EventLevel::Warning, text);
+        let theme = Theme { palette: Palette::None, ascii: false };
+        let shown = |rows| -> Vec<String> {
+            events(&model, theme, BEFORE_TEXT + 20, rows).iter().map(Line::to_string).collect()
+        };
+        let gap = " ".repeat(BEFORE_TEXT);
+        let whole = ["    7.0 vehicle ! arming refused: pin:", &format!("{gap}found in the vehicle")];
+        assert_eq!(shown(0), [""; 0]);
+        assert_eq!(shown(1), ["    7.0 vehicle ! arming refused: pin…"]);
+        assert_eq!(shown(2), whole);
+        assert_eq!(shown(3), ["    7.0 vehicle   SAFED", whole[0], whole[1]]);
+    }
 
     #[test]
     fn texts_wrap_at_spaces_and_keep_every_character() {

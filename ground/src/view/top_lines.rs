@@ -14,8 +14,8 @@ use crate::model::pad_check::{Standing, standing};
 use crate::model::permits::why_other_mission;
 use crate::model::{Model, Role, abort_too_late, words};
 
-/// In flight, a command whose effect is not observed is shown instead of the next event for this long. Its alarm
-/// stays.
+/// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
+/// answered one instead of a NO-GO. Its alarm stays.
 const OPEN_SHOWN: Duration = Duration::from_secs(10);
 pub const ABORT_KEY: &str = "Ctrl-X Enter";
 
@@ -57,7 +57,7 @@ pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// Time to release, or since ignition.
+/// Time to release, or since it.
 pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.countdown_s() {
         None => Span::styled(" T --", theme.style(TextRole::Label)),
@@ -71,8 +71,12 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 }
 
 /// Both directions of the link, each with the age of its last frame: hearing the vehicle does not prove that it hears
-/// us. Whole seconds, because heartbeats come only once a second.
+/// us. Whole seconds, because heartbeats come only once a second. On an attached screen, that its station is silent.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(silence) = model.link.station_silence(now) {
+        let words = format!("STATION SILENT {}s", silence.as_secs());
+        return Line::styled(words, theme.style(TextRole::Alarm));
+    }
     let down = model.link.state(now);
     if down == LinkState::NeverHeard {
         return Line::styled("down: not heard", theme.style(TextRole::Caution));
@@ -221,7 +225,8 @@ fn refusal(result: u8) -> &'static str {
 }
 
 /// The first of these that applies: the warning not to approach; that a check moves the surfaces; a command (other than an abort) that is not observed
-/// yet; a hold; the next event of the flight; the latest command; whether the vehicle may be armed.
+/// yet; a hold; the next event of the flight; the latest command, unless it was answered long ago and the vehicle is NO-GO;
+/// whether the vehicle may be armed.
 pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(mut line) = keep_away(model, theme, now) {
         // Under a parachute the next event is added, because the vehicle is still coming down.
@@ -241,12 +246,18 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
         return next;
     }
+    let ready = readiness(model, now);
+    let go = ready.as_ref().is_none_or(|(_, role)| *role == TextRole::Good);
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    if let Some(track) = latest {
+    if let Some(track) = latest.filter(|track| go || !answered_long_ago(track, now)) {
         return command_facts(track, theme, now);
     }
-    let ready = readiness(model, now);
     ready.map_or_else(Line::default, |(words, role)| Line::styled(format!(" {words}"), theme.style(role)))
+}
+
+fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {
+    let answered = matches!(track.acknowledged, Acknowledgement::Answered(_) | Acknowledgement::GivenUp);
+    answered && now.saturating_sub(track.acknowledged_at.unwrap_or(track.commanded_at)) >= OPEN_SHOWN
 }
 
 /// The latest command other than an abort, while its effect is not observed yet.

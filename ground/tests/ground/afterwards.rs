@@ -38,6 +38,26 @@ fn asks(rig: &mut Rig, key: char) -> Vec<Action> {
     rig.actions.iter().filter(|action| asked(action)).cloned().collect()
 }
 
+/// What was not heard may have been greater.
+#[test]
+fn the_review_says_how_much_of_the_flight_was_not_heard() {
+    let mut rig = falling(Role::Station);
+    rig.key(Key::Char('4'));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("Greatest values in flight"), "{screen}");
+    rig.speaks = false;
+    rig.run(5.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("Greatest values heard"), "{screen}");
+    assert!(screen.contains("link LOST before touchdown"), "{screen}");
+    rig.speaks = true;
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.run(2.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("Greatest values heard"), "{screen}");
+    assert!(screen.contains("silent for 5.0 s of the flight"), "{screen}");
+}
+
 #[test]
 fn replay_and_report_wait_for_the_end_of_a_flight() {
     let mut rig = station(Role::Station);

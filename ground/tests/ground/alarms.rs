@@ -1,10 +1,12 @@
 //! Alarms: the bell rings until they are acknowledged, and old or late values are marked.
 
+use std::time::Duration;
+
 use ground::key::Key;
 use ground::model::alarm::{AlarmKind, RING_EVERY};
 use ground::model::command::CommandKind;
 use ground::model::{Role, Settings};
-use ground::update::Action;
+use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
 
 use crate::keys::ladder;
@@ -76,6 +78,44 @@ fn attaching_does_not_ring_for_past_alarms() {
     lasting.speaks = false;
     lasting.run(0.1);
     assert_eq!(bells(&lasting), 1, "it still holds");
+}
+
+/// A station that hangs tells its screens nothing; that says nothing about the vehicle.
+#[test]
+fn a_screen_says_that_its_station_is_silent() {
+    for role in [Role::Attached, Role::Watching] {
+        let mut rig = Rig::new(Settings { role, ..settings(false, true) });
+        rig.run(5.0);
+        rig.model.history_ends();
+        rig.run(1.0);
+        let hangs = |rig: &mut Rig, seconds: u64| {
+            for _ in 0..10 * seconds {
+                rig.now += Duration::from_millis(100);
+                rig.msg(Msg::ScreenTick);
+            }
+        };
+        hangs(&mut rig, 2);
+        assert!(rig.model.alarms.list().is_empty(), "not yet");
+        hangs(&mut rig, 8);
+        let kinds: Vec<_> = rig.model.alarms.list().iter().map(|alarm| alarm.kind).collect();
+        assert_eq!(kinds, [AlarmKind::StationSilent]);
+        assert!(bells(&rig) > 1, "it rings");
+        let screen = rig.screen(80, 24);
+        assert!(screen.contains("ALARM STATION SILENT"), "{screen}");
+        assert!(screen.contains("STATION SILENT 10s") && !screen.contains("LOST"), "{screen}");
+        // It cannot be asked of the silent station.
+        rig.actions.clear();
+        rig.key(Key::Char(' '));
+        assert!(rig.actions.iter().all(|action| !matches!(action, Action::Request(_))));
+        hangs(&mut rig, 10);
+        assert_eq!(bells(&rig), 0);
+        // In the silence the vehicle did not hear the station, either; its first report is awaited.
+        rig.run(1.0);
+        let mut listed = rig.model.alarms.list().iter();
+        assert!(listed.all(|alarm| alarm.kind != AlarmKind::StationSilent && !alarm.is_active()));
+        assert!(rig.events().contains("the station answers again"), "{}", rig.events());
+        assert!(!rig.screen(80, 24).contains("STATION SILENT 1"), "{}", rig.screen(80, 24));
+    }
 }
 
 #[test]

@@ -53,6 +53,27 @@ fn the_complete_ladder_arms_once_and_is_never_resent() {
     assert!(rig.events().contains("ARM not acknowledged after 1 attempts"));
 }
 
+/// On every page, because only the pad page has the checks themselves.
+#[test]
+fn a_command_answered_long_ago_does_not_hide_no_go() {
+    let mut rig = Rig::crewed();
+    rig.keys(&ladder());
+    rig.answer(ARM, DENIED);
+    rig.checks_failed = 0b1010;
+    rig.key(Key::Char('5'));
+    rig.run(5.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("REFUSED (denied)") && !screen.contains("NO-GO"), "{screen}");
+    rig.run(6.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("NO-GO: ") && !screen.contains("REFUSED (denied)"), "{screen}");
+    // With nothing to report the answer may stay.
+    rig.checks_failed = 0;
+    rig.run(1.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("REFUSED (denied)"), "{screen}");
+}
+
 #[test]
 fn each_missing_step_leaves_the_vehicle_disarmed() {
     for missing in 0..ladder().len() {

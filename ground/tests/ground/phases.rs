@@ -168,6 +168,21 @@ fn regress_land_armed() {
     snapshot("land_armed", &rig);
 }
 
+/// Below the commit height, with the ignition gate shut, an abort still throws out the parachute.
+#[test]
+fn with_the_parachute_still_to_come_no_burn_is_committed_to() {
+    use TdAbortEffect::{TD_ABORT_EFFECT_BURN as BURN, TD_ABORT_EFFECT_CHUTE_NOW as CHUTE_NOW};
+    use TdChute::{TD_CHUTE_FIRED as FIRED, TD_CHUTE_STOWED as STOWED};
+    for (effect, chute, committed) in [(BURN, STOWED, true), (CHUTE_NOW, STOWED, false), (BURN, FIRED, false)]
+    {
+        let mut rig = in_phase(TdPhase::TD_PHASE_LAND_ARMED, effect, (90.0, -38.0), (200.0, 6.0));
+        rig.descent_with(90.0, -38.0, chute);
+        let screen = rig.screen(80, 24);
+        assert_eq!(screen.contains("the band, committed"), committed, "{screen}");
+        assert!(screen.contains("above the band"), "{screen}");
+    }
+}
+
 #[test]
 fn regress_ignition() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;

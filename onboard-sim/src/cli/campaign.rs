@@ -41,7 +41,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long)]
     wire_resolution: bool,
     /// Number of flights; they are numbered from 0.
-    #[arg(long, default_value_t = 1000, value_name = "N")]
+    #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     flights: u64,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]

@@ -31,6 +31,13 @@ impl Ask {
         if self.write_mission.is_some() && (self.files.len() != 1 || is_table(&self.files[0])) {
             bail!("--write-mission takes the log of one flight: its mission is changed");
         }
+        if let Some(motor) = &self.motor
+            && !self.files.iter().any(|file| is_table(file))
+        {
+            bail!(
+                "--motor {motor}: only a table of a test stand (CSV) is compared with a motor; a log has its own"
+            );
+        }
         if let Some(path) = &self.write_mission {
             refuse_existing(path)?;
         }

@@ -1,5 +1,6 @@
 //! `replay gate`.
 
+use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Write as _};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,9 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, ensure};
 use clap::Args;
-use replay::gate::{Baseline, Change, GateProgress, GateState, Judged, find, fly_all, judge};
+use replay::gate::{
+    Baseline, Change, Checked, GateError, GateProgress, GateState, Judged, Outcome, find, fly_all, judge,
+};
 use replay::output::{Destination, NewFile, Overwrite};
 use replay::print::{GateReport, JunitCase, gate_cases, print_gate, print_json, print_junit};
 
@@ -74,6 +77,10 @@ impl Ask {
             .context("the state file cannot be written")?;
         let interrupted = stop.load(Ordering::Relaxed) && outcomes.len() < flights.len();
         let mut judged = judge(&outcomes, &baseline, self.tolerance);
+        // Flights of the baseline that are lost are an answer, but not a new baseline.
+        if !interrupted && (self.accept || judged.iter().all(|judged| judged.change == Change::NoFlight)) {
+            some_flight(&self.directory, &outcomes)?;
+        }
         if interrupted {
             // What was not reached is not missing.
             let known = |judged: &Judged| !flights.iter().any(|found| found.name == judged.name);
@@ -92,6 +99,17 @@ impl Ask {
         }
         Ok(if interrupted { Answer::NotAll } else { Answer::Compared { within: passed } })
     }
+}
+
+/// Refuses a directory whose logs hold no flight.
+fn some_flight(directory: &Path, outcomes: &BTreeMap<String, Outcome>) -> Result<(), GateError> {
+    if outcomes.values().any(|outcome| outcome.checked != Checked::NoFlight) {
+        return Ok(());
+    }
+    let (name, first) = outcomes.first_key_value().map_or_else(Default::default, |(name, outcome)| {
+        (name.clone(), outcome.problem.clone().unwrap_or_default())
+    });
+    Err(GateError::NoFlights { path: directory.to_owned(), name, why: first })
 }
 
 /// Before the flights, so that nothing is flown for a file that may not be written.

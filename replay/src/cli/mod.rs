@@ -108,7 +108,8 @@ enum Question {
     /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
     ///
     /// One table (and one JUnit file) says which flights got better, worse, flipped between landed and not landed,
-    /// diverged or are missing. Exit code 0 if none got worse, 1 if some did, 2 without an answer.
+    /// diverged, are lost or missing, and which logs hold no flight. Exit code 0 if none got worse, 1 if some did, 2 without
+    /// an answer.
     #[command(
         after_help = "Examples:\n  replay gate logs --baseline baseline.json --accept\n  replay gate logs --baseline baseline.json --junit gate.xml"
     )]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
 
-use super::Outcome;
+use super::{Checked, Outcome};
 use crate::output::{Destination, NewFile, Overwrite};
 
 const FORMAT: u32 = 1;
@@ -45,8 +45,9 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// The outcomes of this build.
-    pub fn of(flights: BTreeMap<String, Outcome>) -> Self {
+    /// The outcomes of this build, without the files that hold no flight.
+    pub fn of(mut flights: BTreeMap<String, Outcome>) -> Self {
+        flights.retain(|_, outcome| outcome.checked != Checked::NoFlight);
         Self { format: FORMAT, build: build_info(), flights }
     }
 

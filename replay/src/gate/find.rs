@@ -20,6 +20,15 @@ pub enum GateError {
     /// There is no flight.
     #[error("{}: holds no log (*.mcap) and no campaign ({MANIFEST})", path.display())]
     Nothing { path: PathBuf },
+    /// There are logs, and none holds a flight.
+    #[error("{}: none of its logs holds a flight; {name}: {why}", path.display())]
+    NoFlights {
+        path: PathBuf,
+        /// The first log.
+        name: String,
+        /// Why it holds no flight.
+        why: String,
+    },
 }
 
 /// A flight that was found.

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::{Checked, Flown, Found, Outcome, campaign};
-use crate::log::Recording;
+use crate::log::{LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
-use crate::verify::{Verification, verify};
+use crate::verify::{Obstacle, Verification, verify};
 
 /// What this build makes of a flight. Whatever is wrong is part of the outcome.
 pub(super) fn fly(found: &Found) -> Outcome {
@@ -21,7 +21,12 @@ pub(super) fn fly(found: &Found) -> Outcome {
 
 fn log(path: &Path) -> Outcome {
     let (checked, mut problem) = match verify(path) {
-        Err(error) => (Checked::Unverified, Some(words(error))),
+        // What cannot be read now may still be a flight.
+        Err(error @ LogError::Read { .. }) => (Checked::Unverified, Some(words(error))),
+        Err(error) => return no_flight(words(error)),
+        Ok(reports) if reports.iter().all(|report| report.obstacle == Some(Obstacle::NoTicks)) => {
+            return no_flight(Obstacle::NoTicks.to_string());
+        }
         Ok(reports) => {
             let all = |wanted: Verification| reports.iter().all(|report| report.outcome == wanted);
             let obstacle = reports.iter().find_map(|report| {
@@ -54,6 +59,10 @@ fn log(path: &Path) -> Outcome {
         }
     };
     Outcome { checked, flown, problem }
+}
+
+fn no_flight(why: String) -> Outcome {
+    Outcome { checked: Checked::NoFlight, flown: None, problem: Some(why) }
 }
 
 /// An error and its causes.

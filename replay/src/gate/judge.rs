@@ -22,10 +22,12 @@ pub enum Change {
     NoLongerLands,
     /// Its recorded decisions are not made any more, and it has the same margin.
     Diverged,
-    /// It can no longer be verified or flown again.
+    /// It can no longer be verified or flown again, or is no flight any more.
     Lost,
     /// The baseline does not have it.
     New,
+    /// It is no flight, and none that the baseline knows.
+    NoFlight,
     /// The baseline has it, and the directory does not.
     Missing,
 }
@@ -42,6 +44,7 @@ impl Change {
             Self::Diverged => "DIVERGED",
             Self::Lost => "LOST",
             Self::New => "new",
+            Self::NoFlight => "no flight",
             Self::Missing => "MISSING",
         }
     }
@@ -79,7 +82,11 @@ impl Judged {
 pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
     let of_now = outcomes.iter().map(|(name, now)| {
         let before = baseline.flights.get(name);
-        let change = before.map_or(Change::New, |before| change(before, now, tolerance));
+        let change = match before {
+            Some(before) => change(before, now, tolerance),
+            None if now.checked == Checked::NoFlight => Change::NoFlight,
+            None => Change::New,
+        };
         let newly_diverged = now.checked == Checked::Diverged
             && before.is_some_and(|before| before.checked == Checked::Identical);
         Judged { name: name.clone(), change, newly_diverged, before: before.cloned(), now: Some(now.clone()) }
@@ -105,6 +112,16 @@ fn in_order(name: &str) -> (&str, u64) {
 }
 
 fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
+    // What was neither verified nor flown again did not land differently.
+    let unknown = |outcome: &Outcome| {
+        outcome.flown.is_none() && matches!(outcome.checked, Checked::Unverified | Checked::NoFlight)
+    };
+    match (unknown(before), unknown(now)) {
+        (false, true) => return Change::Lost,
+        // Earlier releases accepted a file without a flight.
+        (true, true) if now.checked == Checked::NoFlight => return Change::NoFlight,
+        _ => {}
+    }
     let landed = |outcome: &Outcome| outcome.flown.as_ref().is_some_and(|flown| flown.landed);
     match (landed(before), landed(now)) {
         (true, false) => return Change::NoLongerLands,
@@ -159,6 +176,14 @@ mod tests {
         }
         let crashed = outcome(Diverged, false, -2.0);
         assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)).change, Change::NowLands);
+        // What cannot be read did not land differently.
+        for checked in [Unverified, Checked::NoFlight] {
+            let gone = Outcome { checked, flown: None, problem: Some("empty".to_owned()) };
+            for before in [&before, &crashed] {
+                let judged = judged(before.clone(), gone.clone());
+                assert_eq!((judged.change, judged.fails(true)), (Change::Lost, true), "{checked:?}");
+            }
+        }
         // A divergence that was accepted is no news.
         let same = judged(crashed.clone(), crashed);
         assert_eq!((same.change, same.fails(false)), (Change::Same, false));
@@ -171,6 +196,19 @@ mod tests {
         let judged = judge(&BTreeMap::from(flights), &Baseline::default(), 0.0);
         let names: Vec<&str> = judged.iter().map(|judged| judged.name.as_str()).collect();
         assert_eq!(names, ["a#9", "a#10", "a.mcap"]);
+    }
+
+    /// It does not fail, whether it is new or an earlier release accepted it as a flight that cannot be verified.
+    #[test]
+    fn a_file_without_a_flight_is_called_that() {
+        let without = |checked| {
+            BTreeMap::from([("ground.mcap".to_owned(), Outcome { checked, flown: None, problem: None })])
+        };
+        for before in [BTreeMap::new(), without(Checked::Unverified)] {
+            let judged = judge(&without(Checked::NoFlight), &Baseline::of(before), 0.02).remove(0);
+            assert_eq!((judged.change, judged.fails(false)), (Change::NoFlight, false));
+        }
+        assert_eq!(Baseline::of(without(Checked::NoFlight)).flights, BTreeMap::new());
     }
 
     #[test]

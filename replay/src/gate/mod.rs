@@ -29,8 +29,10 @@ pub enum Checked {
     Identical,
     /// Some differ.
     Diverged,
-    /// The log has nothing to make again, or is damaged.
+    /// The log is damaged, or not all of it can be made again.
     Unverified,
+    /// The file holds no flight: no ticks and no frames, as an empty log or that of a ground station.
+    NoFlight,
 }
 
 impl Checked {
@@ -40,6 +42,7 @@ impl Checked {
             Self::Identical => "identical",
             Self::Diverged => "DIVERGED",
             Self::Unverified => "unverified",
+            Self::NoFlight => "-",
         }
     }
 }

@@ -35,8 +35,8 @@ pub enum LogError {
         /// Its first bytes.
         found: Vec<u8>,
     },
-    /// The file begins like a log but ends before any record.
-    #[error("{name}: nothing in it can be read: {damage}")]
+    /// The file begins like a log, but no message can be read.
+    #[error("{name}: nothing could be read: it is damaged before its first message: {damage}")]
     NothingReadable {
         /// The file.
         name: String,

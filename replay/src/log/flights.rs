@@ -11,7 +11,7 @@ use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use super::Entry;
+use super::{Clock, ClockTime, Entry};
 
 /// Longest time between the last tick and the verdict's time of contact, s: the last planar tick comes at most one
 /// period (0.1 s) before contact.
@@ -46,17 +46,23 @@ pub struct LoggedFlight {
 /// Where an incomplete record of a flight ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cut {
-    /// Vehicle time of the last tick, s.
+    /// Time of the last tick on its clock, s.
     pub time_s: f64,
+    /// The clock: a log that ends before the release has no T+.
+    pub clock: Clock,
     pub phase: &'static str,
+    /// It ends before the vehicle left its pad.
+    pub on_pad: bool,
     /// Time of contact in the verdict, s, if the verdict is there and only ticks are missing.
     pub contact_s: Option<f64>,
 }
 
 impl fmt::Display for Cut {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { time_s, phase, contact_s } = self;
-        write!(formatter, "ends at T+{time_s:.3} s in {phase}, ")?;
+        let Self { time_s, clock, phase, on_pad, contact_s } = self;
+        let place = if *on_pad { "on the pad, " } else { "" };
+        let time = ClockTime { clock: *clock, time_s: *time_s };
+        write!(formatter, "ends {place}at {time} in {phase}, ")?;
         match contact_s {
             Some(contact_s) => write!(formatter, "before its contact at T+{contact_s:.3} s"),
             None => write!(formatter, "without a verdict"),
@@ -79,15 +85,21 @@ impl LoggedFlight {
 
     /// Where the record ends, if that is before the end of the flight; `None` also for a flight without ticks.
     pub fn cut(&self) -> Option<Cut> {
-        let (time_s, phase) = self.last.or(self.on_the_pad)?;
+        let flown = self.last.map(|last| (last, Clock::Flight));
+        let ((time_s, phase), clock) = flown.or(self.on_the_pad.map(|last| (last, Clock::Boot)))?;
         let period_s = match self.kind {
             FlightKind::Planar => PLANAR_TICK_S,
             FlightKind::InSpace => FRAME_S,
         };
         let reached = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= period_s + ROUNDING_S);
-        let phase =
-            u8::try_from(phase).ok().and_then(Phase::from_index).map_or("an unknown phase", Phase::name);
-        (!reached).then_some(Cut { time_s, phase, contact_s: self.contact_s })
+        let phase = u8::try_from(phase).ok().and_then(Phase::from_index);
+        (!reached).then_some(Cut {
+            time_s,
+            clock,
+            phase: phase.map_or("an unknown phase", Phase::name),
+            on_pad: clock == Clock::Boot && phase.is_some_and(Phase::on_pad),
+            contact_s: self.contact_s,
+        })
     }
 }
 

@@ -127,7 +127,8 @@ impl<R: Read> FlightLog<R> {
     /// The next entry.
     ///
     /// # Errors
-    /// The input cannot be read; or, at the end, nothing in the file belonged to a flight log.
+    /// The input cannot be read; or, at the end, nothing in the file belonged to a flight log, or it is damaged before its
+    /// first message.
     pub fn next_entry(&mut self) -> Result<Option<StampedEntry>, LogError> {
         loop {
             let item = self.reader.next_item();
@@ -146,13 +147,14 @@ impl<R: Read> FlightLog<R> {
     }
 
     fn end(&self) -> Result<(), LogError> {
-        if self.recognised || self.head.is_ours() {
-            return Ok(());
-        }
+        // Without a message, what is missing (ticks, the schema's version) says nothing about the log.
         if let Some(damage) = self.damage()
-            && self.reader.channels().next().is_none()
+            && self.last_log_time_ns.is_none()
         {
             return Err(LogError::NothingReadable { name: self.name.clone(), damage: damage.to_string() });
+        }
+        if self.recognised || self.head.is_ours() {
+            return Ok(());
         }
         let topics = self.reader.channels().map(|(_, channel)| channel.topic.clone()).collect();
         Err(LogError::Foreign { name: self.name.clone(), library: self.head.library.clone(), topics })

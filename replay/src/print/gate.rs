@@ -60,6 +60,7 @@ fn summary(report: &GateReport) -> String {
         Change::Better,
         Change::NowLands,
         Change::New,
+        Change::NoFlight,
         Change::Worse,
         Change::NoLongerLands,
         Change::Diverged,
@@ -78,7 +79,8 @@ fn summary(report: &GateReport) -> String {
         GateReport { passed: true, .. } => "PASSED",
         GateReport { passed: false, .. } => "FAILED",
     };
-    format!("{word}: {}: {}", counted(report.flights.len() as u64, "flight"), counts.join(", "))
+    let flights = report.flights.iter().filter(|judged| judged.change != Change::NoFlight).count();
+    format!("{word}: {}: {}", counted(flights as u64, "flight"), counts.join(", "))
 }
 
 /// Every flight as a case.

@@ -70,6 +70,28 @@ fn a_log_with_a_flipped_byte_does_not_pass() {
     }
 }
 
+/// A log that was cut before its first message says nothing about who wrote it.
+#[test]
+fn a_log_cut_before_its_first_message_has_no_answer() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("cut.mcap");
+    let tables = directory.path().join("csv").display().to_string();
+    let questions: [&[&str]; 4] =
+        [&["info"], &["verify"], &["evaluate"], &["export", "--to", "csv", "--output", &tables]];
+    for log in [&LANDED.log, &NOMINAL.log] {
+        std::fs::write(&path, &std::fs::read(log).unwrap()[..100]).unwrap();
+        for question in questions {
+            let (code, stdout, stderr) = run(replay(question[0], &path).args(&question[1..]));
+            assert_eq!((code, stdout.as_str()), (2, ""), "{question:?}: {stderr}");
+            assert!(
+                stderr.contains("before its first message: ends after 100 bytes"),
+                "{question:?}: {stderr}"
+            );
+        }
+        assert!(!Path::new(&tables).exists());
+    }
+}
+
 /// Every command that reads a damaged log says so.
 #[test]
 fn no_command_is_silent_about_damage() {

@@ -126,6 +126,8 @@ fn a_stands_table_needs_its_motor() {
     let (found, _) = fits(&[table, "--motor", "H45W"]);
     close(&found[0], "thrust_scale", 0.97, 0.005);
     close(&found[0], "ignition_delay", 0.12, 0.002);
+    let (code, _, stderr) = asked(&[LANDED.log.to_str().unwrap(), "--motor", "H45W"]);
+    assert!(code == 2 && stderr.contains("--motor H45W: only a table of a test stand"), "{stderr}");
     let (code, _, stderr) = asked(&[table, "--motor", "G99"]);
     assert!(code == 2 && stderr.contains("is neither a built-in motor"), "{stderr}");
 }

@@ -362,7 +362,11 @@ fn a_vehicle_that_never_left_its_pad_verifies_and_counts_as_cut() {
     let flown = Flown::in_space(&[asked(0, Asked::Hold)], &[]);
     let report = flown.verified();
     assert_eq!(report.outcome, Verification::IdenticalReadablePart);
-    assert_eq!(report.cut.unwrap().phase, "PAD_IDLE");
+    let cut = report.cut.unwrap();
+    assert_eq!(cut.phase, "PAD_IDLE");
+    // It was never released, so it has no T+.
+    let words = format!("ends on the pad, at boot {:.3} s in PAD_IDLE, without a verdict", cut.time_s);
+    assert_eq!(cut.to_string(), words);
     assert!(all_frames_identical(&report) > 2_000);
 }
 

@@ -11,6 +11,7 @@ use sim::recipe::Recipe;
 use tempfile::TempDir;
 
 use crate::command_line::run;
+use crate::flown::write_log;
 use crate::from_apogee::LANDED;
 use crate::simulated::{DISPERSED, NOMINAL};
 
@@ -154,8 +155,44 @@ fn a_log_that_diverges_or_breaks_fails() {
     let (code, stdout, _) = season.gate(&[]);
     assert_eq!(code, 1, "{stdout}");
     assert!(row(&stdout, "week-1/nominal.mcap").contains("DIVERGED"), "{stdout}");
-    assert!(row(&stdout, "week-1/dispersed.mcap").contains("lands no longer"), "{stdout}");
+    assert!(row(&stdout, "week-1/dispersed.mcap").contains("LOST"), "{stdout}");
     assert!(row(&stdout, "week-1/dispersed.mcap").contains("is not a flight log"), "{stdout}");
+}
+
+#[test]
+fn a_file_without_a_flight_is_no_flight_of_the_baseline() {
+    let season = Season::new();
+    let empty = write_log(&[], &crate::flown::Recipe { with_frames: false, ..Default::default() }).bytes;
+    let beside = season.logs().join("week-2/ground.mcap");
+    std::fs::write(&beside, &empty).unwrap();
+    let (code, stdout, _) = season.gate(&["--accept"]);
+    assert!(code == 0 && stdout.ends_with("PASSED: 3 flights: 3 new, 1 no flight\n"), "{stdout}");
+    assert!(!std::fs::read_to_string(season.baseline()).unwrap().contains("ground.mcap"));
+    let (code, stdout, _) = season.gate(&[]);
+    assert!(code == 0 && row(&stdout, "week-2/ground.mcap").contains("no flight"), "{stdout}");
+
+    // A flight of the baseline that became an empty file is lost; it did not land differently.
+    std::fs::write(season.logs().join("week-1/nominal.mcap"), &empty).unwrap();
+    let (code, stdout, _) = season.gate(&[]);
+    assert_eq!(code, 1, "{stdout}");
+    let nominal = row(&stdout, "week-1/nominal.mcap");
+    assert!(nominal.contains("LOST") && nominal.contains("no controller ticks"), "{stdout}");
+}
+
+#[test]
+fn a_directory_without_a_flight_has_no_answer() {
+    let directory = tempfile::tempdir().unwrap();
+    let (logs, baseline) = (directory.path().join("logs"), directory.path().join("baseline.json"));
+    std::fs::create_dir(&logs).unwrap();
+    let empty = write_log(&[], &crate::flown::Recipe::default()).bytes;
+    std::fs::write(logs.join("a.mcap"), empty).unwrap();
+    let (code, _, stderr) = gate(&logs, &baseline, &["--accept"]);
+    assert!(code == 2 && stderr.contains("none of its logs holds a flight; a.mcap"), "{stderr}");
+    assert!(!baseline.exists());
+    let nothing_accepted = r#"{"format": 1, "build": {}, "flights": {}}"#;
+    std::fs::write(&baseline, nothing_accepted).unwrap();
+    let (code, _, stderr) = gate(&logs, &baseline, &[]);
+    assert!(code == 2 && stderr.contains("none of its logs holds a flight"), "{stderr}");
 }
 
 #[test]

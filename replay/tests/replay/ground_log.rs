@@ -1,5 +1,6 @@
 //! Tests the log of a ground station, which has what was heard and nothing that the vehicle recorded.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -8,7 +9,7 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::import::import_tlog;
 use replay::info::info;
-use replay::log::{Clock, Entry, FlightLog, Recording};
+use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording};
 
 use crate::command_line::{replay, run};
 use crate::simulated::{Simulated, WITH_FRAMES, with_frames};
@@ -122,6 +123,30 @@ fn every_message_becomes_a_table_with_every_field() {
         .unwrap()
         .messages;
     assert_eq!(frames, raw);
+}
+
+/// What the crew read as T+ is the T+ of the log, also before the landing motor is lit.
+#[test]
+fn the_crews_clock_is_the_clock_of_the_log() {
+    let clocks = info(&MK2_WITH_FRAMES.log).unwrap().clocks;
+    let directory = MK2_WITH_FRAMES.beside("clocks");
+    let mut log = FlightLog::open(&MK2_WITH_FRAMES.log).unwrap();
+    export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    let mut table = csv::Reader::from_path(directory.join("mavlink_1_1_td_flight_status.csv")).unwrap();
+    let mut flown = 0;
+    for row in table.deserialize() {
+        let row: BTreeMap<String, String> = row.unwrap();
+        let [boot_ms, countdown_ms]: [f64; 2] =
+            ["time_boot_ms", "countdown_ms"].map(|name| row[name].parse().unwrap_or(f64::NAN));
+        let boot = ClockTime { clock: Clock::Boot, time_s: boot_ms / 1e3 };
+        let since_s = clocks.convert(boot, Clock::Flight).unwrap().time_s;
+        // The clock that the crew reads stands still after touchdown.
+        if 0.1 < since_s && since_s < 5.0 {
+            assert!((since_s + countdown_ms / 1e3).abs() < 0.02, "{since_s} s, told {countdown_ms} ms");
+            flown += 1;
+        }
+    }
+    assert!(flown > 10, "{flown}");
 }
 
 /// The same messages at both ends of the link: nothing differs, at the vehicle's own times.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_DESCENT_DATA, TdChute};
+use protocol::dialect::{TD_DESCENT_DATA, TdAbortEffect, TdChute, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
@@ -86,10 +86,18 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     } else {
         ("INSIDE the band", TextRole::Good)
     };
-    let committed = height_m < f64::from(d.commit_height_m);
+    let committed = height_m < f64::from(d.commit_height_m) && !parachute_may_fly(model, d.chute);
     let commit = if committed { ", committed" } else { "" };
     let role = if stale == TextRole::Stale { stale } else { role };
     Line::styled(format!("{mark}{words}{commit}"), theme.style(role))
+}
+
+/// Whether the parachute is out, or an abort would still throw it out. Then the vehicle is not committed to a burn.
+fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
+    let out = matches!(chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
+    let ordered = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+    let now = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
 }
 
 fn chute(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {

@@ -7,6 +7,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::{is_roomy, path, titled};
+use crate::model::link_state::RED_AFTER;
 use crate::model::{Model, words};
 use crate::view::number::fixed;
 use crate::view::theme::{TextRole, Theme};
@@ -60,8 +61,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<
         (none, limits, PLAN_COLUMNS)
     };
     let mut lines = vec![head];
-    let mut maxima = maxima(model, theme);
-    maxima.insert(0, Line::styled(" Greatest values in flight", theme.style(TextRole::Title)));
+    let maxima = maxima(model, theme, now);
     if columns > limit_columns + MAXIMA_COLUMNS {
         lines.extend(beside(limits, limit_columns + 1, maxima));
     } else {
@@ -92,8 +92,21 @@ fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -
         .collect()
 }
 
-fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let most = &model.history.maxima;
+    let lost = most.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64());
+    // What happened in the silence is not known.
+    let title = if lost.is_some() { " Greatest values heard" } else { " Greatest values in flight" };
+    let mut lines = vec![Line::styled(title, theme.style(TextRole::Title))];
+    lines.extend(lost.map(|silence_s| {
+        let unheard = model.vehicle.in_flight() && !model.link.state(now).carries();
+        let words = if unheard {
+            " link LOST before touchdown".to_owned()
+        } else {
+            format!(" silent for {} s of the flight", fixed(silence_s, 1))
+        };
+        Line::styled(words, theme.style(TextRole::Caution))
+    }));
     let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
         let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
         Line::from(vec![
@@ -103,7 +116,7 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         ])
     };
     let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
-    vec![
+    lines.extend([
         row("altitude", most.altitude_m, 2, "m"),
         row("descent speed", most.descent_m_s, 2, "m/s"),
         row("distance", most.distance_m, 1, "m"),
@@ -113,7 +126,8 @@ fn maxima(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
         row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
         row("silence", most.silence_s, 1, "s"),
-    ]
+    ]);
+    lines
 }
 
 /// Each phase and when it began, several on a line.

@@ -367,7 +367,8 @@ impl Computer {
     }
 }
 
-/// Time since its release at the end of a frame, s.
+/// Time since its release at the end of a frame, s: what crews and logs call T+. A flight from a pad is released when its
+/// ascent motor is lit; a flight from apogee or below a drone, when it begins to fall.
 pub fn flight_time_s(frame: u64) -> f64 {
     // Saturating, because a recorded frame may have any number.
     frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3

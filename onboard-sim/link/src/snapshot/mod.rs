@@ -33,7 +33,8 @@ pub struct Snapshot {
     pub interlocks: Interlocks,
     /// Time to release, s, while a countdown runs.
     pub countdown_s: Option<f64>,
-    /// Time since ignition, s; stands still after touchdown.
+    /// Time since T+0, s; stands still after touchdown. In space as in the log: since the release, which lights the ascent
+    /// motor on a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]). In the plane: since ignition.
     pub since_zero_s: Option<f64>,
     /// Time before the pad may be approached, s.
     pub pad_wait_s: Option<f64>,

@@ -97,11 +97,7 @@ impl InSpace<'_> {
         let until_s = self.known.judged.map_or(flight_s, |judged| judged.impact.time_s - released_at_s);
         let sigmas = &estimate.sigmas;
         Snapshot {
-            since_zero_s: match self.mission.start.at {
-                // The clock of a launch starts with the ascent motor, and runs to the end.
-                StartPoint::Pad => Some(until_s),
-                _ => pilot.ignited_at_s().map(|ignited_at_s| until_s - ignited_at_s),
-            },
+            since_zero_s: Some(until_s),
             motion: Motion::in_space(&estimate.state, feet_m, &estimate.wind_m_s),
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
             controller: Some(facts(frame / FRAMES_PER_PLAN, output.level, pilot.report())),
