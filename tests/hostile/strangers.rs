@@ -304,8 +304,8 @@ fn strangers_do_not_delay_an_abort() {
     }
 }
 
-/// The whole measurement is six hundred aborts and takes about half an hour: `cargo test --release -p e2e --test
-/// hostile -- --ignored --nocapture a_hundred`.
+/// The whole measurement is six hundred aborts and takes about half an hour: `cargo test --release -p e2e -- --ignored
+/// --nocapture a_hundred`.
 #[test]
 #[ignore = "takes half an hour"]
 fn a_hundred_aborts_of_each_kind_are_latched_within_half_a_second() {

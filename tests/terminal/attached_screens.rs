@@ -2,7 +2,7 @@
 
 use e2e::{ABORT, Signal};
 
-use crate::rig::Pad;
+use super::rig::Pad;
 
 fn aborts_sent(pad: &Pad) -> usize {
     pad.proxy.commands().iter().filter(|request| request.is(ABORT)).count()

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use e2e::{ABORT, ARM, Impairment, START};
 
-use crate::rig::Rig;
+use super::rig::Rig;
 
 /// A third of the datagrams is lost, a fifth duplicated, and all are delayed.
 const BAD: Impairment = Impairment {

@@ -12,7 +12,7 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 
-use crate::rig::{Rig, SIZE, ground};
+use super::rig::{Rig, SIZE, ground};
 
 /// Reads a log to its end and returns the messages on this topic.
 fn whole_log(path: &Path, topic: &str) -> Vec<String> {

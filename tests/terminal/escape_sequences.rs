@@ -4,7 +4,7 @@ use protocol::dialect::{MavMessage, MavParamType, MavSeverity, PARAM_VALUE_DATA,
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
 
-use crate::rig::Rig;
+use super::rig::Rig;
 
 /// Sequences that a terminal would obey, or bytes that are no text. Each ends in a word that must be shown.
 const ATTACKS: [&[u8]; 16] = [

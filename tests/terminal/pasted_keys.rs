@@ -4,7 +4,7 @@ use std::process::Command;
 
 use e2e::{START, Signal, Terminal};
 
-use crate::rig::{Rig, SIZE, ground};
+use super::rig::{Rig, SIZE, ground};
 
 /// A text that was meant for another window.
 const NOTE: &str = "Send the crew away\nThanks\n";

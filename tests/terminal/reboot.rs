@@ -2,7 +2,7 @@
 
 use e2e::{ARM, Program, Running, START, Signal, Terminal, program, unshared_address};
 
-use crate::rig::{Rig, SIZE, ground};
+use super::rig::{Rig, SIZE, ground};
 
 #[test]
 fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically() {

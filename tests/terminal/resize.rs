@@ -2,7 +2,7 @@
 
 use e2e::Window;
 
-use crate::rig::{Rig, SIZE};
+use super::rig::{Rig, SIZE};
 
 /// The smallest and the largest screen, both extreme shapes, and the sizes on both sides of where panels appear.
 const SIZES: [(u16, u16); 8] =

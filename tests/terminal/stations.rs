@@ -2,7 +2,7 @@
 
 use e2e::{ARM, Bound, Ended, Running, Signal, Terminal};
 
-use crate::rig::{Pad, ground};
+use super::rig::{Pad, ground};
 
 /// A pad whose station runs as a daemon.
 struct Station {

@@ -1,7 +1,7 @@
 //! Hostile datagrams of every kind, sent to a vehicle and a ground station that fly a landing.
 //!
 //! By default the tests send as many as an ordinary test run has time for. `TOUCHDOWN_HOSTILE_DATAGRAMS=10000000
-//! cargo test --release -p e2e --test hostile -- --nocapture` sends more and prints the numbers.
+//! cargo test --release -p e2e hostile -- --nocapture` sends more and prints the numbers.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 mod strangers;

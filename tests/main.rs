@@ -1,0 +1,21 @@
+//! The tests with real processes. `cargo test -p e2e abort` runs one file of them.
+
+mod abort;
+mod architecture;
+mod board;
+mod demo;
+mod download;
+mod ground_log;
+mod hil;
+mod hold;
+mod hostile;
+mod links;
+mod logs;
+mod outside_clients;
+mod pad_check;
+mod pages;
+mod rocket;
+mod signed;
+mod terminal;
+mod two_processes;
+mod two_stations;
