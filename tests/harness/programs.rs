@@ -37,7 +37,7 @@ fn built() -> &'static PathBuf {
         // Building one test as well makes Cargo choose the same dependency features as `cargo test`, which has built
         // the programs already. Otherwise half of the dependencies would be built again.
         build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-        build.args(["build", "--quiet", "--bins", "--test", "outside_clients"]);
+        build.args(["build", "--quiet", "--bins", "--test", "igniter"]);
         build.arg("--target-dir").arg(target);
         if !cfg!(debug_assertions) {
             build.arg("--release");

@@ -167,7 +167,7 @@ fn a_panic_restores_the_terminal_is_reported_and_completes_the_log() {
     }
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("panic.mcap");
-    let name = "endings::a_panic_restores_the_terminal_is_reported_and_completes_the_log";
+    let name = "terminal::endings::a_panic_restores_the_terminal_is_reported_and_completes_the_log";
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--exact", name, "--nocapture"]).env(PANICS_HERE, &log);
     command.env("RUST_BACKTRACE", "0");
