@@ -23,6 +23,10 @@ const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
 /// The status of `emulate ready` when something that `emulate chain` needs is not there.
 const NOT_HERE: i32 = 2;
 
+/// The station's exit codes: a chip sends no verdict on its landing, so that its end counts as not seen; and an abort.
+const NOT_SEEN: i32 = 5;
+const ABORTED: i32 = 4;
+
 fn main() -> Result<(), Failure> {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let ready = emulate(root, &["ready"]).output()?;
@@ -61,7 +65,7 @@ fn land(root: &Path) -> Result<(), Failure> {
     for phase in shown {
         wait(&terminal, phase)?;
     }
-    let report = end(&mut terminal)?;
+    let report = end(&mut terminal, NOT_SEEN)?;
     expect(&report, "LANDED")?;
     say("armed, started and landed from the screen:")?;
     say(&report)
@@ -80,7 +84,7 @@ fn abort(root: &Path) -> Result<(), Failure> {
     terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
     wait(&terminal, "CHUTE")?;
     wait(&terminal, "TOUCHDOWN")?;
-    let report = end(&mut terminal)?;
+    let report = end(&mut terminal, ABORTED)?;
     expect(&report, "ABORTED")?;
     say("aborted in the descent, down under the parachute:")?;
     say(&report)
@@ -95,14 +99,16 @@ fn missing(terminal: &Terminal, what: &str) -> String {
     format!("no {what} on:\n{}", terminal.window().rows().join("\n"))
 }
 
-/// Ends the screen, and with it the chain; what the script says then.
-fn end(terminal: &mut Terminal) -> Result<String, Failure> {
+/// Ends the screen, and with it the chain; what the script says then. A station does not end at one key before it has heard
+/// that its vehicle is disarmed.
+fn end(terminal: &mut Terminal, expected: i32) -> Result<String, Failure> {
+    wait(terminal, "disarmed")?;
     let before = terminal.window().bytes().len();
     terminal.type_bytes(b"q");
     let code = terminal.wait_for_end();
     let window = terminal.window();
     let report = String::from_utf8_lossy(&window.bytes()[before..]).into_owned();
-    if code == Some(0) { Ok(report) } else { Err(format!("ended with {code:?}:\n{report}").into()) }
+    if code == Some(expected) { Ok(report) } else { Err(format!("ended with {code:?}:\n{report}").into()) }
 }
 
 fn expect(report: &str, words: &str) -> Result<(), Failure> {

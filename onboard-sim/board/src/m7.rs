@@ -1,6 +1,7 @@
 //! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and `costs` in the folder of
-//! the emulator or debugger. Its radio is the serial device `radio` there, if a flight has a crew. The files `saved-0` and `saved-1` are its memory that outlasts a reset: where a recorded flight's
-//! computer was dead, this program resets its processor and goes on from them.
+//! the emulator or debugger. Its radio is the serial device `radio` there, if a flight has a crew. The files `saved-0` and
+//! `saved-1` are its memory that outlasts a reset: where a recorded flight's computer was dead, this program resets its processor
+//! and goes on from them.
 
 use core::ffi::CStr;
 use core::fmt::Write as _;
