@@ -9,8 +9,6 @@ from facts import check
 from pymavlink import mavutil
 from pymavlink_client import ACCEPTED, Ground, mav
 
-UNKNOWN_MV = 65535
-
 
 class SerialGround(Ground):
     def __init__(self, device, baud):
@@ -27,13 +25,14 @@ def ready(ground):
     for name in ("3D_GYRO", "3D_ACCEL", "ABSOLUTE_PRESSURE", "GPS"):
         bit = getattr(mav, f"MAV_SYS_STATUS_SENSOR_{name}")
         check(f"{name} is there and healthy", status.onboard_control_sensors_health & bit)
-    check("the battery is not made up", status.voltage_battery == UNKNOWN_MV and status.battery_remaining == -1)
+    # Two lithium cells.
+    check("the battery is told", 6000 < status.voltage_battery < 8500 and 0 < status.battery_remaining <= 100)
 
 
 def pad(ground):
     check("the battery answers", ground.command(512, 147) == ACCEPTED)
     battery = ground.message("BATTERY_STATUS")
-    check("and is unknown", battery.voltages[0] == UNKNOWN_MV and battery.current_battery == -1)
+    check("and has a voltage and a current", 6000 < battery.voltages[0] < 8500 and battery.current_battery > 0)
     check("the IMU answers", ground.command(512, 105) == ACCEPTED)
     imu = ground.message("HIGHRES_IMU")
     check("and feels the pad", abs(imu.xacc - 9.81) < 0.3)

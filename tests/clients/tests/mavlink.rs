@@ -164,7 +164,7 @@ fn val_mavproxy_shows_arms_and_terminates() {
         writeln!(operator, "{words}").and_then(|()| operator.flush()).unwrap();
     };
     // If the file request were not declined, MAVProxy would take about 11 s more.
-    proxy.wait_for_line("Received 31 parameters");
+    proxy.wait_for_line("Received 32 parameters");
     types(&mut operator, "param show NMPC_W_THETA");
     let shown = proxy.wait_for_line("NMPC_W_THETA");
     assert!(shown.contains("150"), "{shown}");
