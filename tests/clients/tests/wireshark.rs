@@ -8,6 +8,7 @@ use std::process::Command;
 use clients::{PYMAVLINK, dialect, tshark, tshark_folder};
 use e2e::{BareGround, Program, Running, program, raw_frames_of};
 use hil::start::{Pace, Start};
+use protocol::dialect::{MavMessage, TD_PAD_CHECK_DATA};
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
 use protocol::mission::MissionHash;
@@ -68,7 +69,21 @@ fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
     read_by_wireshark(folder, profile, &frames)
 }
 
-/// The start, a hundred frames and their answers of hardware in the loop.
+/// What a vehicle that starts by itself is not asked for: a value of a check on its pad.
+fn value_of_a_pad_check() -> MavMessage {
+    MavMessage::TD_PAD_CHECK(TD_PAD_CHECK_DATA {
+        time_boot_ms: 12_345,
+        value: 0.25,
+        least: f32::NAN,
+        most: 2.0,
+        run: 1,
+        progress: 40,
+        found: 3,
+        ..TD_PAD_CHECK_DATA::DEFAULT
+    })
+}
+
+/// The start, a hundred frames and their answers of hardware in the loop, and a value of a check on the pad.
 fn frames_of_a_bench() -> Vec<Vec<u8>> {
     let recipe = Recipe::built_in("mk2", "field").unwrap();
     let mut flight = RemoteFlight::new(&recipe, 0).unwrap();
@@ -87,6 +102,7 @@ fn frames_of_a_bench() -> Vec<Vec<u8>> {
         let readings = flight.sense();
         sent = of_frame(9, flight.frame(), &readings);
     }
+    all.push(value_of_a_pad_check());
     let mut encoder = Encoder::new(VEHICLE);
     all.iter().map(|message| encoder.encode(message).as_bytes().to_vec()).collect()
 }
