@@ -1,4 +1,4 @@
-//! The tests with real processes. `cargo test -p e2e abort` runs one file of them.
+//! The tests with real processes. `cargo test --test e2e abort` runs one file of them.
 
 mod abort;
 mod architecture;
