@@ -12,6 +12,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use e2e::{Terminal, Window};
+use ground::exit::Exit;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -22,10 +23,6 @@ const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
 
 /// The status of `emulate ready` when something that `emulate chain` needs is not there.
 const NOT_HERE: i32 = 2;
-
-/// The station's exit codes: a chip sends no verdict on its landing, so that its end counts as not seen; and an abort.
-const NOT_SEEN: i32 = 5;
-const ABORTED: i32 = 4;
 
 fn main() -> Result<(), Failure> {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
@@ -65,7 +62,8 @@ fn land(root: &Path) -> Result<(), Failure> {
     for phase in shown {
         wait(&terminal, phase)?;
     }
-    let report = end(&mut terminal, NOT_SEEN)?;
+    // A chip sends no verdict on its landing.
+    let report = end(&mut terminal, Exit::NotSeen)?;
     expect(&report, "LANDED")?;
     say("armed, started and landed from the screen:")?;
     say(&report)
@@ -84,7 +82,7 @@ fn abort(root: &Path) -> Result<(), Failure> {
     terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
     wait(&terminal, "CHUTE")?;
     wait(&terminal, "TOUCHDOWN")?;
-    let report = end(&mut terminal, ABORTED)?;
+    let report = end(&mut terminal, Exit::RefusedOrAborted)?;
     expect(&report, "ABORTED")?;
     say("aborted in the descent, down under the parachute:")?;
     say(&report)
@@ -101,14 +99,18 @@ fn missing(terminal: &Terminal, what: &str) -> String {
 
 /// Ends the screen, and with it the chain; what the script says then. A station does not end at one key before it has heard
 /// that its vehicle is disarmed.
-fn end(terminal: &mut Terminal, expected: i32) -> Result<String, Failure> {
+fn end(terminal: &mut Terminal, expected: Exit) -> Result<String, Failure> {
     wait(terminal, "disarmed")?;
     let before = terminal.window().bytes().len();
     terminal.type_bytes(b"q");
     let code = terminal.wait_for_end();
     let window = terminal.window();
     let report = String::from_utf8_lossy(&window.bytes()[before..]).into_owned();
-    if code == Some(expected) { Ok(report) } else { Err(format!("ended with {code:?}:\n{report}").into()) }
+    if code == Some(expected as i32) {
+        Ok(report)
+    } else {
+        Err(format!("ended with {code:?}:\n{report}").into())
+    }
 }
 
 fn expect(report: &str, words: &str) -> Result<(), Failure> {

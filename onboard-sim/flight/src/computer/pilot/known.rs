@@ -107,7 +107,7 @@ impl Known {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
-    /// The guidance of the landing burn, with room for the longest plan: the one at ignition.
+    /// The guidance of the landing burn before its first plan, with room for every plan.
     pub(super) fn guidance(&self) -> PoweredGuidance {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());

@@ -8,8 +8,8 @@ use nmpc::free_time::FreeTimeSolution;
 use nmpc::{Solution, SolveStatus};
 
 // The settings come from the mission. A search does not depend on the workspace. The trial solutions are cleared before
-// each solve and only keep their capacity, and so does what becomes the flown plan. (If a problem cannot be posed, the trial keeps an older final time, which is
-// reported but decides nothing.)
+// each solve and only keep their capacity, and so does what becomes the flown plan. (If a problem cannot be posed, the trial
+// keeps an older final time, which is reported but decides nothing.)
 remembers!(PoweredGuidance { plane, flown, report, space } but { settings, workspace, trial, set_aside, unused });
 
 remembers!(Plane { along, across });

@@ -56,10 +56,6 @@ const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that corrects the velocity when a plan is flown to its end, rad.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
-/// How much longer than as certified a motor may burn before its plans need more memory than at set-up, s: five standard
-/// deviations of mk2's motor. Beyond it they allocate.
-const LONGER_BURN_S: f64 = 0.5;
-
 /// Factor on the cost of tilt when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
 
@@ -94,16 +90,18 @@ pub struct PoweredGuidance {
 }
 
 impl PoweredGuidance {
-    /// Guidance without a plan, whose plans from this state on need no more memory than it has.
+    /// Guidance without a plan, whose plans in a plane need no more memory than it has, however long the motor burns.
     ///
-    /// It plans that landing and forgets the plans, so that every buffer has its size.
+    /// It plans a landing with the most intervals and forgets the plans, so that every buffer has its size.
     pub fn with_room(
         settings: PoweredSettings,
         state: &RigidState,
         situation: &PoweredSituation<'_>,
     ) -> Self {
         let solver = SolverLimits { max_iterations: 1, ..settings.solver };
-        let latest_after_s = settings.latest_after_s + LONGER_BURN_S;
+        // As many intervals as there can be, and no longer than in flight: of longer ones fewer would be settled.
+        let carried_s = situation.ends_s(0.0, 0.0).map_or(0.0, |(earliest_s, _)| earliest_s);
+        let latest_after_s = MOST_INTERVALS as f64 * settings.interval_s - carried_s;
         let mut planned = Self::new(PoweredSettings { solver, max_solves: 1, latest_after_s, ..settings });
         // Cold, warm, and cold again: the search swaps its buffers, and a warm plan is shorter.
         planned.plan(0.0, state, situation, None);
