@@ -38,6 +38,19 @@ impl Aim {
         Self::at(Vector3::z())
     }
 
+    /// At rest in a direction, or in the nearest one that leans from the vertical by no more than an angle, rad.
+    pub fn leaning_at_most(direction: &Vector3<f64>, lean_rad: f64) -> Self {
+        let level = libm::hypot(direction.x, direction.y);
+        let (sin, cos) = libm::sincos(lean_rad);
+        if level <= sin && direction.z > 0.0 {
+            return Self::at(*direction);
+        }
+        if level == 0.0 {
+            return Self::upright();
+        }
+        Self::at(Vector3::new(direction.x * sin / level, direction.y * sin / level, cos))
+    }
+
     /// An aim at rest in a direction of the world.
     pub fn at(nose_in_world: Vector3<f64>) -> Self {
         Self {
@@ -237,6 +250,21 @@ mod tests {
         disturbance_max_rad_s2: 20.0,
         play_deg: 0.0,
     };
+
+    #[test]
+    fn a_limited_lean_keeps_its_side() {
+        let leaning = |lean_deg: f64| {
+            let (sin, cos) = libm::sincos(lean_deg.to_radians());
+            Vector3::new(0.6 * sin, -0.8 * sin, cos)
+        };
+        let limited = |lean_deg: f64| Aim::leaning_at_most(&leaning(lean_deg), 5.0_f64.to_radians());
+        assert_eq!(limited(3.0), Aim::at(leaning(3.0)));
+        for lean_deg in [8.0, 90.0, 170.0] {
+            let nose = limited(lean_deg).nose_in_world;
+            assert!((nose - leaning(5.0)).norm() < 1e-12, "{nose} for a lean of {lean_deg} degrees");
+        }
+        assert_eq!(Aim::leaning_at_most(&-Vector3::z(), 0.1), Aim::upright());
+    }
 
     #[test]
     fn the_shortest_rotation_is_right_handed() {

@@ -130,6 +130,7 @@ fn powered(settings: &PoweredSettings) -> Check {
     not_negative("powered.settled_s", settings.settled_s)?;
     not_negative("powered.flown_out_s", settings.flown_out_s)?;
     not_negative("powered.quiet_s", settings.quiet_s)?;
+    not_negative("powered.contact_quiet_s", settings.contact_quiet_s)?;
     require(
         (1..=100).contains(&settings.max_solves),
         "powered.max_solves",

@@ -133,6 +133,7 @@ impl Known {
             inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
             arm_m: situation.mass.cg_station_m,
             feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
+            foot_radius_m: self.airframe().legs.foot_radius_m,
             gravity_m_s2: self.mission.gravity_m_s2,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),

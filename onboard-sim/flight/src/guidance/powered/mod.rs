@@ -56,6 +56,10 @@ const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that corrects the velocity when a plan is flown to its end, rad.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
+/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take. 4 to 7 degrees
+/// land as many.
+const CONTACT_LEAN_RAD: f64 = 0.0873;
+
 /// Factor on the cost of tilt when a plan tilts too far.
 const UPRIGHT_DEARER: f64 = 8.0;
 
@@ -325,7 +329,18 @@ impl PoweredGuidance {
     }
 
     /// The wanted direction of the nose at a time.
+    ///
+    /// A vehicle whose foot is about to touch is only brought to rest, because it may touch before its plan ends: a lean of 10
+    /// degrees lowers a foot of mk2 by 7 cm, which it sinks in 0.15 s.
     pub fn aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
+        let quiet_s = self.settings.contact_quiet_s;
+        if quiet_s > 0.0 && situation.touches_within(quiet_s, state) {
+            return Aim::leaning_at_most(&state.nose_in_world(), CONTACT_LEAN_RAD);
+        }
+        self.planned_aim(time_s, state, situation)
+    }
+
+    fn planned_aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
         let thrust_n = situation.burn.thrust_n(situation.burning_s);
         let level_m_s2 = |push_m_s2: f64| {
             let most = self.settings.across_lean_max_deg.to_radians();

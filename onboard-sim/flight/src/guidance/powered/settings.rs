@@ -34,6 +34,9 @@ pub struct PoweredSettings {
     pub flown_out_s: f64,
     /// During this time before the plan's end the nose is not turned any more, only held, s.
     pub quiet_s: f64,
+    /// The same during this time before the lowest foot is expected to touch, whatever the plan says, s.
+    #[serde(default)]
+    pub contact_quiet_s: f64,
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
     /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times

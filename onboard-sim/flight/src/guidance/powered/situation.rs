@@ -22,6 +22,8 @@ pub struct PoweredSituation<'a> {
     pub arm_m: f64,
     /// Centre of gravity above the feet when upright, m.
     pub feet_below_cg_m: f64,
+    /// Distance of the feet from the axis, m.
+    pub foot_radius_m: f64,
     pub gravity_m_s2: f64,
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
@@ -53,6 +55,15 @@ impl PoweredSituation<'_> {
         let latest_s =
             (carried_until_s + latest_after_s - self.burning_s).max(earliest_s + to_ground_s.min(0.4));
         Some((earliest_s, latest_s))
+    }
+
+    /// Whether the lowest foot of a vehicle that sinks on as it does touches the ground within a time, s.
+    pub(super) fn touches_within(&self, within_s: f64, state: &RigidState) -> bool {
+        let nose = state.nose_in_world();
+        let lowest_m = state.position_m.z
+            - self.feet_below_cg_m * nose.z
+            - self.foot_radius_m * libm::hypot(nose.x, nose.y);
+        lowest_m < -within_s * state.velocity_m_s.z
     }
 
     pub(super) fn model(&self) -> PlanarModel {
@@ -94,5 +105,45 @@ impl Motor for Ahead<'_, '_> {
     fn mean_mass_kg(&self, from_s: f64, to_s: f64) -> f64 {
         let middle_s = self.0.burning_s + 0.5 * (from_s + to_s);
         self.0.mass_at_ignition_kg - self.0.burn.burnt_kg(middle_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicles::motors;
+    use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn val_hand_a_leaning_vehicle_touches_earlier() {
+        let curve = motors::builtin("H45W").expect("a built-in motor");
+        let situation = PoweredSituation {
+            burn: Burn::nominal(&curve),
+            burning_s: 4.0,
+            mass_at_ignition_kg: 3.1,
+            inertia_kg_m2: 0.12,
+            arm_m: 0.4,
+            feet_below_cg_m: 0.44,
+            foot_radius_m: 0.4,
+            gravity_m_s2: 9.8,
+            air_density_kg_m3: 1.2,
+            wind_m_s: Vector3::zeros(),
+            body_drag_area_m2: 0.004,
+            crossflow_area_m2: 0.05,
+            fin_drag_area_m2: 0.01,
+            gimbal_limit_rad: 0.1,
+            lands_here: false,
+        };
+        // 0.1 m above the ground and sinking at 0.5 m/s.
+        let upright = RigidState { velocity_m_s: -0.5 * Vector3::z(), ..RigidState::upright(0.54) };
+        assert!(!situation.touches_within(0.19, &upright));
+        assert!(situation.touches_within(0.21, &upright));
+        // With 10 degrees of lean a foot is 0.4 sin 10 = 69.5 mm lower, and the body's end 0.44 (1 - cos 10) = 6.7 mm higher.
+        let lean = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 10.0_f64.to_radians());
+        let leaning = RigidState { world_from_body: lean * upright.world_from_body, ..upright };
+        assert!(!situation.touches_within(0.073, &leaning));
+        assert!(situation.touches_within(0.076, &leaning));
+        let rising = RigidState { velocity_m_s: 0.5 * Vector3::z(), ..leaning };
+        assert!(!situation.touches_within(10.0, &rising));
     }
 }
