@@ -6,10 +6,11 @@
 //! one flight has are counted separately, because interpolation would hide a lost record.
 //!
 //! The log of a ground station has no ticks. It is compared with the vehicle's own log by the MAVLink messages that
-//! both have, over the vehicle's time in them.
+//! both have, over the vehicle's time in them and while both recorded.
 
 mod align;
 mod difference;
+mod heard;
 mod samples;
 mod series;
 mod tolerance;
@@ -56,6 +57,9 @@ pub struct Comparison {
     pub align: Align,
     /// Offset added to the times of the other flight, s.
     pub shift_s: f64,
+    /// If one log is a ground station's: from when to when both recorded, vehicle time of the baseline, s. Only that is
+    /// compared.
+    pub both_recorded_s: Option<[f64; 2]>,
     /// The two verdicts.
     pub verdicts: (Option<VerdictFacts>, Option<VerdictFacts>),
     /// Signals that both flights have; those that exceed their tolerance first, then by name.
@@ -86,11 +90,21 @@ pub fn compare(
     tolerances: &Tolerances,
 ) -> Result<Comparison, CompareError> {
     let shift_s = align.shift_s(baseline, other)?;
-    let over_the_air = baseline.only_one_has_ticks(other);
-    let (a, b) = if over_the_air {
-        (&baseline.over_the_air, &other.over_the_air)
-    } else {
-        (&baseline.signals, &other.signals)
+    let both_recorded_s = baseline
+        .only_one_has_ticks(other)
+        .then(|| heard::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
+        .flatten();
+    let parts;
+    let (a, b) = match both_recorded_s {
+        Some([from_s, to_s]) => {
+            parts = [
+                heard::within(&baseline.over_the_air, [from_s, to_s]),
+                heard::within(&other.over_the_air, [from_s - shift_s, to_s - shift_s]),
+            ];
+            (&parts[0], &parts[1])
+        }
+        None if baseline.only_one_has_ticks(other) => (&baseline.over_the_air, &other.over_the_air),
+        None => (&baseline.signals, &other.signals),
     };
     let (ours, theirs): (Vec<String>, Vec<String>) =
         (a.keys().cloned().collect(), b.keys().cloned().collect());
@@ -128,6 +142,7 @@ pub fn compare(
         other: other.name.clone(),
         align,
         shift_s,
+        both_recorded_s,
         verdicts,
         signals,
         missing,

@@ -31,6 +31,9 @@ fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()>
         Align::Time => "vehicle time",
     };
     writeln!(output, "Aligned on {aligned}: {:+.6} s added to the second's times.\n", comparison.shift_s)?;
+    if let Some([from_s, to_s]) = comparison.both_recorded_s {
+        writeln!(output, "Compared while both recorded: {from_s:.3} to {to_s:.3} s since power-up.\n")?;
+    }
     print_verdicts(comparison, output)?;
     let identical = comparison.identical();
     writeln!(

@@ -20,11 +20,16 @@ const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
 
 /// The log that a station writes which hears every frame of a vehicle.
 fn heard(flight: &Simulated) -> PathBuf {
-    let (tlog, imported) = (flight.beside("heard.tlog"), flight.beside("heard.mcap"));
+    heard_while(flight, "ground", |_| true)
+}
+
+/// The same of a station that hears the frames at some times since the first, ns.
+fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> PathBuf {
+    let [tlog, imported] = ["tlog", "mcap"].map(|end| flight.beside(&format!("sent-{name}.{end}")));
     let open = || FlightLog::open(&flight.log);
     export_tlog(&open, None, &tlog).unwrap();
     import_tlog(&tlog, &imported, &mut |_| {}).unwrap();
-    let path = flight.beside("ground.mcap");
+    let path = flight.beside(&format!("{name}.mcap"));
     let header =
         LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
     let mut log = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
@@ -32,6 +37,9 @@ fn heard(flight: &Simulated) -> PathBuf {
     let mut first_ns = None;
     while let Some(stamped) = from.next_entry().unwrap() {
         let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
+        if !hears(since_ns) {
+            continue;
+        }
         let at_ns = EARLIER_NS + since_ns;
         let record = match stamped.entry {
             Entry::RawFrame => Record::RawFrame(RawFrame {
@@ -165,4 +173,23 @@ fn a_ground_log_is_compared_with_the_vehicles_own() {
         assert!(signals.len() > 50 && signals.iter().all(|name| name.starts_with("mavlink_1_1_")));
         assert!(signals.contains(&"mavlink_1_1_local_position_ned.x"), "{signals:?}");
     }
+}
+
+/// A station that was started late and ended early is compared while it heard the vehicle; what it lost in between is missing.
+#[test]
+fn a_ground_log_is_compared_while_both_recorded() {
+    const SECOND_NS: u64 = 1_000_000_000;
+    let vehicle = &MK2_WITH_FRAMES;
+    let some = heard_while(vehicle, "late", |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns));
+    let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(&some));
+    assert_eq!(code, 1, "only the verdicts differ: {stdout}{stderr}");
+    assert!(stdout.contains("Compared while both recorded: ") && stdout.contains("0 missing, 0 added"), "{stdout}");
+    assert!(stdout.contains("the verdicts differ") && !stdout.contains("samples are"), "{stdout}");
+
+    let lossy = heard_while(vehicle, "lossy", |at_ns| {
+        (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns) && at_ns / SECOND_NS != 6
+    });
+    let (code, stdout, _) = run(replay("compare", &vehicle.log).arg(&lossy));
+    assert!(code == 1 && stdout.contains("mavlink_1_1_local_position_ned: "), "{stdout}");
+    assert!(stdout.contains("samples are missing"), "{stdout}");
 }
