@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use re_sdk::RecordingStreamError;
 use replay::log::LogError;
+use rerun::RecordingStreamError;
 
 /// Why a log could not be exported. Damage inside a log is not a reason.
 #[derive(Debug, thiserror::Error)]

@@ -8,8 +8,8 @@ use protocol::log::flight_v1::{PilotTick, TruthSample};
 use protocol::log::v1::{
     ControllerTick, LandingVerdict as RecordedVerdict, PlanarState, PlantTruth, Telemetry,
 };
-use re_sdk::{RecordingStream, RecordingStreamResult};
 use replay::log::{Entry, FlightLog, StampedEntry};
+use rerun::{RecordingStream, RecordingStreamResult};
 
 use crate::ExportError;
 use crate::again::{Again, FrameAgain};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use re_sdk::RecordingStreamBuilder;
+use rerun::RecordingStreamBuilder;
 
 use crate::survey::Survey;
 

@@ -4,21 +4,21 @@
 //! (<https://rerun.io/docs/reference/types/archetypes>, blueprint archetypes); they are written one by one because
 //! the ready-made builders have no camera, no grid and no time range.
 
-use re_sdk::external::re_log_types::BlueprintActivationCommand;
-use re_sdk::{
-    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId, StoreKind,
-};
-use re_sdk_types::blueprint::archetypes::{
+use rerun::components::Plane3D;
+use rerun::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, Uuid, VisibleTimeRange};
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
     ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TextLogColumns,
     TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
 };
-use re_sdk_types::blueprint::components::{
+use rerun::external::re_sdk_types::blueprint::components::{
     ColumnShare, ContainerKind, Corner2D, Eye3DKind, IncludedContent, PanelState, QueryExpression,
     RootContainer, RowShare, TimelineName, ViewClass,
 };
-use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use re_sdk_types::components::Plane3D;
-use re_sdk_types::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, Uuid, VisibleTimeRange};
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::{
+    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId, StoreKind,
+};
 
 use crate::entity;
 use crate::plot_list::Plot;

@@ -6,10 +6,10 @@ use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
 use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
-use re_sdk::{RecordingStream, RecordingStreamResult};
-use re_sdk_types::archetypes::{Scalars, SeriesLines, StateChange};
-use re_sdk_types::components::InterpolationMode;
-use re_sdk_types::datatypes::Rgba32;
+use rerun::archetypes::{Scalars, SeriesLines, StateChange};
+use rerun::components::InterpolationMode;
+use rerun::datatypes::Rgba32;
+use rerun::{RecordingStream, RecordingStreamResult};
 use tick_log::pilot::state_from_log;
 
 use crate::entity;

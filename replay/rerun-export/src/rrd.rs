@@ -4,10 +4,10 @@ use std::io::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use re_sdk::external::re_log_encoding::{EncodeError, Encoder};
-use re_sdk::log::{Chunk, ChunkBatcherConfig, LogMsg};
-use re_sdk::sink::{LogSink, SinkFlushError};
-use re_sdk::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
+use rerun::external::re_log_encoding::{EncodeError, Encoder};
+use rerun::log::{Chunk, ChunkBatcherConfig, LogMsg};
+use rerun::sink::{LogSink, SinkFlushError};
+use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
 use crate::ExportError;
 use crate::entity;
@@ -78,8 +78,8 @@ impl<W: Write + Send + 'static> RrdWriter<W> {
         batches: Batches,
     ) -> Result<Self, ExportError> {
         let encoder = Encoder::new_eager(
-            re_sdk::build_info().version,
-            re_sdk::external::re_log_encoding::EncodingOptions::PROTOBUF_COMPRESSED,
+            rerun::build_info().version,
+            rerun::external::re_log_encoding::EncodingOptions::PROTOBUF_COMPRESSED,
             output,
         )
         .map_err(encode_error)?;

@@ -4,10 +4,10 @@ use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use protocol::log::v1::ControllerTick;
-use re_sdk::{RecordingStream, RecordingStreamResult};
-use re_sdk_types::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
-use re_sdk_types::components::Radius;
-use re_sdk_types::datatypes::{Quaternion, Rgba32};
+use rerun::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
+use rerun::components::Radius;
+use rerun::datatypes::{Quaternion, Rgba32};
+use rerun::{RecordingStream, RecordingStreamResult};
 
 use crate::entity;
 use crate::flown::FlownPath;

@@ -2,9 +2,9 @@
 
 use flight::vehicle::airframe::{Airframe, MassModel};
 use flight::vehicle::profile::Vehicle;
-use re_sdk_types::archetypes::{LineStrips3D, Mesh3D};
-use re_sdk_types::components::Color;
-use re_sdk_types::datatypes::{Rgba32, UVec3D, Vec3D};
+use rerun::archetypes::{LineStrips3D, Mesh3D};
+use rerun::components::Color;
+use rerun::datatypes::{Rgba32, UVec3D, Vec3D};
 
 /// Number of edges of a circle.
 const SEGMENTS: u32 = 32;

@@ -1,6 +1,6 @@
 //! The recording's timelines.
 
-use re_sdk::{RecordingStream, TimeCell};
+use rerun::{RecordingStream, TimeCell};
 
 use crate::entity::{TIMELINE_FLIGHT_TIME, TIMELINE_TICK};
 

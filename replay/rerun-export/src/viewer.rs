@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use re_sdk::{RecordingStream, RecordingStreamBuilder};
+use rerun::{RecordingStream, RecordingStreamBuilder};
 
 use crate::ExportError;
 use crate::rrd::Batches;
 
 /// Where a viewer listens unless told otherwise.
-pub const DEFAULT_ADDRESS: &str = re_sdk::DEFAULT_CONNECT_URL;
+pub const DEFAULT_ADDRESS: &str = rerun::DEFAULT_CONNECT_URL;
 
 /// How long a viewer may take to receive what was sent.
 const PATIENCE: Duration = Duration::from_secs(10);

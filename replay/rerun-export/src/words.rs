@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use protocol::log::record::EventLevel;
 use protocol::log::v1::LandingVerdict;
 use protocol::text::printable;
-use re_sdk::{RecordingStream, RecordingStreamResult};
-use re_sdk_types::archetypes::{TextDocument, TextLog};
-use re_sdk_types::components::{MediaType, TextLogLevel};
+use rerun::archetypes::{TextDocument, TextLog};
+use rerun::components::{MediaType, TextLogLevel};
+use rerun::{RecordingStream, RecordingStreamResult};
 
 use crate::entity;
 use crate::survey::{StampedEvent, Survey};

@@ -183,7 +183,10 @@ fn a_ground_log_is_compared_while_both_recorded() {
     let some = heard_while(vehicle, "late", |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns));
     let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(&some));
     assert_eq!(code, 1, "only the verdicts differ: {stdout}{stderr}");
-    assert!(stdout.contains("Compared while both recorded: ") && stdout.contains("0 missing, 0 added"), "{stdout}");
+    assert!(
+        stdout.contains("Compared while both recorded: ") && stdout.contains("0 missing, 0 added"),
+        "{stdout}"
+    );
     assert!(stdout.contains("the verdicts differ") && !stdout.contains("samples are"), "{stdout}");
 
     let lossy = heard_while(vehicle, "lossy", |at_ns| {

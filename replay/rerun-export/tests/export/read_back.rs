@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use re_sdk::external::re_log_encoding::Decoder;
-use re_sdk::log::{Chunk, LogMsg};
+use rerun::external::re_log_encoding::Decoder;
+use rerun::log::{Chunk, LogMsg};
 
 /// A recording that was read back.
 pub(crate) struct Recording {

@@ -6,9 +6,9 @@ use std::path::Path;
 use flight::rules::phase::Phase;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
-use re_sdk::log::Chunk;
 use replay::log::Recording as Log;
 use replay_rerun::{Overwrite, entity, export_file};
+use rerun::log::Chunk;
 
 use crate::flown::{MK2, NOMINAL};
 use crate::read_back::Recording;
