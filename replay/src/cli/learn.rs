@@ -24,8 +24,8 @@ pub(super) struct Ask {
     /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     prior: String,
-    /// Simulated flights of the day.
-    #[arg(long, default_value_t = 200, value_name = "N")]
+    /// Simulated flights of the day; with fewer the interval gets wider.
+    #[arg(long, default_value_t = 1000, value_name = "N")]
     flights: usize,
     #[arg(long, default_value_t = 1)]
     seed: u64,

@@ -10,6 +10,7 @@
 pub mod day;
 pub mod posterior;
 pub mod rate;
+mod surface;
 
 use std::num::NonZeroUsize;
 use std::panic::resume_unwind;
