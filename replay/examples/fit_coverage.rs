@@ -146,7 +146,7 @@ fn main() -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     writeln!(
         stdout,
-        "{:<26} {:>5} {:>7} {:>15} {:>10} {:>10} {:>10} {:>6} {:>6} {:>6}",
+        "{:<26} {:>5} {:>7} {:>15} {:>10} {:>10} {:>10} {:>6} {:>6} {:>6} {:>6}",
         "parameter",
         "found",
         "held %",
@@ -156,12 +156,13 @@ fn main() -> anyhow::Result<()> {
         "med sigma",
         "z mean",
         "z rms",
+        "z 95",
         "lacks"
     )?;
     for (name, Tally { errors, not_found }) in tallies {
         let count = errors.len();
         if count == 0 {
-            writeln!(stdout, "{name:<26} {count:>5} {not_found:>79}")?;
+            writeln!(stdout, "{name:<26} {count:>5} {not_found:>86}")?;
             continue;
         }
         let n = count as f64;
@@ -173,13 +174,17 @@ fn main() -> anyhow::Result<()> {
         sigmas.sort_by(f64::total_cmp);
         let z_mean = errors.iter().map(|error| error.0 / error.1).sum::<f64>() / n;
         let z_rms = (errors.iter().map(|error| (error.0 / error.1).powi(2)).sum::<f64>() / n).sqrt();
+        // As a multiple of what a normal error has.
+        let mut sizes: Vec<f64> = errors.iter().map(|error| (error.0 / error.1).abs() / 1.96).collect();
+        sizes.sort_by(f64::total_cmp);
         writeln!(
             stdout,
-            "{name:<26} {count:>5} {:>7.1} {:>6.1} to {:>5.1} {mean:>10.5} {rms:>10.5} {:>10.5} {z_mean:>6.2} {z_rms:>6.2} {not_found:>6}",
+            "{name:<26} {count:>5} {:>7.1} {:>6.1} to {:>5.1} {mean:>10.5} {rms:>10.5} {:>10.5} {z_mean:>6.2} {z_rms:>6.2} {:>6.2} {not_found:>6}",
             100.0 * held as f64 / n,
             100.0 * low,
             100.0 * high,
             sigmas[count / 2],
+            sizes[95 * (count - 1) / 100],
         )?;
     }
     Ok(())
