@@ -38,6 +38,10 @@ const FEWEST_FRAMES: usize = 100;
 /// and it goes into every scale.
 pub(super) const ACCELEROMETER_SCALE_SIGMA: f64 = 0.001;
 
+/// What the deviation of the whole drag still lacks: how hard the air blew up and down is itself told by few gusts. With this
+/// factor the 95 % intervals hold the truth in 95 % of the 1,100 `field` flights of seeds 5 and 7, without it in 91.6 %.
+const DRAG_LACKING: f64 = 1.2;
+
 pub(super) const BODY: usize = 0;
 pub(super) const FINS: usize = 1;
 pub(super) const BIAS: usize = 2;
@@ -96,6 +100,7 @@ impl Along {
             .flat_map(|row| (0..2).map(move |column| (row, column)))
             .map(|(row, column)| shares[row] * shares[column] * self.solution.covariance[(row, column)])
             .sum();
+        let variance = variance * DRAG_LACKING * DRAG_LACKING;
         let of_speed = 2.0 * self.speed_share * total;
         let of_scale = ACCELEROMETER_SCALE_SIGMA * total;
         (total, libm::sqrt(variance + of_speed * of_speed + of_scale * of_scale))

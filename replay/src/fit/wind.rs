@@ -39,6 +39,10 @@ struct Sample {
     by_wind: f64,
 }
 
+/// What the deviation still lacks: gusts of a fall are not exactly those of the model. Without it the 95 % intervals hold the
+/// truth in 93 % of the 1,600 `field` flights of seeds 5, 7 and 8.
+const LACKING: f64 = 1.1;
+
 /// The mean wind 10 m above the ground, towards world x and y, m/s; an error is the reason why there is none.
 pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &'static str> {
     let frames = falling(trace);
@@ -88,7 +92,7 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
         libm::hypot(attitude, bias) / by_height
     });
     let found = ["wind_x", "wind_y"].into_iter().enumerate().map(|(axis, name)| {
-        let sigma = libm::sqrt(variances[axis] + systematic * systematic);
+        let sigma = LACKING * libm::sqrt(variances[axis] + systematic * systematic);
         Parameter::normal(name, "m/s", wind[axis], sigma)
     });
     Ok(found.collect())
