@@ -10,8 +10,8 @@ use serde_json::Value;
 use spdx::{Expression, ParseMode};
 
 /// Licences that ask for no more than their text beside a program. MPL-2.0 asks for the source of its own files, which are
-/// used unchanged.
-const ACCEPTED: [&str; 10] = [
+/// used unchanged; CDLA-Permissive-2.0 is that of a list of certificates, which comes with the export to Rerun.
+const ACCEPTED: [&str; 11] = [
     "MIT",
     "Apache-2.0",
     "BSD-2-Clause",
@@ -22,6 +22,7 @@ const ACCEPTED: [&str; 10] = [
     "BSL-1.0",
     "MPL-2.0",
     "CC0-1.0",
+    "CDLA-Permissive-2.0",
 ];
 
 /// Whether a manifest's licence can be met. The slash of old manifests means `OR`.
