@@ -88,7 +88,7 @@ impl Ask {
         let set = text_of(&self.prior, sim::dispersion::BUILTIN, "set of dispersions")?;
         let jobs =
             self.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
-        say(&format!("{} flights of the day, some minutes for a thousand", self.flights));
+        say(&format!("simulates {} flights of the day; a thousand take some minutes", self.flights));
         let learnt = learn(
             &fits,
             &learn::Ask {

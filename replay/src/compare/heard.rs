@@ -56,7 +56,7 @@ mod tests {
         assert_eq!(within(&vehicle, [1.0, 3.0]), log(&[("x", &[2.0])]));
         assert_eq!(common_s(&vehicle, &station, 0.0), None);
         assert_eq!(common_s(&vehicle, &Signals::new(), 0.0), None);
-        // A signal whose times run backwards inside out is empty, not a panic.
+        // A time that ends before it begins holds nothing.
         assert_eq!(within(&vehicle, [3.0, 1.0]), Signals::new());
     }
 }

@@ -90,10 +90,9 @@ pub fn compare(
     tolerances: &Tolerances,
 ) -> Result<Comparison, CompareError> {
     let shift_s = align.shift_s(baseline, other)?;
-    let both_recorded_s = baseline
-        .only_one_has_ticks(other)
-        .then(|| heard::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
-        .flatten();
+    let over_the_air = baseline.only_one_has_ticks(other);
+    let both_recorded_s =
+        over_the_air.then(|| heard::common_s(&baseline.over_the_air, &other.over_the_air, shift_s)).flatten();
     let parts;
     let (a, b) = match both_recorded_s {
         Some([from_s, to_s]) => {
@@ -103,7 +102,7 @@ pub fn compare(
             ];
             (&parts[0], &parts[1])
         }
-        None if baseline.only_one_has_ticks(other) => (&baseline.over_the_air, &other.over_the_air),
+        None if over_the_air => (&baseline.over_the_air, &other.over_the_air),
         None => (&baseline.signals, &other.signals),
     };
     let (ours, theirs): (Vec<String>, Vec<String>) =

@@ -38,8 +38,8 @@ const FEWEST_FRAMES: usize = 100;
 /// and it goes into every scale.
 pub(super) const ACCELEROMETER_SCALE_SIGMA: f64 = 0.001;
 
-/// What the deviation of the whole drag still lacks: how hard the air blew up and down is itself told by few gusts. With this
-/// factor the 95 % intervals hold the truth in 95 % of the 1,100 `field` flights of seeds 5 and 7, without it in 91.6 %.
+/// Factor on the deviation of the whole drag. A fall has only a few vertical gusts, so their strength is badly known, too. With
+/// this factor the 95 % intervals hold the truth in about 95 % of the 1,100 `field` flights of seeds 5 and 7, without it in 91.6 %.
 const DRAG_LACKING: f64 = 1.2;
 
 pub(super) const BODY: usize = 0;

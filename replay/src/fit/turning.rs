@@ -34,10 +34,10 @@ const FEEDBACK_RAD: f64 = 0.001_745;
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
-/// What the deviations of delay, gain and offsets still lack. The process of the rest is the most likely one for what the fit
-/// leaves of the same second or two of gusts, and what the fit took away is not in it; so it is too small (R. N. Kackar and
-/// D. A. Harville, Journal of the American Statistical Association 79, 1984). By how much was measured: with these factors the
-/// 95 % intervals hold the truth in 95 % of 600 `field` flights of seed 5, without them in 92, 91 and 88 %.
+/// Factors on the deviations of delay, gain and offsets. The rest is estimated from the residuals. The fit has already taken a
+/// part of the rest out of them, so the deviations are too small (R. N. Kackar and D. A. Harville, Journal of the American
+/// Statistical Association 79, 1984). By how much was measured: without these factors the 95 % intervals hold the truth in 92,
+/// 91 and 88 % of 600 `field` flights of seed 5, with them in 95 %.
 const LACKING: [(usize, f64); 4] = [(DELAY, 1.12), (GAIN, 1.23), (PITCH, 1.45), (YAW, 1.45)];
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 

@@ -180,7 +180,8 @@ fn a_ground_log_is_compared_with_the_vehicles_own() {
 fn a_ground_log_is_compared_while_both_recorded() {
     const SECOND_NS: u64 = 1_000_000_000;
     let vehicle = &MK2_WITH_FRAMES;
-    let some = heard_while(vehicle, "late", |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns));
+    let on = |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns);
+    let some = heard_while(vehicle, "late", on);
     let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(&some));
     assert_eq!(code, 1, "only the verdicts differ: {stdout}{stderr}");
     assert!(
@@ -189,9 +190,7 @@ fn a_ground_log_is_compared_while_both_recorded() {
     );
     assert!(stdout.contains("the verdicts differ") && !stdout.contains("samples are"), "{stdout}");
 
-    let lossy = heard_while(vehicle, "lossy", |at_ns| {
-        (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns) && at_ns / SECOND_NS != 6
-    });
+    let lossy = heard_while(vehicle, "lossy", |at_ns| on(at_ns) && at_ns / SECOND_NS != 6);
     let (code, stdout, _) = run(replay("compare", &vehicle.log).arg(&lossy));
     assert!(code == 1 && stdout.contains("mavlink_1_1_local_position_ned: "), "{stdout}");
     assert!(stdout.contains("samples are missing"), "{stdout}");
