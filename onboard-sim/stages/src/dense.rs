@@ -4,7 +4,13 @@
 use alloc::vec::Vec;
 use core::array::from_fn;
 
+use pulp::Simd;
+
+use crate::curvature::Curvature;
 use crate::intervals::{Hessian, Interval, Intervals};
+use crate::riccati::backward::slope_before;
+use crate::riccati::{Feedback, Stage};
+use crate::value::Value;
 
 /// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and `pulled_u`, and the other
 /// fields if derivatives are asked for.
@@ -33,6 +39,34 @@ impl<const NX: usize, const NU: usize> Dense<NX, NU> {
         b: [[0.0; NU]; NX],
         curvature: Hessian { xx: [[0.0; NX]; NX], ux: [[0.0; NX]; NU], uu: [[0.0; NU]; NU] },
     };
+
+    /// `(A, B)' P (A, B)` for a symmetric `P`, plus a share of the curvature.
+    #[inline(always)]
+    fn square(&self, p: &[[f64; NX]; NX], share: f64) -> Hessian<NX, NU> {
+        let (mut pa, mut pb) = ([[0.0; NX]; NX], [[0.0; NU]; NX]);
+        for i in 0..NX {
+            (pa[i], pb[i]) = (&self).pull(&p[i]);
+        }
+        let mut square = self.curvature;
+        for row in square.xx.iter_mut().chain(&mut square.ux) {
+            for entry in row {
+                *entry *= share;
+            }
+        }
+        for entry in square.uu.as_flattened_mut() {
+            *entry *= share;
+        }
+        for k in 0..NX {
+            for i in 0..NX {
+                add_multiple(&mut square.xx[i], self.a[k][i], &pa[k]);
+            }
+            for i in 0..NU {
+                add_multiple(&mut square.ux[i], self.b[k][i], &pa[k]);
+                add_multiple(&mut square.uu[i], self.b[k][i], &pb[k]);
+            }
+        }
+        square
+    }
 }
 
 /// All intervals of a horizon.
@@ -40,6 +74,7 @@ impl<const NX: usize, const NU: usize> Dense<NX, NU> {
 pub struct DenseIntervals<const NX: usize, const NU: usize>(pub Vec<Dense<NX, NU>>);
 
 impl<const NX: usize, const NU: usize> Intervals<NX, NU> for DenseIntervals<NX, NU> {
+    type Value = [[f64; NX]; NX];
     type Interval<'a> = &'a Dense<NX, NU>;
 
     fn resize(&mut self, intervals: usize) {
@@ -63,6 +98,8 @@ impl<const NX: usize, const NU: usize> Intervals<NX, NU> for DenseIntervals<NX, 
 }
 
 impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
+    type Value = [[f64; NX]; NX];
+
     #[inline(always)]
     fn pull(&self, g: &[f64; NX]) -> ([f64; NX], [f64; NU]) {
         (combine(g, &self.a), combine(g, &self.b))
@@ -74,30 +111,34 @@ impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
     }
 
     #[inline(always)]
-    fn square(&self, p: &[[f64; NX]; NX], share: f64) -> Hessian<NX, NU> {
-        let (mut pa, mut pb) = ([[0.0; NX]; NX], [[0.0; NU]; NX]);
-        for i in 0..NX {
-            (pa[i], pb[i]) = self.pull(&p[i]);
-        }
-        let mut square = self.curvature;
-        for row in square.xx.iter_mut().chain(&mut square.ux) {
-            for entry in row {
-                *entry *= share;
-            }
-        }
-        for entry in square.uu.as_flattened_mut() {
-            *entry *= share;
-        }
-        for k in 0..NX {
+    fn eliminate<S: Simd, C: Curvature<NX>, R: Curvature<NU>>(
+        &self,
+        _: S,
+        stage: &Stage<C, R, NX, NU>,
+        after: &[[f64; NX]; NX],
+        before: &mut [[f64; NX]; NX],
+        slope: &mut [f64; NX],
+    ) -> Option<Feedback<NX, NU>> {
+        let ((own_curvature, own_slope), (_, input_slope)) = (stage.state_terms, stage.input_terms);
+        after.add_times(&stage.defect, slope);
+        let (pulled_x, pulled_u) = self.pull(slope);
+        let Hessian { mut xx, ux, uu } = self.square(after, stage.share);
+        let factor = stage.factor(uu)?;
+        let reduced = factor.reduce(ux);
+        let scaled = factor.scale(&reduced);
+        let push = factor.scale(&factor.reduce(from_fn(|i| [input_slope[i] + pulled_u[i]])));
+        let offset = factor.restore(push).map(|[value]| value);
+        for (scaled, reduced) in scaled.iter().zip(&reduced) {
             for i in 0..NX {
-                add_multiple(&mut square.xx[i], self.a[k][i], &pa[k]);
-            }
-            for i in 0..NU {
-                add_multiple(&mut square.ux[i], self.b[k][i], &pa[k]);
-                add_multiple(&mut square.uu[i], self.b[k][i], &pb[k]);
+                for j in 0..NX {
+                    xx[i][j] -= scaled[i] * reduced[j];
+                }
             }
         }
-        square
+        own_curvature.add_to(&mut xx);
+        *before = xx;
+        *slope = slope_before(own_slope, &pulled_x, &reduced, &push);
+        Some(Feedback { gain: factor.restore(scaled), offset, reduced, factor })
     }
 
     #[inline(always)]

@@ -3,6 +3,12 @@
 
 use core::fmt::Debug;
 
+use pulp::Simd;
+
+use crate::curvature::Curvature;
+use crate::riccati::{Feedback, Stage};
+use crate::value::Value;
+
 /// All intervals of a horizon, evaluated at a point: where each ends, and its derivatives.
 ///
 /// `A` and `B` are the derivatives of the end `F(x, u)` by state and input, `lambda` is the costate of the node after
@@ -12,8 +18,11 @@ pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
     /// are those of the identity.
     const INTEGRALS: usize = 0;
 
+    /// The quadratic part of the value function.
+    type Value: Value<NX>;
+
     /// One interval's derivatives.
-    type Interval<'a>: Interval<NX, NU>
+    type Interval<'a>: Interval<NX, NU, Value = Self::Value>
     where
         Self: 'a;
 
@@ -33,15 +42,27 @@ pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
 
 /// The derivatives of one interval, as operations. They are inlined into the sweeps, so mark them `#[inline(always)]`.
 pub trait Interval<const NX: usize, const NU: usize> {
+    type Value: Value<NX>;
+
     /// `(A' g, B' g)`.
     fn pull(&self, g: &[f64; NX]) -> ([f64; NX], [f64; NU]);
 
     /// `A dx + B du`.
     fn push(&self, dx: &[f64; NX], du: &[f64; NU]) -> [f64; NX];
 
-    /// `(A, B)' P (A, B)` for a symmetric `P`, plus a share of the curvature, which is the second derivative of
-    /// `lambda' F`.
-    fn square(&self, p: &[[f64; NX]; NX], share: f64) -> Hessian<NX, NU>;
+    /// One stage of the backward sweep, in the vectors of `simd`: from the value function of the node after the interval,
+    /// `dx' after dx / 2 + slope' dx`, to that of the node before it, with the feedback of the inputs. `None` if the matrix of
+    /// the inputs is not positive definite; `before` and `slope` must then not be used.
+    ///
+    /// [`Dense`](crate::Dense) has the formulas.
+    fn eliminate<S: Simd, C: Curvature<NX>, R: Curvature<NU>>(
+        &self,
+        simd: S,
+        stage: &Stage<C, R, NX, NU>,
+        after: &Self::Value,
+        before: &mut Self::Value,
+        slope: &mut [f64; NX],
+    ) -> Option<Feedback<NX, NU>>;
 
     /// A share of the curvature, times `(dx, du)`.
     fn curve(&self, share: f64, dx: &[f64; NX], du: &[f64; NU]) -> ([f64; NX], [f64; NU]);

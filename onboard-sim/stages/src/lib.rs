@@ -80,6 +80,7 @@ mod riccati;
 mod sides;
 mod solver;
 mod start;
+mod value;
 mod warm;
 
 pub use condition::Condition;
@@ -88,8 +89,10 @@ pub use dense::{Dense, DenseIntervals};
 pub use intervals::{Hessian, Interval, Intervals};
 pub use model::{InputRange, Model, Settings};
 pub use outcome::{Outcome, Status};
+pub use riccati::{Factor, Feedback, Stage};
 pub use solver::Workspace;
 pub use start::Start;
+pub use value::Value;
 
 #[cfg(test)]
 mod tests;

@@ -3,12 +3,16 @@
 //!
 //! * `block`: inputs and results of an evaluation.
 //! * `step`: the RK4 step and its adjoint; `tangent`: its tangent and curvature.
-//! * `rows`: one interval's derivatives as the sweeps of the solver need them.
+//! * `line`: one interval's derivatives, out of the lanes; `rows`: as the sweeps of the solver need them, with `four` for
+//!   vectors and `split` for the value function.
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 mod block;
+mod four;
 mod lanes;
+mod line;
 mod rows;
+mod split;
 mod step;
 mod tangent;
 
@@ -20,13 +24,17 @@ use pulp::{Arch, NullaryFnOnce};
 use crate::Problem;
 use block::{Block, Constants, D, Points};
 use lanes::LANES;
+use line::Line;
 use rows::Rows;
+use split::Split;
 use step::evaluate;
 
-/// The intervals of a horizon, several to a block.
+/// The intervals of a horizon, filled up to whole vectors.
 #[derive(Debug, Clone, Default)]
 pub struct Blocks {
-    blocks: Vec<Block>,
+    evaluated: Vec<Block>,
+    /// Of each block.
+    lines: Vec<[Line; LANES]>,
     step_s: f64,
 }
 
@@ -46,7 +54,7 @@ impl Blocks {
         let mut points = Points::rest(constants);
         let arch = Arch::new();
         self.step_s = problem.step_s;
-        for (index, block) in self.blocks.iter_mut().enumerate() {
+        for (index, (block, lines)) in self.evaluated.iter_mut().zip(&mut self.lines).enumerate() {
             for lane in 0..LANES {
                 // Lanes beyond the end repeat the last interval.
                 let k = (index * LANES + lane).min(count - 1);
@@ -67,6 +75,9 @@ impl Blocks {
                 (false, true) => Kernel::<DERIVATIVES, false, true> { constants, points, block }.run(arch),
                 (false, false) => Kernel::<DERIVATIVES, false, false> { constants, points, block }.run(arch),
             }
+            if DERIVATIVES {
+                line::write(block, lines);
+            }
         }
     }
 }
@@ -75,28 +86,30 @@ impl stages::Intervals<6, 1> for Blocks {
     /// Nothing depends on x and z.
     const INTEGRALS: usize = 2;
 
+    type Value = Split;
     type Interval<'a> = Rows<'a>;
 
     fn resize(&mut self, intervals: usize) {
-        self.blocks.resize(intervals.div_ceil(LANES), Block::EMPTY);
+        self.evaluated.resize(intervals.div_ceil(LANES), Block::EMPTY);
+        self.lines.resize(intervals.div_ceil(LANES), [Line::EMPTY; LANES]);
     }
 
     #[inline(always)]
     fn end(&self, k: usize) -> [f64; 6] {
-        let after = &self.blocks[k / LANES].after;
+        let after = &self.evaluated[k / LANES].after;
         from_fn(|i| after[i].0[k % LANES])
     }
 
     #[inline(always)]
     fn pulled(&self, k: usize, lambda: &[f64; 6]) -> ([f64; 6], [f64; 1]) {
-        let block = &self.blocks[k / LANES];
+        let block = &self.evaluated[k / LANES];
         let pulled = |direction: usize| block.pulled[direction].0[k % LANES];
         ([lambda[0], lambda[1], pulled(0), pulled(1), pulled(2), pulled(3)], [pulled(D)])
     }
 
     #[inline(always)]
     fn interval(&self, k: usize) -> Rows<'_> {
-        Rows::of(&self.blocks[k / LANES], k % LANES, self.step_s)
+        Rows::of(&self.evaluated[k / LANES], &self.lines[k / LANES][k % LANES], k % LANES, self.step_s)
     }
 }
 

@@ -1,9 +1,14 @@
-//! One interval's derivatives, as rows for the sweeps.
+//! One interval's derivatives, as the sweeps use them.
 #![expect(clippy::inline_always, reason = "fixed-size kernels of a few dozen instructions")]
 
-use stages::Hessian;
+use pulp::Simd;
+use stages::{Curvature, Feedback, Stage};
 
-use super::block::{Block, D, DIRECTIONS, pair};
+use super::block::{Block, D, pair};
+use super::four::Four;
+use super::lanes::Lanes;
+use super::line::Line;
+use super::split::Split;
 
 /// Indices of the states.
 const X: usize = 0;
@@ -13,141 +18,175 @@ const U: usize = 3;
 const W: usize = 4;
 const Q: usize = 5;
 
-/// Number of directions, filled up to whole vectors.
-const WIDE: usize = DIRECTIONS + 1;
-
-/// One interval's derivatives, from its block.
-///
-/// The rows of `(A, b)` over the directions, filled up with a zero to whole vectors: x, z, u and w, then theta and q.
+/// One interval's derivatives. A vector is over theta, u, w and q, which are the last four states; the gimbal angle is apart.
 pub struct Rows<'a> {
-    tangent: [[f64; WIDE]; 4],
-    theta: [f64; WIDE],
-    q: [f64; WIDE],
-    block: &'a Block,
-    lane: usize,
+    line: &'a Line,
+    /// Derivatives of theta and q after the interval, which the line leaves out.
+    theta: Lanes,
+    q: Lanes,
+    /// Derivatives by the gimbal angle of x, z, u and w, of theta and of q after the interval.
+    gimbal: [f64; 4],
+    theta_gimbal: f64,
+    q_gimbal: f64,
+    /// Second derivative by the gimbal angle.
+    gimbal_twice: f64,
 }
 
 impl<'a> Rows<'a> {
+    /// Those of the interval in a lane of a block.
     #[inline(always)]
-    pub(super) fn of(block: &'a Block, lane: usize, step_s: f64) -> Self {
+    pub(super) fn of(block: &Block, line: &'a Line, lane: usize, step_s: f64) -> Self {
         let turn = block.turn.0[lane];
-        let mut tangent = [[0.0; WIDE]; 4];
-        for (row, lanes) in tangent.iter_mut().zip(&block.tangent) {
-            for (entry, value) in row.iter_mut().zip(lanes) {
-                *entry = value.0[lane];
-            }
-        }
+        let [x, z, u, w] = &block.tangent;
         Self {
-            tangent,
-            theta: [1.0, 0.0, 0.0, step_s, 0.5 * step_s * turn, 0.0],
-            q: [0.0, 0.0, 0.0, 1.0, turn, 0.0],
-            block,
-            lane,
+            line,
+            theta: Lanes([1.0, 0.0, 0.0, step_s]),
+            q: Lanes([0.0, 0.0, 0.0, 1.0]),
+            gimbal: [x[D].0[lane], z[D].0[lane], u[D].0[lane], w[D].0[lane]],
+            theta_gimbal: 0.5 * step_s * turn,
+            q_gimbal: turn,
+            gimbal_twice: block.curvature[pair(D, D)].0[lane],
         }
     }
 
-    /// `(A, b)' g` without its x and z.
+    /// `b' g`.
     #[inline(always)]
-    fn pull_along(&self, g: &[f64; 6]) -> [f64; WIDE] {
-        let a = &self.tangent;
-        let mut pulled = [0.0; WIDE];
-        for j in 0..WIDE {
-            pulled[j] = (a[0][j] * g[X] + a[1][j] * g[Z])
-                + (a[2][j] * g[U] + a[3][j] * g[W])
-                + (self.theta[j] * g[T] + self.q[j] * g[Q]);
-        }
-        pulled
-    }
-
-    /// `(A, b)' M` without its x and z, for the rows of an `M` over the directions.
-    #[inline(always)]
-    fn square_along(&self, m: &[[f64; WIDE]; 6]) -> [[f64; WIDE]; DIRECTIONS] {
-        let a = &self.tangent;
-        let mut square = [[0.0; WIDE]; DIRECTIONS];
-        for (i, row) in square.iter_mut().enumerate() {
-            for j in 0..WIDE {
-                row[j] = (a[0][i] * m[X][j] + a[1][i] * m[Z][j]) + (a[2][i] * m[U][j] + a[3][i] * m[W][j]);
-            }
-        }
-        for j in 0..WIDE {
-            square[0][j] += m[T][j];
-            square[3][j] += self.theta[3] * m[T][j] + m[Q][j];
-            square[D][j] += self.theta[D] * m[T][j] + self.q[D] * m[Q][j];
-        }
-        square
-    }
-
-    /// A share of the curvature by two directions.
-    #[inline(always)]
-    fn bent(&self, share: f64, i: usize, j: usize) -> f64 {
-        share * self.block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }].0[self.lane]
+    fn pull_gimbal(&self, g: &[f64; 6]) -> f64 {
+        let b = &self.gimbal;
+        (b[0] * g[X] + b[1] * g[Z])
+            + (b[2] * g[U] + b[3] * g[W])
+            + (self.theta_gimbal * g[T] + self.q_gimbal * g[Q])
     }
 }
 
+/// The last four of the states' values.
+#[inline(always)]
+fn rest([_, _, rest @ ..]: &[f64; 6]) -> Lanes {
+    Lanes(*rest)
+}
+
 impl stages::Interval<6, 1> for Rows<'_> {
+    type Value = Split;
+
     #[inline(always)]
     fn pull(&self, g: &[f64; 6]) -> ([f64; 6], [f64; 1]) {
-        let pulled = self.pull_along(g);
-        ([g[X], g[Z], pulled[0], pulled[1], pulled[2], pulled[3]], [pulled[D]])
+        let a = &self.line.tangent;
+        let pulled =
+            (a[0] * g[X] + a[1] * g[Z]) + (a[2] * g[U] + a[3] * g[W]) + (self.theta * g[T] + self.q * g[Q]);
+        let [theta, u, w, q] = pulled.0;
+        ([g[X], g[Z], theta, u, w, q], [self.pull_gimbal(g)])
     }
 
     #[inline(always)]
     fn push(&self, dx: &[f64; 6], [dd]: &[f64; 1]) -> [f64; 6] {
-        let a = &self.tangent;
         let row = |i: usize| {
-            (a[i][0] * dx[T] + a[i][1] * dx[U]) + (a[i][2] * dx[W] + a[i][3] * dx[Q]) + a[i][D] * dd
+            let [theta, u, w, q] = self.line.tangent[i].0;
+            (theta * dx[T] + u * dx[U]) + (w * dx[W] + q * dx[Q]) + self.gimbal[i] * dd
         };
         [
             dx[X] + row(0),
             dx[Z] + row(1),
-            dx[T] + self.theta[3] * dx[Q] + self.theta[D] * dd,
+            dx[T] + self.theta.0[3] * dx[Q] + self.theta_gimbal * dd,
             row(2),
             row(3),
-            dx[Q] + self.q[D] * dd,
+            dx[Q] + self.q_gimbal * dd,
         ]
     }
 
+    /// With `A` and `b` the derivatives by all states and by the gimbal angle, `m = P A` (its rows are vectors) and `n = P b`:
+    /// `before = A' m - (A' n) (A' n)' / b' n`, both with the curvature. Straight lines, no loops: the compiler would keep the
+    /// rows in memory.
     #[inline(always)]
-    fn square(&self, p: &[[f64; 6]; 6], share: f64) -> Hessian<6, 1> {
-        let mut m = [[0.0; WIDE]; 6];
-        for (product, row) in m.iter_mut().zip(p) {
-            *product = self.pull_along(row);
+    fn eliminate<S: Simd, C: Curvature<6>, R: Curvature<1>>(
+        &self,
+        simd: S,
+        stage: &Stage<C, R, 6, 1>,
+        after: &Split,
+        before: &mut Split,
+        slope: &mut [f64; 6],
+    ) -> Option<Feedback<6, 1>> {
+        let four = |lanes: Lanes| Four(simd, lanes);
+        let Line { tangent, curvature } = self.line;
+        let [a0, a1, a2, a3] = tangent.map(four);
+        let (theta, q, b) = (four(self.theta), four(self.q), &self.gimbal);
+
+        // The slope at the end of the interval, and pulled back.
+        let (r, Split { x, z, rest: y }) = (&stage.defect, after);
+        let gx = slope[X] + x[X] * r[X] + x[Z] * r[Z] + x[T] * r[T] + x[U] * r[U] + x[W] * r[W] + x[Q] * r[Q];
+        let gz = slope[Z] + z[X] * r[X] + z[Z] * r[Z] + z[T] * r[T] + z[U] * r[U] + z[W] * r[W] + z[Q] * r[Q];
+        let g = four(rest(slope)) + four(y[X]) * r[X] + four(y[Z]) * r[Z] + four(y[T]) * r[T];
+        let g = g + four(y[U]) * r[U] + four(y[W]) * r[W] + four(y[Q]) * r[Q];
+        let [gt, gu, gw, gq] = g.1.0;
+        let pulled = (a0 * gx + a1 * gz) + (a2 * gu + a3 * gw) + (theta * gt + q * gq);
+        let pushed = stage.input_terms.1[0] + self.pull_gimbal(&[gx, gz, gt, gu, gw, gq]);
+
+        macro_rules! product {
+            ($i:ident) => {{
+                let [t, u, w, turn] = y[$i].0;
+                let m = (a0 * x[$i] + a1 * z[$i]) + (a2 * u + a3 * w) + (theta * t + q * turn);
+                (m, self.pull_gimbal(&[x[$i], z[$i], t, u, w, turn]))
+            }};
         }
-        let across = self.square_along(&m);
-        let h = |i: usize, j: usize| self.bent(share, i, j);
-        let ux = [
-            m[X][D],
-            m[Z][D],
-            across[D][0] + h(0, D),
-            across[D][1] + h(1, D),
-            across[D][2] + h(2, D),
-            across[D][3] + h(3, D),
-        ];
-        let mut xx = [
-            [p[X][X], p[X][Z], m[X][0], m[X][1], m[X][2], m[X][3]],
-            [p[Z][X], p[Z][Z], m[Z][0], m[Z][1], m[Z][2], m[Z][3]],
-            [m[X][0], m[Z][0], across[0][0], across[0][1], across[0][2], across[0][3]],
-            [m[X][1], m[Z][1], across[1][0], across[1][1], across[1][2], across[1][3]],
-            [m[X][2], m[Z][2], across[2][0], across[2][1], across[2][2], across[2][3]],
-            [m[X][3], m[Z][3], across[3][0], across[3][1], across[3][2], across[3][3]],
-        ];
-        for i in 0..4 {
-            for j in 0..4 {
-                xx[T + i][T + j] += h(i, j);
-            }
+        let ((mx, nx), (mz, nz), (mt, nt)) = (product!(X), product!(Z), product!(T));
+        let ((mu, nu), (mw, nw), (mq, nq)) = (product!(U), product!(W), product!(Q));
+
+        let mut twice = (b[0] * nx + b[1] * nz) + (b[2] * nu + b[3] * nw);
+        twice += self.theta_gimbal * nt + self.q_gimbal * nq;
+        twice += stage.share * self.gimbal_twice;
+        let factor = stage.factor([[twice]])?;
+        let [inverse] = *factor.inverse();
+        let mut crossed = (mx * b[0] + mz * b[1]) + (mu * b[2] + mw * b[3]);
+        crossed += mt * self.theta_gimbal + mq * self.q_gimbal;
+        crossed += four(curvature[D]) * stage.share;
+        let (gain_x, gain_z, gain) = (nx * inverse, nz * inverse, crossed * inverse);
+        let offset = pushed * inverse;
+
+        let (own_curvature, own_slope) = stage.state_terms;
+        macro_rules! row {
+            ($i:literal, $more:expr, $own:expr) => {{
+                let [x, z, u, w] = tangent.map(|row| row.0[$i]);
+                let square = (mx * x + mz * z) + (mu * u + mw * w);
+                let square = $more(square) + four(curvature[$i]) * stage.share;
+                before.rest[T + $i] = (square - crossed * gain.1.0[$i] + four(Lanes($own))).1;
+            }};
         }
-        Hessian { xx, ux: [ux], uu: [[across[D][D] + h(D, D)]] }
+        let own = |i: usize| own_curvature.diagonal(i);
+        row!(0, |square| square + mt, [own(T), 0.0, 0.0, 0.0]);
+        row!(1, |square| square, [0.0, own(U), 0.0, 0.0]);
+        row!(2, |square| square, [0.0, 0.0, own(W), 0.0]);
+        row!(3, |square| square + (mt * self.theta.0[3] + mq), [0.0, 0.0, 0.0, own(Q)]);
+        before.rest[X] = (mx - crossed * gain_x).1;
+        before.rest[Z] = (mz - crossed * gain_z).1;
+        let [t, u, w, turn] = (mx - gain * nx).1.0;
+        before.x = [x[X] - gain_x * nx + own(X), x[Z] - gain_z * nx, t, u, w, turn];
+        let [t, u, w, turn] = (mz - gain * nz).1.0;
+        before.z = [z[X] - gain_x * nz, z[Z] - gain_z * nz + own(Z), t, u, w, turn];
+
+        let [t, u, w, turn] = (four(rest(own_slope)) + pulled - crossed * offset).1.0;
+        *slope = [own_slope[X] + gx - nx * offset, own_slope[Z] + gz - nz * offset, t, u, w, turn];
+        let ([t, u, w, turn], [by_t, by_u, by_w, by_q]) = (crossed.1.0, gain.1.0);
+        Some(Feedback {
+            gain: [[gain_x, gain_z, by_t, by_u, by_w, by_q]],
+            offset: [offset],
+            reduced: [[nx, nz, t, u, w, turn]],
+            factor,
+        })
     }
 
     #[inline(always)]
     fn curve(&self, share: f64, dx: &[f64; 6], [dd]: &[f64; 1]) -> ([f64; 6], [f64; 1]) {
         let moved = [dx[T], dx[U], dx[W], dx[Q], *dd];
-        let mut bent = [0.0; DIRECTIONS];
-        for (i, sum) in bent.iter_mut().enumerate() {
-            for (j, direction) in moved.iter().enumerate() {
-                *sum += self.bent(share, i, j) * direction;
-            }
+        // The curvature is symmetric: its rows are its columns.
+        let (mut bent, mut by_gimbal) = (Lanes::ZERO, 0.0);
+        for (row, direction) in self.line.curvature.iter().zip(moved) {
+            bent += *row * share * direction;
         }
-        ([0.0, 0.0, bent[0], bent[1], bent[2], bent[3]], [bent[D]])
+        let crossed = self.line.curvature[D] * share;
+        for (entry, direction) in crossed.0.iter().zip(moved) {
+            by_gimbal += entry * direction;
+        }
+        by_gimbal += share * self.gimbal_twice * dd;
+        let [theta, u, w, q] = bent.0;
+        ([0.0, 0.0, theta, u, w, q], [by_gimbal])
     }
 }

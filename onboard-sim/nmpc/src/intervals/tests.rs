@@ -1,6 +1,6 @@
 use proptest::prelude::*;
-
-use stages::{Interval, Intervals};
+use pulp::{Scalar, Simd, WithSimd};
+use stages::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
 use super::block::{DIRECTIONS, pair};
 use super::lanes::Lanes;
@@ -138,44 +138,98 @@ fn symmetric() -> impl Strategy<Value = [[f64; 6]; 6]> {
         .prop_map(|half| from_fn(|i| from_fn(|j| half[i][j] + half[j][i])))
 }
 
+/// A stage with the elements that a solve gives it.
+fn stage<'a>(
+    own: &'a ([f64; 6], [f64; 6]),
+    input: &'a ([f64; 1], [f64; 1]),
+) -> Stage<'a, [f64; 6], [f64; 1], 6, 1> {
+    let defect = [0.02, -0.01, 0.03, 0.1, -0.2, 0.05];
+    Stage { defect, share: 0.5, state_terms: (&own.0, &own.1), input_terms: (&input.0, &input.1) }
+}
+
+/// Eliminates an interval in the vectors that it is dispatched to.
+struct Eliminate<'a> {
+    rows: &'a Rows<'a>,
+    stage: &'a Stage<'a, [f64; 6], [f64; 1], 6, 1>,
+    after: &'a Split,
+    slope: [f64; 6],
+}
+
+impl WithSimd for Eliminate<'_> {
+    type Output = Option<(Split, [f64; 6], Feedback<6, 1>)>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> Self::Output {
+        let mut before = Split::ZERO;
+        let feedback = self.rows.eliminate(simd, self.stage, self.after, &mut before, &mut self.slope)?;
+        Some((before, self.slope, feedback))
+    }
+}
+
 proptest! {
     /// The columns of `A` and `b` are the pushed unit vectors, those of the curvature the curved ones.
     #[test]
-    fn the_rows_pull_and_square_as_the_matrices_that_they_stand_for(point in point(), p in symmetric()) {
+    fn the_rows_pull_and_eliminate_as_the_matrices_that_they_stand_for(point in point(), p in symmetric()) {
         let unit = |i: usize| from_fn(|j| f64::from(u8::from(i == j)));
         for vehicle in &vehicles() {
             let block = block(vehicle, &point);
-            let rows = Rows::of(&block, 1, STEP_S);
+            let mut lines = [Line::EMPTY; LANES];
+            line::write(&block, &mut lines);
+            let rows = Rows::of(&block, &lines[1], 1, STEP_S);
             let columns: [[f64; 6]; 7] = from_fn(|j| match j {
                 6 => rows.push(&[0.0; 6], &[1.0]),
                 _ => rows.push(&unit(j), &[0.0]),
             });
             let curved: [[f64; 7]; 7] = from_fn(|j| {
                 let (by_state, [by_input]) = match j {
-                    6 => rows.curve(0.5, &[0.0; 6], &[1.0]),
-                    _ => rows.curve(0.5, &unit(j), &[0.0]),
+                    6 => rows.curve(1.0, &[0.0; 6], &[1.0]),
+                    _ => rows.curve(1.0, &unit(j), &[0.0]),
                 };
                 from_fn(|i| *by_state.get(i).unwrap_or(&by_input))
             });
-            let dot = |one: &[f64; 6], other: &[f64; 6]| one.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
-            let close = |one: f64, other: f64| (one - other).abs() < 1e-10 * (1.0 + other.abs());
+            let curvature = Hessian {
+                xx: from_fn(|i| from_fn(|j| curved[j][i])),
+                ux: [from_fn(|j| curved[j][6])],
+                uu: [[curved[6][6]]],
+            };
+            let dense = Dense {
+                end: [0.0; 6],
+                pulled_x: [0.0; 6],
+                pulled_u: [0.0; 1],
+                a: from_fn(|i| from_fn(|j| columns[j][i])),
+                b: from_fn(|i| [columns[6][i]]),
+                curvature,
+            };
+            let close = |one: f64, other: f64| (one - other).abs() < 1e-9 * (1.0 + other.abs());
             let (pulled, [pulled_input]) = rows.pull(&point.2);
-            let square = rows.square(&p, 0.5);
-            for (i, column) in columns.iter().enumerate() {
-                let expected = dot(column, &point.2);
-                let actual = *pulled.get(i).unwrap_or(&pulled_input);
-                prop_assert!(close(actual, expected), "[{i}] {actual} {expected}");
-                for (j, other) in columns.iter().enumerate() {
-                    let product: [f64; 6] = p.map(|row| dot(&row, other));
-                    let expected = dot(column, &product) + curved[j][i];
-                    let actual = match (i, j) {
-                        (6, 6) => square.uu[0][0],
-                        (6, j) => square.ux[0][j],
-                        (i, 6) => square.ux[0][i],
-                        _ => square.xx[i][j],
-                    };
-                    prop_assert!(close(actual, expected), "[{i}][{j}] {actual} {expected}");
+            let (expected, [expected_input]) = (&dense).pull(&point.2);
+            for (one, other) in pulled.iter().chain([&pulled_input]).zip(expected.iter().chain([&expected_input])) {
+                prop_assert!(close(*one, *other), "{one} {other}");
+            }
+
+            let (own, input) = (([1.0, 0.0, 2.0, 0.5, 0.1, 0.3], [0.2; 6]), ([2e4], [-3.0]));
+            let (stage, mut after) = (stage(&own, &input), Split::ZERO);
+            for (i, row) in p.iter().enumerate() {
+                let [x, z, last @ ..] = *row;
+                (after.x[i], after.z[i], after.rest[i]) = (x, z, Lanes(last));
+            }
+            let slope = point.2;
+            let whole = Arch::new().dispatch(Eliminate { rows: &rows, stage: &stage, after: &after, slope });
+            let plain = Eliminate { rows: &rows, stage: &stage, after: &after, slope }.with_simd(Scalar);
+            prop_assert_eq!(whole, plain, "the width of the vectors changes a bit");
+            let (found, found_slope, found_feedback) = plain.expect("a large curvature by the input");
+            let (mut before, mut slope) = ([[0.0; 6]; 6], slope);
+            let feedback = (&dense).eliminate(Scalar, &stage, &p, &mut before, &mut slope);
+            let feedback = feedback.expect("the same curvature");
+            for (i, row) in before.iter().enumerate() {
+                for (one, other) in found.row(i).iter().zip(row) {
+                    prop_assert!(close(*one, *other), "row {i}: {one} {other}");
                 }
+            }
+            let found = found_slope.iter().chain(&found_feedback.gain[0]).chain(&found_feedback.offset);
+            let expected = slope.iter().chain(&feedback.gain[0]).chain(&feedback.offset);
+            for (one, other) in found.chain(&found_feedback.reduced[0]).zip(expected.chain(&feedback.reduced[0])) {
+                prop_assert!(close(*one, *other), "{one} {other}");
             }
         }
     }
@@ -204,7 +258,7 @@ fn the_width_of_the_vectors_does_not_change_any_bit() {
         wide.evaluate::<true>(&problem, &states, &inputs_rad, &costates);
         for k in 0..COUNT {
             let plain = block(&vehicle, &(states[k], inputs_rad[k][0], costates[k + 1]));
-            let (wide, lane) = (&wide.blocks[k / LANES], k % LANES);
+            let (wide, lane) = (&wide.evaluated[k / LANES], k % LANES);
             let rows = wide.tangent.as_flattened().iter().zip(plain.tangent.as_flattened());
             let others =
                 wide.curvature.iter().zip(&plain.curvature).chain(wide.pulled.iter().zip(&plain.pulled));

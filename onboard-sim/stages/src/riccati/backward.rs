@@ -3,61 +3,39 @@
 
 use core::array::from_fn;
 
-use super::{Factor, Feedback, Sweep};
-use crate::curvature::Curvature;
-use crate::intervals::{Hessian, Interval, Intervals};
+use pulp::Simd;
+
+use super::{Feedback, Stage, Sweep};
+use crate::intervals::{Interval, Intervals};
 use crate::iterate::Iterate;
 use crate::model::Model;
-
-/// Smallest curvature by an input that counts as positive, relative to the input's own terms.
-const LEAST_CURVATURE: f64 = 1e-11;
+use crate::value::Value;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
     /// [`backward`](Self::backward) in the vectors of the function it is inlined into.
     #[inline(always)]
-    pub(crate) fn eliminate(&mut self, iterate: &Iterate<M, NX, NU>) -> bool {
+    pub(crate) fn eliminate<S: Simd>(&mut self, simd: S, iterate: &Iterate<M, NX, NU>) -> bool {
         let count = self.inputs.len();
-        let mut p = [[0.0; NX]; NX];
-        self.curvatures[count].add_to(&mut p);
+        let mut value = <M::Intervals as Intervals<NX, NU>>::Value::ZERO;
+        value.add(&self.curvatures[count]);
+        self.values[count] = value;
         let mut slope = self.slopes[count];
 
         for k in (0..count).rev() {
+            let (curvature, input_slope) = &self.input_terms[k];
+            let stage = Stage {
+                defect: iterate.defect(k),
+                share: self.share,
+                state_terms: (&self.curvatures[k], &self.slopes[k]),
+                input_terms: (curvature, input_slope),
+            };
+            let (before, after) = self.values.split_at_mut(k + 1);
             let interval = iterate.intervals.interval(k);
-            let residual = iterate.defect(k);
-            self.values[k] = p;
-            let mut g = slope;
-            for j in 0..NX {
-                for i in 0..NX {
-                    g[i] += p[j][i] * residual[j];
-                }
-            }
-            let (pulled_x, pulled_u) = interval.pull(&g);
-            let Hessian { xx: mut next, ux, mut uu } = interval.square(&p, self.share);
-            let (own_curvature, own_slope) = &self.input_terms[k];
-            own_curvature.add_to(&mut uu);
-            let least = from_fn(|i| LEAST_CURVATURE * (1.0 + own_curvature.diagonal(i)));
-            let Some(factor) = Factor::of(uu, &least) else {
+            let Some(feedback) = interval.eliminate(simd, &stage, &after[0], &mut before[k], &mut slope)
+            else {
                 return false;
             };
-            let reduced = factor.reduce(ux);
-            let scaled = factor.scale(&reduced);
-            let push = factor.scale(&factor.reduce(from_fn(|i| [own_slope[i] + pulled_u[i]])));
-            let offset = factor.restore(push).map(|[value]| value);
-            self.feedbacks[k] = Feedback { gain: factor.restore(scaled), offset, reduced, factor };
-            if k == 0 {
-                break;
-            }
-
-            for (scaled, reduced) in scaled.iter().zip(&reduced) {
-                for i in 0..NX {
-                    for j in 0..NX {
-                        next[i][j] -= scaled[i] * reduced[j];
-                    }
-                }
-            }
-            self.curvatures[k].add_to(&mut next);
-            p = next;
-            slope = before(&self.slopes[k], &pulled_x, &reduced, &push);
+            self.feedbacks[k] = feedback;
         }
         true
     }
@@ -71,11 +49,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             let interval = iterate.intervals.interval(k);
             let residual = iterate.defect(k);
             let mut g = slope;
-            for (row, gap) in self.values[k].iter().zip(&residual) {
-                for (sum, entry) in g.iter_mut().zip(row) {
-                    *sum += entry * gap;
-                }
-            }
+            self.values[k + 1].add_times(&residual, &mut g);
             let (pulled_x, pulled_u) = interval.pull(&g);
             // The correction for the dynamics' change since then, because their first derivatives are the old ones,
             // too.
@@ -93,14 +67,14 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             let Feedback { factor, reduced, offset, .. } = &mut self.feedbacks[k];
             let push = factor.scale(&factor.reduce(from_fn(|i| [own_slope[i] + pulled_u[i]])));
             *offset = factor.restore(push).map(|[value]| value);
-            slope = before(slopes, &pulled_x, reduced, &push);
+            slope = slope_before(slopes, &pulled_x, reduced, &push);
         }
     }
 }
 
 /// Slope of the value function before an interval, with its inputs eliminated.
 #[inline(always)]
-fn before<const NX: usize, const NU: usize>(
+pub(crate) fn slope_before<const NX: usize, const NU: usize>(
     slopes: &[f64; NX],
     pulled: &[f64; NX],
     reduced: &[[f64; NX]; NU],

@@ -5,7 +5,7 @@ use core::array::from_fn;
 
 /// `L D L'`, with ones on the diagonal of `L`. With one input it is the number itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Factor<const N: usize> {
+pub struct Factor<const N: usize> {
     /// `L` below its diagonal.
     lower: [[f64; N]; N],
     /// The inverse of `D`.
@@ -14,6 +14,12 @@ pub(super) struct Factor<const N: usize> {
 
 impl<const N: usize> Factor<N> {
     pub(super) const ZERO: Self = Self { lower: [[0.0; N]; N], inverse: [0.0; N] };
+
+    /// The inverse of `D`.
+    #[inline(always)]
+    pub fn inverse(&self) -> &[f64; N] {
+        &self.inverse
+    }
 
     /// Factorises a matrix, if every entry of `D` exceeds its `least`.
     #[inline(always)]
@@ -40,7 +46,7 @@ impl<const N: usize> Factor<N> {
 
     /// The inverse of `L`, times `rows`.
     #[inline(always)]
-    pub(super) fn reduce<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
+    pub(crate) fn reduce<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
         for i in 1..N {
             for j in 0..i {
                 rows[i] = from_fn(|w| rows[i][w] - self.lower[i][j] * rows[j][w]);
@@ -51,13 +57,13 @@ impl<const N: usize> Factor<N> {
 
     /// The inverse of `D`, times `rows`.
     #[inline(always)]
-    pub(super) fn scale<const W: usize>(&self, rows: &[[f64; W]; N]) -> [[f64; W]; N] {
+    pub(crate) fn scale<const W: usize>(&self, rows: &[[f64; W]; N]) -> [[f64; W]; N] {
         from_fn(|i| rows[i].map(|value| value * self.inverse[i]))
     }
 
     /// The inverse of `L'`, times `rows`.
     #[inline(always)]
-    pub(super) fn restore<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
+    pub(crate) fn restore<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
         for i in (0..N).rev() {
             for j in i + 1..N {
                 rows[i] = from_fn(|w| rows[i][w] - self.lower[j][i] * rows[j][w]);

@@ -13,33 +13,22 @@
 //! stage (`factor`).
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
-mod backward;
+pub(crate) mod backward;
 mod factor;
 mod forward;
+mod stage;
 
 use alloc::vec::Vec;
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::curvature::Curvature;
+use crate::intervals::Intervals;
 use crate::iterate::Iterate;
 use crate::model::Model;
-use factor::Factor;
-
-/// The feedback of the inputs at a stage: `du = -(offset + gain dx)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Feedback<const NX: usize, const NU: usize> {
-    gain: [[f64; NX]; NU],
-    offset: [f64; NU],
-    /// Second derivative by input (rows) and state, reduced by the factor of the one by the inputs.
-    reduced: [[f64; NX]; NU],
-    factor: Factor<NU>,
-}
-
-impl<const NX: usize, const NU: usize> Feedback<NX, NU> {
-    const ZERO: Self =
-        Self { gain: [[0.0; NX]; NU], offset: [0.0; NU], reduced: [[0.0; NX]; NU], factor: Factor::ZERO };
-}
+use crate::value::Value;
+pub use factor::Factor;
+pub use stage::{Feedback, Stage};
 
 /// The Newton step and its data.
 #[derive(Debug, Clone)]
@@ -51,8 +40,8 @@ pub(crate) struct Sweep<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     /// Second and first derivative of the objective by each interval's inputs.
     pub(crate) input_terms: Vec<(M::InputCurvature, [f64; NU])>,
     feedbacks: Vec<Feedback<NX, NU>>,
-    /// `P` of the node after each interval.
-    values: Vec<[[f64; NX]; NX]>,
+    /// `P` of each node.
+    values: Vec<<M::Intervals as Intervals<NX, NU>>::Value>,
     /// Change of each state.
     pub(crate) states: Vec<[f64; NX]>,
     /// Change of each interval's inputs.
@@ -89,16 +78,16 @@ const BACKWARD: u8 = 0;
 const BACKWARD_AGAIN: u8 = 1;
 const FORWARD: u8 = 2;
 
-impl<M: Model<NX, NU>, const NX: usize, const NU: usize, const SWEEP: u8> NullaryFnOnce
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize, const SWEEP: u8> WithSimd
     for Wide<'_, M, NX, NU, SWEEP>
 {
     /// Whether the inertia is right.
     type Output = bool;
 
     #[inline(always)]
-    fn call(self) -> bool {
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
         match SWEEP {
-            BACKWARD => return self.sweep.eliminate(self.iterate),
+            BACKWARD => return self.sweep.eliminate(simd, self.iterate),
             BACKWARD_AGAIN => self.sweep.eliminate_again(self.iterate),
             _ => self.sweep.substitute(self.iterate),
         }
@@ -113,7 +102,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
         self.slopes.resize(intervals + 1, [0.0; NX]);
         self.input_terms.resize(intervals, (M::InputCurvature::ZERO, [0.0; NU]));
         self.feedbacks.resize(intervals, Feedback::ZERO);
-        self.values.resize(intervals, [[0.0; NX]; NX]);
+        self.values.resize(intervals + 1, Value::ZERO);
         self.states.resize(intervals + 1, [0.0; NX]);
         self.inputs.resize(intervals, [0.0; NU]);
         self.costates.resize(intervals + 1, [0.0; NX]);
