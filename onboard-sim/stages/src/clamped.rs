@@ -31,7 +31,7 @@ use crate::outcome::{SolveEnd, Status};
 use crate::solver::{CURVATURE_SHARES, Workspace};
 
 /// Largest number of steps; sides that still change after it are cycling.
-const MOST_STEPS: usize = 12;
+pub(crate) const MOST_STEPS: usize = 12;
 
 /// After this many steps, a residual this large means that the method does not converge.
 const STRAY_STEPS: usize = 8;
@@ -64,6 +64,8 @@ const LARGEST_STEP: f64 = 3.0;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Iterates from `current`, a complete warm start, to the optimum.
+    ///
+    /// With a cap below its own it may end at the iteration limit, with `current` after so many steps.
     ///
     /// # Errors
     /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be used.
@@ -103,6 +105,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             }
             if self.allowance.is_spent() {
                 return Err((steps, sweeps));
+            }
+            if steps == cap {
+                let residual = self.settle(model);
+                let status = Status::IterationLimit;
+                return Ok(SolveEnd { status, iterations: steps, sweeps, residual, ..SolveEnd::BAD });
             }
             if let Some(before) = tangent_step.filter(|_| settled) {
                 self.assemble_sides(model, stiffness);

@@ -1,6 +1,7 @@
 //! A solve from an earlier solution.
 
 use crate::barrier::LAST_BARRIER;
+use crate::clamped::MOST_STEPS;
 use crate::model::Model;
 use crate::outcome::{SolveEnd, Status};
 use crate::solver::Workspace;
@@ -29,8 +30,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         }
         let (mut iterations, mut sweeps) = (0, 0);
         if complete {
-            // Half of the iterations are reserved for the methods that can start from further away.
-            match self.pursue(model, cap / 2) {
+            // Half of the iterations are reserved for the methods that can start from further away. Of few there is nothing to
+            // reserve: none of those methods is nearer to the optimum after so few.
+            let share = if cap < MOST_STEPS { cap } else { cap / 2 };
+            match self.pursue(model, share) {
                 Ok(outcome) => return outcome,
                 Err((made, swept)) => (iterations, sweeps) = (made, swept),
             }

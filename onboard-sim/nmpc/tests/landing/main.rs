@@ -118,6 +118,41 @@ fn a_disturbed_warm_start_converges_in_a_few_iterations() {
     }
 }
 
+/// A solve that has time for a few iterations uses them all: over some kicks, the first inputs are nearer to those of the
+/// optima than the plan's are.
+#[test]
+fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
+    let profile = paper_profile();
+    let plan = solve(&from_ignition(&profile, nominal_start()), None);
+    let off_rad = |iterations: usize| {
+        let mut sum = 0.0;
+        for (samples, sign) in [(1, 1.0), (1, -1.0), (7, 1.0), (7, -1.0), (19, 1.0), (19, -1.0), (31, 1.0)] {
+            let planned = plan.states[samples];
+            let kicked = PlanarState {
+                u_m_s: planned.u_m_s + 0.02 * sign,
+                w_m_s: planned.w_m_s - 0.02,
+                q_rad_s: planned.q_rad_s + 0.5_f64.to_radians() * sign,
+                ..planned
+            };
+            let remaining = plan.inputs_rad.len() - samples;
+            let mut problem = landing_problem(&profile, kicked, 0.1 * samples as f64, remaining, 1.0);
+            problem.touchdown_speed_max_m_s = f64::MAX;
+            let warm = plan.shifted(samples);
+            let best = solve(&problem, Some(&warm)).inputs_rad[0];
+            problem.solver.max_iterations = iterations;
+            let found = solve(&problem, Some(&warm));
+            assert!(found.iterations <= iterations, "{} iterations of {iterations}", found.iterations);
+            let first = if iterations == 0 { plan.inputs_rad[samples] } else { found.inputs_rad[0] };
+            println!("{samples} {sign}: {:.5} rad off", first - best);
+            sum += (first - best).abs();
+        }
+        sum
+    };
+    let (planned, once, four) = (off_rad(0), off_rad(1), off_rad(4));
+    println!("{planned} rad, {once} after one iteration, {four} after four");
+    assert!(once < planned && four < 0.3 * planned, "{planned} rad, {once} after one, {four} after four");
+}
+
 /// With 30 N of thrust on 3 kg, even an upright vehicle hits the ground at 4.3 m/s, by the closed form without drag
 /// (v^2 = 25 - 2 (10 - 9.81) 15). The bound, which includes a little drag, agrees.
 #[test]
