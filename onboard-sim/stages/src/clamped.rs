@@ -65,11 +65,11 @@ const LARGEST_STEP: f64 = 3.0;
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Iterates from `current`, a complete warm start, to the optimum.
     ///
-    /// With a cap below its own it may end at the iteration limit, with `current` after so many steps.
+    /// If the cap `ends` the solve, it may end at its iteration limit, with `current` after so many steps.
     ///
     /// # Errors
     /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be used.
-    pub(crate) fn pursue(&mut self, model: &M, cap: usize) -> Result<SolveEnd, (usize, u32)> {
+    pub(crate) fn pursue(&mut self, model: &M, cap: usize, ends: bool) -> Result<SolveEnd, (usize, u32)> {
         self.take_sides(model);
         let tolerance = model.settings().tolerance;
         let mut likely_last = false;
@@ -106,7 +106,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             if self.allowance.is_spent() {
                 return Err((steps, sweeps));
             }
-            if steps == cap {
+            if ends && steps == cap {
                 let residual = self.settle(model);
                 let status = Status::IterationLimit;
                 return Ok(SolveEnd { status, iterations: steps, sweeps, residual, ..SolveEnd::BAD });

@@ -29,8 +29,9 @@
 //!    in all intervals.
 //! 2. `residual`: stops if the optimality conditions hold; lowers the barrier `mu` if its problem is solved.
 //! 3. `newton`: eliminates slacks and limit multipliers, which leaves diagonal terms at the nodes.
-//! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. The inertia is
-//!    right exactly if one matrix per stage, with a row for each input, is positive definite. If it is not, the sweep
+//! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. In the backward sweep an
+//!    interval eliminates itself ([`Interval::eliminate`]), so that a model can keep the value function in the order of its
+//!    vectors ([`Value`]). The inertia is right exactly if one matrix per stage, with a row for each input, is positive definite. If it is not, the sweep
 //!    runs again with half the dynamics' curvature, and then without it.
 //! 5. `newton`: finds the longest fractions of the step that keep slacks and multipliers positive, primal and dual
 //!    separately.
@@ -38,9 +39,9 @@
 //!
 //! `solver` is the loop. A cold solve runs it from the model's guesses (`start`). A warm solve (`warm`) takes over
 //! states, inputs and all multipliers, and first checks whether they are still optimal. If not, it treats the active
-//! limits and conditions as equations (`clamped`), which needs no barrier and no line search. If that does not
-//! converge, the loop starts at the last barrier, and raises it once if the first step shows that many limits and
-//! conditions must change sides. Iterations are capped; there is no clock.
+//! limits and conditions as equations (`clamped`), which needs no barrier and no line search. A solve that may take only a
+//! few iterations ends with that. If it does not converge, the loop starts at the last barrier, and raises it once if the
+//! first step shows that many limits and conditions must change sides. Iterations are capped; there is no clock.
 //!
 //! The sweeps are compiled twice, for plain and for wider vectors, and the program uses the widest that the machine has
 //! (`pulp`). Both execute the same operations in the same order and fuse none, so the bits are the same.

@@ -32,8 +32,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         if complete {
             // Half of the iterations are reserved for the methods that can start from further away. Of few there is nothing to
             // reserve: none of those methods is nearer to the optimum after so few.
-            let share = if cap < MOST_STEPS { cap } else { cap / 2 };
-            match self.pursue(model, share) {
+            let few = cap < MOST_STEPS;
+            match self.pursue(model, if few { cap } else { cap / 2 }, few) {
                 Ok(outcome) => return outcome,
                 Err((made, swept)) => (iterations, sweeps) = (made, swept),
             }
