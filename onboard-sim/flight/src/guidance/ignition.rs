@@ -48,7 +48,7 @@ pub struct IgnitionOutlook {
 }
 
 /// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
-/// 0.8 of its terminal speed.
+/// 0.8 of its terminal speed. Halved or doubled: no flight changes.
 const AHEAD_S: f64 = 0.25;
 const AHEAD_STEPS: u32 = 16;
 

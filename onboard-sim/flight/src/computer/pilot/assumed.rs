@@ -19,7 +19,7 @@ use crate::vehicle::burn::Burn;
 /// Number of steps from full caution to none.
 const CAUTION_STEPS: u32 = 3;
 
-/// Above this place in the band the motor as estimated is tried as well.
+/// Above this place in the band the motor as estimated is tried as well. Halved and doubled: 144, 144.
 const HIGH_PLACE: f64 = 0.5;
 
 /// A motor, and how far open its fins would be on average until touchdown, 0 to 1.

@@ -6,11 +6,12 @@
 use crate::computer::memory::remembers;
 use serde::{Deserialize, Serialize};
 
-/// A fin that has moved by this much is working, rad.
+/// A fin that has moved by this much is working, rad. Halved or doubled: no flight changes.
 const MOVED_RAD: f64 = 0.015;
 /// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
 const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
 /// A fin is stuck if its command has been far away for this long in total and it has not moved, s.
+/// Halved or doubled: no flight changes.
 const STUCK_AFTER_S: f64 = 0.25;
 
 /// State of the watch over one fin.

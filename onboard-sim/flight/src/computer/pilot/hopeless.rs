@@ -5,15 +5,15 @@ use crate::estimation::estimator::Estimate;
 use crate::rules::gate::GateInput;
 use crate::rules::phase::{Event, Mode};
 
-/// A reason that has kept the gate shut for this long, s, will not go away before ignition.
+/// A reason that has kept the gate shut for this long, s, will not go away before ignition. Halved or doubled: no flight changes.
 const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s.
+/// The decision is taken this long before the room for the parachute ends, s. Halved and doubled: 144, 143.
 const BEFORE_S: f64 = 0.1;
 /// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
-/// them: such a vehicle tumbles, or does not know where it is.
+/// them: such a vehicle tumbles, or does not know where it is. Halved and doubled: 59, 144.
 const FAR_BEYOND: f64 = 2.0;
 /// A fin that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights. If the gate stays shut for
-/// longer than this after ignition was due, s, there is another reason.
+/// longer than this after ignition was due, s, there is another reason. Halved or doubled: no flight changes.
 const OVERDUE_S: f64 = 0.1;
 
 impl Pilot {

@@ -8,10 +8,11 @@ use crate::guidance::vertical::fall_ends_m_s;
 use crate::rules::phase::Phase;
 use crate::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 
-/// The commit height is the height that the parachute needs, times this.
+/// The commit height is the height that the parachute needs, times this. Halved and doubled: 144, 132.
 const COMMIT_MARGIN: f64 = 1.5;
 
 /// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at apogee.
+/// Halved or doubled: no flight changes.
 const FALL_MIN_M_S: f64 = 5.0;
 
 /// The forecast before ignition, renewed five or twenty times a second.
@@ -51,7 +52,7 @@ pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m
 }
 
 /// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40 m/s over g, and half as
-/// much again while it is slower.
+/// much again while it is slower. Halved or doubled: no flight changes.
 const TAKES_THE_WIND_S: f64 = 6.0;
 
 /// The apogee ahead of a coasting vehicle.

@@ -10,11 +10,12 @@ use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
 use super::{Estimator, VehicleNow};
 use crate::computer::memory::remembers;
 
-/// Frames whose sideways force is averaged for one update.
+/// Frames whose sideways force is averaged for one update. Halved and doubled: 147, 144.
 const FRAMES: u32 = 4;
-/// Below this dynamic pressure the force is not used, Pa.
+/// Below this dynamic pressure the force is not used, Pa. Halved and doubled: 148, 146.
 const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
 /// An error of the drag coefficients does not average out. It counts as noise with this correlation time, s.
+/// Halved and doubled: 146, 143.
 const COEFFICIENT_ERROR_LASTS_S: f64 = 2.0;
 
 /// The running mean of the sideways specific force, body y and z.

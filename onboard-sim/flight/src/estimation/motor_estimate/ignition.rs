@@ -4,11 +4,12 @@ use super::NominalThrust;
 use crate::computer::memory::remembers;
 use serde::{Deserialize, Serialize};
 
-/// The motor burns when the thrust is above this fraction of the peak in two frames in a row.
+/// The motor burns when the thrust is above this fraction of the peak in two frames in a row. Halved and doubled: 142, 147.
 const CAUGHT_SHARE: f64 = 0.1;
-/// Standard deviation of the instant, s.
+/// Standard deviation of the instant, s. Halved and doubled: 145, 144.
 pub(super) const SIGMA_S: f64 = 0.004;
 /// The curve's own rise to that fraction is searched up to this time, and in steps of this length, s.
+/// Halved or doubled: no flight changes.
 const RISE_S: f64 = 0.3;
 const RISE_STEP_S: f64 = 0.0005;
 

@@ -168,26 +168,30 @@ const AIR: usize = 3;
 const SHAPE: usize = 4;
 
 /// The igniter and the first pressure peak are not in the curve, so samples within this time after ignition are not
-/// used, s.
+/// used, s. Halved and doubled: 146, 142.
 const SPIKE_S: f64 = 0.06;
-/// Correlation time of roughness and shape errors, s: samples within it are not independent.
+/// Correlation time of roughness and shape errors, s: samples within it are not independent. Halved and doubled: 143, 144.
 const ROUGHNESS_LASTS_S: f64 = 0.1;
 /// Gusts along the nose and a lean against the wind change the air force by this fraction, with this correlation time,
-/// s.
+/// s. Halved and doubled: 148, 141.
 const GUST_SHARE: f64 = 0.03;
+/// Halved and doubled: 145, 143.
 const GUST_LASTS_S: f64 = 0.5;
-/// Wander of the air scale in one second: the flow changes with speed, lean and exhaust.
+/// Wander of the air scale in one second: the flow changes with speed, lean and exhaust. Halved and doubled: 146, 147.
 const AIR_WALK_SQRT_S: f64 = 0.01;
-/// Below this air force the air scale is not estimated, N.
+/// Below this air force the air scale is not estimated, N. Halved and doubled: 145, 145.
 const SMALLEST_AIR_N: f64 = 2.0;
-/// Below this fraction of the peak, in the tail-off, samples are not used.
+/// Below this fraction of the peak, in the tail-off, samples are not used. Halved or doubled: no flight changes.
 const TAIL_SHARE: f64 = 0.08;
 /// A sample that differs from its prediction by more than this many standard deviations is rejected.
+/// Halved and doubled: 146, 144.
 const GATE_SIGMAS: f64 = 5.0;
 /// Below this fraction of the predicted thrust, for this many frames in a row, the motor has burnt out.
+/// Halved or doubled: no flight changes.
 const STARVED_SHARE: f64 = 0.3;
+/// Halved or doubled: no flight changes.
 const STARVED_FRAMES: u32 = 16;
-/// Half the span over which the curve's slope is taken, s.
+/// Half the span over which the curve's slope is taken, s. Halved and doubled: 145, 145.
 const SLOPE_SPAN_S: f64 = 0.02;
 /// Limits of the scales.
 const IMPULSE_RANGE: [f64; 2] = [0.7, 1.3];

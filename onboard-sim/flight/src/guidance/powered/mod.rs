@@ -48,28 +48,32 @@ use nmpc::{Problem, SolveStatus};
 
 /// Longest and shortest horizons, intervals.
 const MOST_INTERVALS: usize = 60;
+/// Halved and doubled: 144, 129.
 const LEAST_INTERVALS: usize = 6;
 
 /// Homing across the plane ends this long before touchdown, s, and its distance is limited to this, m.
+/// Halved and doubled: 146, 146.
 const HOMING_ENDS_S: f64 = 1.5;
+/// Halved and doubled: 146, 144.
 const HOMING_MOST_M: f64 = 6.0;
-/// Largest lean that corrects the velocity when a plan is flown to its end, rad.
+/// Largest lean that corrects the velocity when a plan is flown to its end, rad. Halved and doubled: 144, 144.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
 /// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take. 4 to 7 degrees
-/// land as many.
+/// land as many. Halved and doubled: 144, 143.
 const CONTACT_LEAN_RAD: f64 = 0.0873;
 
-/// Factor on the cost of tilt when a plan tilts too far.
+/// Factor on the cost of tilt when a plan tilts too far. Halved and doubled: 148, 145.
 const UPRIGHT_DEARER: f64 = 8.0;
 
-/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one.
+/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one. Halved and doubled: 132, 144.
 const SOFT_M_S: f64 = -0.7;
 
 /// A plan that touches down faster than this is not flown, m/s, because the upright law brakes just as well.
+/// Halved and doubled: 138, 146.
 const HARD_M_S: f64 = -1.2;
 
-/// A plan that still tilts further than this is not flown, rad.
+/// A plan that still tilts further than this is not flown, rad. Halved and doubled: 123, 144.
 const TILT_BELIEVED_RAD: f64 = 1.6;
 
 /// Velocity along the nose at the plan's touchdown, m/s; minus infinity without a plan.

@@ -9,7 +9,7 @@ const INTERVALS: usize = 40;
 const MET_M_S: f64 = 1e-4;
 /// Largest number of falls tried for a way of braking; about six are usual.
 const MOST_FALLS: usize = 24;
-/// A vehicle that moves upwards faster than this rises, m/s.
+/// A vehicle that moves upwards faster than this rises, m/s. Halved and doubled: 144, 144.
 const RISING_M_S: f64 = 0.05;
 
 /// The fraction of the thrust and the drag of one way of braking.

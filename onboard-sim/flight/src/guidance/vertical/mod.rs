@@ -19,10 +19,10 @@ mod fall;
 use self::fall::Fall;
 use crate::vehicle::burn::Burn;
 
-/// Number of end times tried between the thrust's fall through the weight and the latest end.
+/// Number of end times tried between the thrust's fall through the weight and the latest end. Halved and doubled: 146, 148.
 const END_TIMES: usize = 4;
 
-/// Gain of the fin opening: fraction of the fins' travel per fraction of the band.
+/// Gain of the fin opening: fraction of the fins' travel per fraction of the band. Halved and doubled: 141, 144.
 const FIN_GAIN: f64 = 1.5;
 
 /// Fin opening, 0 to 1, that moves a vehicle from its place in the band to the wanted place.
