@@ -8,8 +8,7 @@ use pulp::Simd;
 
 use crate::curvature::Curvature;
 use crate::intervals::{Hessian, Interval, Intervals};
-use crate::riccati::backward::slope_before;
-use crate::riccati::{Feedback, Stage};
+use crate::stage::{Feedback, Stage, slope_before};
 use crate::value::Value;
 
 /// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and `pulled_u`, and the other

@@ -6,7 +6,7 @@ use core::fmt::Debug;
 use pulp::Simd;
 
 use crate::curvature::Curvature;
-use crate::riccati::{Feedback, Stage};
+use crate::stage::{Feedback, Stage};
 use crate::value::Value;
 
 /// All intervals of a horizon, evaluated at a point: where each ends, and its derivatives.

@@ -5,10 +5,11 @@ use core::array::from_fn;
 
 use pulp::Simd;
 
-use super::{Feedback, Stage, Sweep};
+use super::Sweep;
 use crate::intervals::{Interval, Intervals};
 use crate::iterate::Iterate;
 use crate::model::Model;
+use crate::stage::{Feedback, Stage, slope_before};
 use crate::value::Value;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
@@ -70,21 +71,4 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             slope = slope_before(slopes, &pulled_x, reduced, &push);
         }
     }
-}
-
-/// Slope of the value function before an interval, with its inputs eliminated.
-#[inline(always)]
-pub(crate) fn slope_before<const NX: usize, const NU: usize>(
-    slopes: &[f64; NX],
-    pulled: &[f64; NX],
-    reduced: &[[f64; NX]; NU],
-    push: &[[f64; 1]; NU],
-) -> [f64; NX] {
-    let mut slope = from_fn(|i| slopes[i] + pulled[i]);
-    for (row, [push]) in reduced.iter().zip(push) {
-        for (entry, value) in slope.iter_mut().zip(row) {
-            *entry -= value * push;
-        }
-    }
-    slope
 }

@@ -3,11 +3,12 @@
 
 use core::array::from_fn;
 
-use super::{Feedback, Sweep};
+use super::Sweep;
 use crate::curvature::Curvature;
 use crate::intervals::{Interval, Intervals};
 use crate::iterate::Iterate;
 use crate::model::Model;
+use crate::stage::Feedback;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
     /// [`forward`](Self::forward) in the vectors of the function it is inlined into.

@@ -10,13 +10,11 @@
 //! The costates come from their own recursion, which does not use `P`.
 //!
 //! The system has the right inertia exactly if `B' P B` plus the inputs' own curvature is positive definite at every
-//! stage (`factor`).
+//! stage ([`Factor`](crate::Factor)).
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
-pub(crate) mod backward;
-mod factor;
+mod backward;
 mod forward;
-mod stage;
 
 use alloc::vec::Vec;
 
@@ -26,9 +24,8 @@ use crate::curvature::Curvature;
 use crate::intervals::Intervals;
 use crate::iterate::Iterate;
 use crate::model::Model;
+use crate::stage::Feedback;
 use crate::value::Value;
-pub use factor::Factor;
-pub use stage::{Feedback, Stage};
 
 /// The Newton step and its data.
 #[derive(Debug, Clone)]

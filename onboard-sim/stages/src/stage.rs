@@ -3,8 +3,8 @@
 
 use core::array::from_fn;
 
-use super::factor::Factor;
 use crate::curvature::Curvature;
+use crate::factor::Factor;
 
 /// Smallest curvature by an input that counts as positive, relative to the input's own terms.
 const LEAST_CURVATURE: f64 = 1e-11;
@@ -44,6 +44,23 @@ pub struct Feedback<const NX: usize, const NU: usize> {
 }
 
 impl<const NX: usize, const NU: usize> Feedback<NX, NU> {
-    pub(super) const ZERO: Self =
+    pub(crate) const ZERO: Self =
         Self { gain: [[0.0; NX]; NU], offset: [0.0; NU], reduced: [[0.0; NX]; NU], factor: Factor::ZERO };
+}
+
+/// Slope of the value function before an interval, with its inputs eliminated.
+#[inline(always)]
+pub(crate) fn slope_before<const NX: usize, const NU: usize>(
+    slopes: &[f64; NX],
+    pulled: &[f64; NX],
+    reduced: &[[f64; NX]; NU],
+    push: &[[f64; 1]; NU],
+) -> [f64; NX] {
+    let mut slope = from_fn(|i| slopes[i] + pulled[i]);
+    for (row, [push]) in reduced.iter().zip(push) {
+        for (entry, value) in slope.iter_mut().zip(row) {
+            *entry -= value * push;
+        }
+    }
+    slope
 }

@@ -13,7 +13,7 @@ pub struct Factor<const N: usize> {
 }
 
 impl<const N: usize> Factor<N> {
-    pub(super) const ZERO: Self = Self { lower: [[0.0; N]; N], inverse: [0.0; N] };
+    pub(crate) const ZERO: Self = Self { lower: [[0.0; N]; N], inverse: [0.0; N] };
 
     /// The inverse of `D`.
     #[inline(always)]
@@ -23,7 +23,7 @@ impl<const N: usize> Factor<N> {
 
     /// Factorises a matrix, if every entry of `D` exceeds its `least`.
     #[inline(always)]
-    pub(super) fn of(mut matrix: [[f64; N]; N], least: &[f64; N]) -> Option<Self> {
+    pub(crate) fn of(mut matrix: [[f64; N]; N], least: &[f64; N]) -> Option<Self> {
         let mut factor = Self::ZERO;
         for j in 0..N {
             let pivot = matrix[j][j];
