@@ -31,7 +31,7 @@ use crate::outcome::{SolveEnd, Status};
 use crate::solver::{CURVATURE_SHARES, Workspace};
 
 /// Largest number of steps; sides that still change after it are cycling.
-pub(crate) const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 12;
 
 /// After this many steps, a residual this large means that the method does not converge.
 const STRAY_STEPS: usize = 8;
@@ -65,11 +65,15 @@ const LARGEST_STEP: f64 = 3.0;
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Iterates from `current`, a complete warm start, to the optimum.
     ///
-    /// If the cap `ends` the solve, it may end at its iteration limit, with `current` after so many steps.
+    /// With few iterations it may end at their limit, with `current` after so many steps.
     ///
     /// # Errors
     /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be used.
-    pub(crate) fn pursue(&mut self, model: &M, cap: usize, ends: bool) -> Result<SolveEnd, (usize, u32)> {
+    pub(crate) fn pursue(&mut self, model: &M, cap: usize) -> Result<SolveEnd, (usize, u32)> {
+        // Half of the iterations are reserved for the methods that can start from further away. Of few there is nothing to
+        // reserve: none of those methods is nearer to the optimum after so few.
+        let few = cap < MOST_STEPS;
+        let most = if few { cap } else { MOST_STEPS.min(cap / 2) };
         self.take_sides(model);
         let tolerance = model.settings().tolerance;
         let mut likely_last = false;
@@ -78,7 +82,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let mut stiffness = STIFF;
         let mut softened = false;
         let mut sweeps = 0;
-        for steps in 0..=MOST_STEPS.min(cap) {
+        for steps in 0..=most {
             if likely_last {
                 self.current.evaluate(model, false);
             } else {
@@ -106,7 +110,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             if self.allowance.is_spent() {
                 return Err((steps, sweeps));
             }
-            if ends && steps == cap {
+            if few && steps == most {
                 let residual = self.settle(model);
                 let status = Status::IterationLimit;
                 return Ok(SolveEnd { status, iterations: steps, sweeps, residual, ..SolveEnd::BAD });
@@ -152,7 +156,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             tangent_step = (likely_last && whole && stiffness >= STIFF).then_some(largest);
             stiffness = (stiffness * HARDENING).min(STIFF);
         }
-        Err((MOST_STEPS.min(cap), sweeps))
+        Err((most, sweeps))
     }
 
     /// The Newton step that belongs to the sides; whether it has the whole curvature of the dynamics, `None` without

@@ -1,7 +1,6 @@
 //! A solve from an earlier solution.
 
 use crate::barrier::LAST_BARRIER;
-use crate::clamped::MOST_STEPS;
 use crate::model::Model;
 use crate::outcome::{SolveEnd, Status};
 use crate::solver::Workspace;
@@ -30,10 +29,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         }
         let (mut iterations, mut sweeps) = (0, 0);
         if complete {
-            // Half of the iterations are reserved for the methods that can start from further away. Of few there is nothing to
-            // reserve: none of those methods is nearer to the optimum after so few.
-            let few = cap < MOST_STEPS;
-            match self.pursue(model, if few { cap } else { cap / 2 }, few) {
+            match self.pursue(model, cap) {
                 Ok(outcome) => return outcome,
                 Err((made, swept)) => (iterations, sweeps) = (made, swept),
             }

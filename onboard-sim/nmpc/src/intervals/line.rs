@@ -1,15 +1,14 @@
 //! One interval's evaluation, turned from the lanes of its block into rows that the sweeps load whole.
-#![expect(clippy::inline_always, reason = "inlined into the evaluation, to be compiled for its vectors")]
 
 use super::block::{Block, DIRECTIONS, pair};
 use super::lanes::{LANES, Lanes};
 
-/// Derivatives by the directions theta, u, w and q of one interval; its block has the other ones.
+/// One interval's derivatives by theta, u, w and q, row by row. Its block has those that are by the gimbal angle alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
-    /// Derivatives of x, z, u and w after the interval.
+    /// Of x, z, u and w after the interval.
     pub(super) tangent: [Lanes; 4],
-    /// Second derivative of `lambda . step`, and by the gimbal angle.
+    /// Of the derivatives of `lambda . step` by theta, u, w, q and the gimbal angle.
     pub(super) curvature: [Lanes; 5],
 }
 
@@ -18,7 +17,7 @@ impl Line {
 }
 
 /// Lane by lane, four values.
-#[inline(always)]
+#[inline]
 fn transposed(a: &Lanes, b: &Lanes, c: &Lanes, d: &Lanes) -> [Lanes; LANES] {
     [
         Lanes([a.0[0], b.0[0], c.0[0], d.0[0]]),
@@ -28,7 +27,8 @@ fn transposed(a: &Lanes, b: &Lanes, c: &Lanes, d: &Lanes) -> [Lanes; LANES] {
     ]
 }
 
-/// Writes a block's intervals.
+/// Writes the lines of a block's intervals. It is not inlined: within the evaluation the compiler would give up the vectors there,
+/// which takes 2.4 times as long.
 #[inline(never)]
 pub(super) fn write(block: &Block, lines: &mut [Line; LANES]) {
     for (row, tangent) in block.tangent.iter().enumerate() {

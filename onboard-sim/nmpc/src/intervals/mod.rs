@@ -29,11 +29,12 @@ use rows::Rows;
 use split::Split;
 use step::evaluate;
 
-/// The intervals of a horizon, filled up to whole vectors.
+/// The intervals of a horizon.
 #[derive(Debug, Clone, Default)]
 pub struct Blocks {
+    /// Several intervals to a block.
     evaluated: Vec<Block>,
-    /// Of each block.
+    /// Those of each block's intervals.
     lines: Vec<[Line; LANES]>,
     step_s: f64,
 }

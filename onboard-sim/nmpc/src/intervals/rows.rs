@@ -1,7 +1,7 @@
 //! One interval's derivatives, as the sweeps use them.
 #![expect(clippy::inline_always, reason = "fixed-size kernels of a few dozen instructions")]
 
-use pulp::Simd;
+use pulp::{Scalar, Simd};
 use stages::{Curvature, Feedback, Stage};
 
 use super::block::{Block, D, pair};
@@ -49,13 +49,16 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// `b' g`.
+    /// `A' g` without its x and z, and `b' g`.
     #[inline(always)]
-    fn pull_gimbal(&self, g: &[f64; 6]) -> f64 {
-        let b = &self.gimbal;
-        (b[0] * g[X] + b[1] * g[Z])
+    fn pull_in<S: Simd>(&self, simd: S, g: &[f64; 6]) -> (Four<S>, f64) {
+        let a = |i: usize| Four(simd, self.line.tangent[i]);
+        let (theta, q, b) = (Four(simd, self.theta), Four(simd, self.q), &self.gimbal);
+        let along = (a(0) * g[X] + a(1) * g[Z]) + (a(2) * g[U] + a(3) * g[W]) + (theta * g[T] + q * g[Q]);
+        let by_gimbal = (b[0] * g[X] + b[1] * g[Z])
             + (b[2] * g[U] + b[3] * g[W])
-            + (self.theta_gimbal * g[T] + self.q_gimbal * g[Q])
+            + (self.theta_gimbal * g[T] + self.q_gimbal * g[Q]);
+        (along, by_gimbal)
     }
 }
 
@@ -70,11 +73,9 @@ impl stages::Interval<6, 1> for Rows<'_> {
 
     #[inline(always)]
     fn pull(&self, g: &[f64; 6]) -> ([f64; 6], [f64; 1]) {
-        let a = &self.line.tangent;
-        let pulled =
-            (a[0] * g[X] + a[1] * g[Z]) + (a[2] * g[U] + a[3] * g[W]) + (self.theta * g[T] + self.q * g[Q]);
-        let [theta, u, w, q] = pulled.0;
-        ([g[X], g[Z], theta, u, w, q], [self.pull_gimbal(g)])
+        let (along, by_gimbal) = self.pull_in(Scalar, g);
+        let [theta, u, w, q] = along.1.0;
+        ([g[X], g[Z], theta, u, w, q], [by_gimbal])
     }
 
     #[inline(always)]
@@ -107,8 +108,7 @@ impl stages::Interval<6, 1> for Rows<'_> {
     ) -> Option<Feedback<6, 1>> {
         let four = |lanes: Lanes| Four(simd, lanes);
         let Line { tangent, curvature } = self.line;
-        let [a0, a1, a2, a3] = tangent.map(four);
-        let (theta, q, b) = (four(self.theta), four(self.q), &self.gimbal);
+        let b = &self.gimbal;
 
         // The slope at the end of the interval, and pulled back.
         let (r, Split { x, z, rest: y }) = (&stage.defect, after);
@@ -117,18 +117,12 @@ impl stages::Interval<6, 1> for Rows<'_> {
         let g = four(rest(slope)) + four(y[X]) * r[X] + four(y[Z]) * r[Z] + four(y[T]) * r[T];
         let g = g + four(y[U]) * r[U] + four(y[W]) * r[W] + four(y[Q]) * r[Q];
         let [gt, gu, gw, gq] = g.1.0;
-        let pulled = (a0 * gx + a1 * gz) + (a2 * gu + a3 * gw) + (theta * gt + q * gq);
-        let pushed = stage.input_terms.1[0] + self.pull_gimbal(&[gx, gz, gt, gu, gw, gq]);
+        let (pulled, by_gimbal) = self.pull_in(simd, &[gx, gz, gt, gu, gw, gq]);
+        let pushed = stage.input_terms.1[0] + by_gimbal;
 
-        macro_rules! product {
-            ($i:ident) => {{
-                let [t, u, w, turn] = y[$i].0;
-                let m = (a0 * x[$i] + a1 * z[$i]) + (a2 * u + a3 * w) + (theta * t + q * turn);
-                (m, self.pull_gimbal(&[x[$i], z[$i], t, u, w, turn]))
-            }};
-        }
-        let ((mx, nx), (mz, nz), (mt, nt)) = (product!(X), product!(Z), product!(T));
-        let ((mu, nu), (mw, nw), (mq, nq)) = (product!(U), product!(W), product!(Q));
+        let product = |i: usize| self.pull_in(simd, &after.row(i));
+        let ((mx, nx), (mz, nz), (mt, nt)) = (product(X), product(Z), product(T));
+        let ((mu, nu), (mw, nw), (mq, nq)) = (product(U), product(W), product(Q));
 
         let mut twice = (b[0] * nx + b[1] * nz) + (b[2] * nu + b[3] * nw);
         twice += self.theta_gimbal * nt + self.q_gimbal * nq;

@@ -12,7 +12,8 @@ const BAROMETER_KEEPS_S: f64 = 0.25;
 /// Correlation time of the vertical velocity's errors, s. Halved or doubled: no flight changes.
 const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 
-/// Growth of the height's variance with each measurement that does not fit. Halved and doubled: 69, 144.
+/// Growth of the height's variance with each measurement that does not fit. Halved and doubled: 69, 144;
+/// halved, the variance shrinks instead.
 const DOUBT_FACTOR: f64 = 1.1;
 
 /// Heights of the centre of gravity above the pad, from two sources.

@@ -10,7 +10,8 @@ use super::{Estimator, GnssFix};
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
 /// 20 in 0.2 s. Halved and doubled: 144, 143.
 const ASKEW_SAMPLES: f64 = 20.0;
-/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height. Halved and doubled: 144, 43.
+/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height. Halved and doubled: 144, 43;
+/// doubled, no range is ever used.
 const LIDAR_COS_TILT: f64 = 0.65;
 /// Standard deviations that the filter adds when satellite velocities do not fit on average.
 /// Halved or doubled: no flight changes.
