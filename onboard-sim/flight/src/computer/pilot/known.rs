@@ -118,7 +118,7 @@ impl Known {
         PoweredGuidance::with_room(self.mission.powered, &state, &situation)
     }
 
-    /// The burning vehicle with this motor, and with this drag area of the fins as certified.
+    /// The burning vehicle, not high, with this motor, and with this drag area of the fins as certified.
     pub(super) fn powered_situation<'a>(
         &'a self,
         estimate: &Estimate,
@@ -142,6 +142,7 @@ impl Known {
             fin_drag_area_m2: self.motor.air_scale() * self.burning_fins(fin_drag_area_m2),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
             lands_here: situation.lands_here,
+            high: false,
         }
     }
 }

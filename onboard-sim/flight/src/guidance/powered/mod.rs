@@ -21,6 +21,8 @@ mod report;
 mod settings;
 mod situation;
 mod space;
+#[cfg(test)]
+mod tests;
 
 use alloc::vec::Vec;
 
@@ -69,7 +71,7 @@ const UPRIGHT_DEARER: f64 = 8.0;
 /// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one. Halved and doubled: 132, 144.
 const SOFT_M_S: f64 = -0.7;
 
-/// A plan that touches down faster than this is not flown, m/s, because the upright law brakes just as well.
+/// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the upright law brakes just as well.
 /// Halved and doubled: 138, 146.
 const HARD_M_S: f64 = -1.2;
 
@@ -214,7 +216,10 @@ impl PoweredGuidance {
     fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
         solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
-        let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
+        // A vehicle that is high has to lean far: upright it would hover.
+        let most_rad =
+            if situation.high { TILT_BELIEVED_RAD } else { self.settings.tilt_max_deg.to_radians() };
+        let tilts = largest_tilt_rad(&self.trial) > most_rad;
         if tilts && !self.workspace.is_spent() {
             // A loop satisfies the equations, but no vehicle can fly it in air. Solve again with a higher cost of tilt.
             problem.landing.state_weights[2] *= UPRIGHT_DEARER;
@@ -286,7 +291,7 @@ impl PoweredGuidance {
             },
             // Too low for any landing: a plan would turn the body across the air to brake, and gain the same speed
             // sideways.
-            () if solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S) => {
+            () if !situation.high && solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S) => {
                 ControlLevel::Stabiliser
             }
             () if solution.status == SolveStatus::Converged

@@ -37,6 +37,8 @@ pub struct PoweredSituation<'a> {
     pub gimbal_limit_rad: f64,
     /// After an abort: the vehicle lands on the ground below, not on the pad.
     pub lands_here: bool,
+    /// High in the band of feasible heights or above it: more thrust has to be turned away than is easy.
+    pub high: bool,
 }
 
 impl PoweredSituation<'_> {
@@ -133,6 +135,7 @@ mod tests {
             fin_drag_area_m2: 0.01,
             gimbal_limit_rad: 0.1,
             lands_here: false,
+            high: false,
         };
         // 0.1 m above the ground and sinking at 0.5 m/s.
         let upright = RigidState { velocity_m_s: -0.5 * Vector3::z(), ..RigidState::upright(0.54) };

@@ -146,9 +146,7 @@ impl Column {
         const NARROW_S: f64 = 0.25;
         let [weak, strong] = burns.map(|burn| self.band(burn, burning_s, vertical_m_s));
         let Some(weak) = weak else {
-            // The vehicle falls slower than a landing needs, so the fins close.
-            let close = vertical_m_s > -1.0 || self.stops_too_soon(burns[0], burning_s, vertical_m_s);
-            return if close { 0.0 } else { 1.0 };
+            return if self.falls_too_slowly(burns[0], burning_s, vertical_m_s) { 0.0 } else { 1.0 };
         };
         let strong = strong.unwrap_or(weak);
         let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
@@ -156,8 +154,12 @@ impl Column {
         share_for(place, (height_m - low_m) / width_m)
     }
 
-    /// Whether even the softest braking stops the vehicle before the thrust falls through the weight.
-    fn stops_too_soon(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
+    /// Whether a vehicle without a band falls more slowly than a landing needs: even the softest braking stops it before
+    /// the thrust falls through the weight.
+    pub fn falls_too_slowly(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
+        if vertical_m_s > -1.0 {
+            return true;
+        }
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
             let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
