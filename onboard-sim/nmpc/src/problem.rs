@@ -14,7 +14,9 @@ use crate::dynamics::{PlanarModel, PlanarState};
 #[serde(deny_unknown_fields)]
 pub struct FinalBox {
     /// Number of nodes at the end, one per sample, at which pitch, lateral speed and pitch rate are inside the box.
-    /// With one node the vehicle may fly through the box at the last instant; with more it arrives settled.
+    /// With one node the vehicle may fly through the box at the last instant; with more it arrives settled. A plan with a free
+    /// final time has as many as its settled time asks for, whatever stands here.
+    #[serde(default = "one")]
     pub settled_nodes: usize,
     /// Largest pitch error from upright, degrees.
     pub pitch_error_deg: f64,
@@ -33,18 +35,30 @@ pub struct FinalBox {
 pub struct SolverLimits {
     /// Largest number of Newton iterations of one solve.
     pub max_iterations: usize,
-    /// Largest number of Newton iterations in the tick after a missed deadline, so that a late controller catches up.
+    /// Largest number of Newton iterations in the tick after a missed deadline, so that a late planar controller catches up;
+    /// nothing else reads it.
+    #[serde(default = "one")]
     pub max_iterations_after_miss: usize,
     /// Residual of the optimality conditions that counts as converged.
     pub kkt_tolerance: f64,
     /// Price of a metre of unmet end condition (exact penalty), cost units per metre.
     pub terminal_penalty: f64,
-    /// Largest number of iterations of one quadratic subproblem.
+    /// Largest number of iterations of one quadratic subproblem of the reference solver; nothing else reads it.
+    #[serde(default = "subproblem_iterations")]
     pub qp_max_iterations: u32,
     /// Amplitude of the bent initial guesses, rad of pitch.
     pub guess_amplitude_rad: f64,
     /// Half-waves of the bent initial guesses over the horizon.
     pub guess_half_waves: u32,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// As in the paper's profiles.
+fn subproblem_iterations() -> u32 {
+    60
 }
 
 /// Barrier of a cold solve's first iteration.

@@ -227,14 +227,18 @@ pub struct StateWeights {
     /// Horizontal position, 1/m^2.
     pub x: f64,
     /// Altitude, 1/m^2.
+    #[serde(default)]
     pub z: f64,
     /// Pitch from upright, 1/rad^2.
     pub theta: f64,
     /// Axial velocity, s^2/m^2.
+    #[serde(default)]
     pub u: f64,
     /// Lateral velocity, s^2/m^2.
+    #[serde(default)]
     pub w: f64,
     /// Pitch rate, s^2/rad^2.
+    #[serde(default)]
     pub q: f64,
     /// Gimbal angle, 1/rad^2 (the paper's P).
     pub delta: f64,
