@@ -14,8 +14,8 @@ use crate::dynamics::{PlanarModel, PlanarState};
 #[serde(deny_unknown_fields)]
 pub struct FinalBox {
     /// Number of nodes at the end, one per sample, at which pitch, lateral speed and pitch rate are inside the box.
-    /// With one node the vehicle may fly through the box at the last instant; with more it arrives settled. A plan with a free
-    /// final time has as many as its settled time asks for, whatever stands here.
+    /// With one node the vehicle may fly through the box at the last instant; with more it arrives settled. A mission does not
+    /// use this number: its plans have as many nodes as `settled_s` asks for.
     #[serde(default = "one")]
     pub settled_nodes: usize,
     /// Largest pitch error from upright, degrees.
