@@ -21,6 +21,10 @@ pub const GROUND: Address = Address { system_id: 255, component_id: 190 };
 /// without error correction.
 pub const RADIO_BUDGET_BYTES_S: u32 = 2_000;
 
+/// Boot numbers are 1 to here: a command names the boot that it is meant for in a parameter, and a float holds every whole
+/// number up to 2^24 exactly.
+pub const LARGEST_BOOT_NUMBER: u32 = 0x00FF_FFFF;
+
 impl Address {
     /// Returns the same component of another system: two rockets on one link need different system ids.
     #[must_use]

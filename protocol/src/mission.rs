@@ -18,6 +18,10 @@ impl MissionHash {
     }
 }
 
+/// A float holds every whole number up to 2^24, so 22 bits plus one in any case.
+const BITS_A_PARAM: u32 = 22;
+const MASK: u64 = (1 << BITS_A_PARAM) - 1;
+
 /// What an arm says about the mission that the station is prepared for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
@@ -29,32 +33,33 @@ pub enum Expected {
 }
 
 impl MissionHash {
-    /// The hash as parameters 4 to 7 of MAV_CMD_COMPONENT_ARM_DISARM: two bytes each, little-endian, plus one, so that 0
+    /// The hash as parameters 4 to 6 of MAV_CMD_COMPONENT_ARM_DISARM: 22 bits each, the lowest first, plus one, so that 0
     /// means that none is given. A float holds each of them exactly.
-    pub fn to_params(self) -> [f32; 4] {
-        let mut params = [0.0; 4];
-        for (param, pair) in params.iter_mut().zip(self.0.chunks_exact(2)) {
-            *param = f32::from(u16::from_le_bytes([pair[0], pair[1]])) + 1.0;
-        }
-        params
+    pub fn to_params(self) -> [f32; 3] {
+        let bits = u64::from_le_bytes(self.0);
+        [0, 1, 2].map(|place| ((bits >> (BITS_A_PARAM * place)) & MASK) as f32 + 1.0)
     }
 }
 
 impl Expected {
-    /// Reads parameters 4 to 7 of an arm. Other ground stations leave them at 0 or NaN.
-    pub fn of_params(params: [f32; 4]) -> Self {
+    /// Reads parameters 4 to 6 of an arm. Other ground stations leave them at 0 or NaN.
+    pub fn of_params(params: [f32; 3]) -> Self {
         let is_unset = |param: &f32| param.is_nan() || param.abs() < 0.5;
         if params.iter().all(is_unset) {
             return Self::Any;
         }
-        let mut hash = [0; 8];
-        for (pair, param) in hash.chunks_exact_mut(2).zip(params) {
-            if !((1.0..=65_536.0).contains(&param) && libm::truncf(param).to_bits() == param.to_bits()) {
+        let mut bits = 0;
+        for (place, param) in (0..).zip(params) {
+            // The last parameter has the 20 bits that are left.
+            let most = (u64::MAX >> (BITS_A_PARAM * place)) & MASK;
+            if !((1.0..=most as f32 + 1.0).contains(&param)
+                && libm::truncf(param).to_bits() == param.to_bits())
+            {
                 return Self::Unreadable;
             }
-            pair.copy_from_slice(&((param - 1.0) as u16).to_le_bytes());
+            bits |= (param as u64 - 1) << (BITS_A_PARAM * place);
         }
-        Self::Hash(MissionHash(hash))
+        Self::Hash(MissionHash(bits.to_le_bytes()))
     }
 }
 
@@ -83,11 +88,11 @@ mod tests {
 
     #[test]
     fn what_other_stations_send_is_no_hash_and_nonsense_is_no_permission() {
-        for unset in [[0.0; 4], [f32::NAN; 4], [0.0, f32::NAN, -0.0, 0.0]] {
+        for unset in [[0.0; 3], [f32::NAN; 3], [0.0, f32::NAN, -0.0]] {
             assert_eq!(Expected::of_params(unset), Expected::Any);
         }
         for wrong in
-            [[1.0, 2.0, 3.0, 0.0], [1.5, 1.0, 1.0, 1.0], [65_537.0; 4], [f32::INFINITY; 4], [-1.0; 4]]
+            [[1.0, 2.0, 0.0], [1.5, 1.0, 1.0], [4_194_305.0; 3], [1.0, 1.0, 1_048_577.0], [f32::INFINITY; 3], [-1.0; 3]]
         {
             assert_eq!(Expected::of_params(wrong), Expected::Unreadable, "{wrong:?}");
         }

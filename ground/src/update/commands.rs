@@ -60,9 +60,9 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
     // An arm says for which mission: the vehicle refuses it if it flies another one.
     let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
-    let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 4], MissionHash::to_params);
-    let [param4, param5, param6, param7] = mission;
-    let params = [param1, 0.0, number, param4, param5, param6, param7];
+    let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 3], MissionHash::to_params);
+    let [param4, param5, param6] = mission;
+    let params = [param1, 0.0, number, param4, param5, param6, 0.0];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 

@@ -9,7 +9,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use protocol::crew_file::CrewFile;
-use protocol::identity::{RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::identity::{LARGEST_BOOT_NUMBER, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
@@ -56,8 +56,8 @@ pub(crate) struct FlyArguments {
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     serial_budget: u32,
-    /// Number of this boot on the wire, instead of a random one.
-    #[arg(long, value_name = "NUMBER")]
+    /// Number of this boot on the wire, 1 to 16777215, instead of a random one.
+    #[arg(long, value_name = "NUMBER", value_parser = boot_number)]
     boot_number: Option<NonZeroU32>,
     /// Log to write (MCAP). An existing file is not overwritten.
     #[arg(long, value_name = "FILE")]
@@ -234,6 +234,11 @@ pub(super) async fn interrupted() {
         _ = tokio::signal::ctrl_c() => {}
         _ = terminate.recv() => {}
     }
+}
+
+fn boot_number(text: &str) -> Result<NonZeroU32, String> {
+    let number = text.parse().ok().filter(|number: &NonZeroU32| number.get() <= LARGEST_BOOT_NUMBER);
+    number.ok_or_else(|| format!("must be a whole number from 1 to {LARGEST_BOOT_NUMBER}"))
 }
 
 fn report_event(time_s: f64, event: &VehicleEvent) {

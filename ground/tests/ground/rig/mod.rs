@@ -207,6 +207,7 @@ impl Rig {
             abort_impact_m_s: 0,
             hold: self.hold,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
+            ..TD_FLIGHT_STATUS_DATA::default()
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
     }

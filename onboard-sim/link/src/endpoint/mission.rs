@@ -15,16 +15,16 @@ pub fn why_other(request: &CommandRequest, asked: &Command, vehicle: &dyn Vehicl
     if *asked != Command::Vehicle(Asked::Arm) {
         return None;
     }
-    let [.., param4, param5, param6, param7] = request.params;
+    let [_, _, _, param4, param5, param6, _] = request.params;
     let flies = vehicle.mission();
-    match Expected::of_params([param4, param5, param6, param7]) {
+    match Expected::of_params([param4, param5, param6]) {
         Expected::Any => None,
         Expected::Hash(expected) if expected == flies.hash => None,
         Expected::Hash(expected) => {
             Some(format!("arm refused: this vehicle flies {} {}, not {expected}", flies.name, flies.hash))
         }
         Expected::Unreadable => {
-            Some("arm refused: parameters 4 to 7 are no mission's hash (0 for any mission)".to_owned())
+            Some("arm refused: parameters 4 to 6 are no mission's hash (0 for any mission)".to_owned())
         }
     }
 }

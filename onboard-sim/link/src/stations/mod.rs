@@ -189,6 +189,8 @@ impl Stations {
             refusal: refused.map_or(TdFrameRefusal::TD_FRAME_REFUSAL_NONE, |refused| refusal(refused.why)),
             refused_system: from.system_id,
             refused_component: from.component_id,
+            session: 0,
+            same_id: 0,
         })
     }
 }

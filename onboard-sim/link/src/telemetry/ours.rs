@@ -4,7 +4,7 @@ use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLimit, TdMotor, TdPhase, TdSolverStatus,
+    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase, TdSolverStatus,
     TdVehicleFlag,
 };
 
@@ -37,6 +37,8 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
         abort_impact_m_s,
         boot_number,
         vehicle_flags: TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
+        latch: TdLatch::TD_LATCH_NONE,
+        last_hold_ms: 0,
     })
 }
 

@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::num::NonZeroU32;
 
-use protocol::identity::RADIO_BUDGET_BYTES_S;
+use protocol::identity::{LARGEST_BOOT_NUMBER, RADIO_BUDGET_BYTES_S};
 use protocol::transport::LinkAddress;
 
 /// Identity and budgets of a vehicle on the wire.
@@ -21,7 +21,7 @@ impl OnTheWire {
     /// A random boot number, and a radio's budget on every link.
     pub fn drawn() -> Self {
         // The standard library's random hash keys differ in every process.
-        let drawn = RandomState::new().build_hasher().finish() as u32;
+        let drawn = RandomState::new().build_hasher().finish() as u32 & LARGEST_BOOT_NUMBER;
         let boot_number = NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN);
         Self { boot_number, network_bytes_s: RADIO_BUDGET_BYTES_S, serial_bytes_s: RADIO_BUDGET_BYTES_S }
     }

@@ -59,18 +59,17 @@ fn a_flood_of_ends_is_answered_within_the_budget() {
     assert!(count(&sent, HEARTBEAT_DATA::ID) >= 1);
 }
 
-fn arm_for(wire: &mut Wire, params: [f32; 4]) -> (u8, String) {
+fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
     wire.beats = true;
     wire.beat();
     wire.run(0.5);
-    let [param4, param5, param6, param7] = params;
+    let [param4, param5, param6] = params;
     let arm = COMMAND_LONG_DATA {
         command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
         param1: 1.0,
         param4,
         param5,
         param6,
-        param7,
         target_system: 1,
         target_component: 1,
         ..COMMAND_LONG_DATA::default()
@@ -97,10 +96,10 @@ fn another_mission_is_not_armed_whatever_the_station_shows() {
     assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
     assert!(words.contains(&format!("this vehicle flies mk2 {ours}, not {other}")), "{words}");
     assert!(!wire.vehicle.mode().interlocks.armed);
-    let (result, words) = arm_for(&mut wire, [1.0, 0.0, 0.0, 0.0]);
+    let (result, words) = arm_for(&mut wire, [1.0, 0.0, 0.0]);
     assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
     assert!(!wire.vehicle.mode().interlocks.armed);
-    for params in [ours.to_params(), [0.0; 4], [f32::NAN; 4]] {
+    for params in [ours.to_params(), [0.0; 3], [f32::NAN; 3]] {
         let mut wire = fresh();
         let (result, words) = arm_for(&mut wire, params);
         assert_eq!(result, MavResult::MAV_RESULT_ACCEPTED as u8, "{words}");
@@ -110,7 +109,7 @@ fn another_mission_is_not_armed_whatever_the_station_shows() {
 proptest! {
     /// Whatever a station writes there, it arms no vehicle of another mission.
     #[test]
-    fn no_parameters_but_the_own_hash_or_none_arm(params in prop::array::uniform4(any::<u32>())) {
+    fn no_parameters_but_the_own_hash_or_none_arm(params in prop::array::uniform3(any::<u32>())) {
         let params = params.map(f32::from_bits);
         let arms = match protocol::mission::Expected::of_params(params) {
             protocol::mission::Expected::Any => true,
@@ -121,7 +120,7 @@ proptest! {
             source: GROUND,
             target: VEHICLE,
             command: ARM,
-            params: [1.0, 0.0, 0.0, params[0], params[1], params[2], params[3]],
+            params: [1.0, 0.0, 0.0, params[0], params[1], params[2], 0.0],
             confirmation: 0,
         };
         let vehicle = planar().of_mission("mk2", "the right one");
