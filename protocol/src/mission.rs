@@ -91,9 +91,14 @@ mod tests {
         for unset in [[0.0; 3], [f32::NAN; 3], [0.0, f32::NAN, -0.0]] {
             assert_eq!(Expected::of_params(unset), Expected::Any);
         }
-        for wrong in
-            [[1.0, 2.0, 0.0], [1.5, 1.0, 1.0], [4_194_305.0; 3], [1.0, 1.0, 1_048_577.0], [f32::INFINITY; 3], [-1.0; 3]]
-        {
+        for wrong in [
+            [1.0, 2.0, 0.0],
+            [1.5, 1.0, 1.0],
+            [4_194_305.0; 3],
+            [1.0, 1.0, 1_048_577.0],
+            [f32::INFINITY; 3],
+            [-1.0; 3],
+        ] {
             assert_eq!(Expected::of_params(wrong), Expected::Unreadable, "{wrong:?}");
         }
     }

@@ -25,6 +25,9 @@ const QUEUE_LEN: usize = 1024;
 /// sender's next frame repeats it.
 const BELIEVED_QUEUE_LEN: usize = 256;
 
+/// Bytes to send. With an origin, a link that answers several senders sends them to that one alone.
+type Outgoing = (Vec<u8>, Option<Origin>);
+
 #[derive(Debug)]
 pub struct Transport {
     address: LinkAddress,
@@ -35,7 +38,7 @@ pub struct Transport {
 /// The sending half of a [`Transport`].
 #[derive(Debug, Clone)]
 pub struct TransportSender {
-    queue: mpsc::Sender<Vec<u8>>,
+    queue: mpsc::Sender<Outgoing>,
     believed: mpsc::Sender<Origin>,
     dropped: Arc<AtomicU64>,
 }
@@ -44,7 +47,13 @@ impl TransportSender {
     /// Queues bytes to be sent and returns whether there was room. A link that is too slow drops bytes and counts the
     /// drops.
     pub fn send(&self, bytes: Vec<u8>) -> bool {
-        let queued = self.queue.try_send(bytes).is_ok();
+        self.send_to(bytes, None)
+    }
+
+    /// As [`TransportSender::send`]. On a link that listens, only this origin gets the bytes; `None` stands for all that
+    /// are answered.
+    pub fn send_to(&self, bytes: Vec<u8>, to: Option<Origin>) -> bool {
+        let queued = self.queue.try_send((bytes, to)).is_ok();
         if !queued {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }

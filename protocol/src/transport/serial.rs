@@ -5,10 +5,11 @@ use std::time::Duration;
 use tokio::sync::mpsc::{Receiver, Sender};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
+use super::Outgoing;
 use super::stream::{Line, keep_open};
 use crate::hub::Received;
 
-pub(super) fn open(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
+pub(super) fn open(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
     tokio::spawn(keep_open(Port { path, baud }, inbox, outbox));
 }
 

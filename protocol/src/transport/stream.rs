@@ -5,6 +5,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::sync::mpsc::{Receiver, Sender};
 
+use super::Outgoing;
 use crate::hub::{Received, StreamId};
 
 const READ_LEN: usize = 4096;
@@ -30,7 +31,7 @@ pub(super) trait Line: Send + 'static {
 }
 
 /// Keeps a stream open and carries bytes over it until the owner drops the link.
-pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Vec<u8>>) {
+pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
     let mut last_trouble = String::new();
     for opening in 0.. {
         let stream_id: StreamId = if L::BEGINS_ANEW { opening } else { 0 };
@@ -73,12 +74,12 @@ async fn carry<L: Line>(
     io: L::Io,
     stream_id: StreamId,
     inbox: &Sender<Received>,
-    outbox: &mut Receiver<Vec<u8>>,
+    outbox: &mut Receiver<Outgoing>,
 ) -> Option<String> {
     let (reader, mut writer) = tokio::io::split(io);
     let write = async {
         loop {
-            if let Err(error) = writer.write_all(&outbox.recv().await?).await {
+            if let Err(error) = writer.write_all(&outbox.recv().await?.0).await {
                 return Some(error.to_string());
             }
         }

@@ -9,8 +9,9 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::broadcast;
 use tokio::sync::mpsc::{Receiver, Sender};
 
+use super::Outgoing;
 use super::stream::{Line, REOPEN_AFTER, keep_open, read_all};
-use crate::hub::{Received, StreamId};
+use crate::hub::{Origin, Received, StreamId};
 
 /// This many clients are served at the same time; further ones are disconnected.
 const MAX_CLIENTS: usize = 4;
@@ -25,7 +26,7 @@ const SILENCE: Duration = Duration::from_secs(1);
 pub(super) async fn listen(
     address: &str,
     inbox: Sender<Received>,
-    outbox: Receiver<Vec<u8>>,
+    outbox: Receiver<Outgoing>,
 ) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
@@ -33,8 +34,8 @@ pub(super) async fn listen(
     Ok(bound)
 }
 
-async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Receiver<Vec<u8>>) {
-    let (all, _) = broadcast::channel::<Vec<u8>>(CLIENT_QUEUE);
+async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
+    let (all, _) = broadcast::channel::<Outgoing>(CLIENT_QUEUE);
     let mut stream_id: StreamId = 0;
     loop {
         tokio::select! {
@@ -52,10 +53,10 @@ async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Recei
                 // core.
                 Err(_) => tokio::time::sleep(REOPEN_AFTER).await,
             },
-            bytes = outbox.recv() => {
-                let Some(bytes) = bytes else { return };
+            outgoing = outbox.recv() => {
+                let Some(outgoing) = outgoing else { return };
                 // It fails when no client is connected, which is no error.
-                let _ = all.send(bytes);
+                let _ = all.send(outgoing);
             }
         }
     }
@@ -66,7 +67,7 @@ async fn serve_client(
     stream: TcpStream,
     stream_id: StreamId,
     inbox: Sender<Received>,
-    mut all: broadcast::Receiver<Vec<u8>>,
+    mut all: broadcast::Receiver<Outgoing>,
 ) {
     // Without this, TCP delays telemetry to collect more bytes. If the option cannot be set, the delay is accepted.
     let _ = stream.set_nodelay(true);
@@ -74,7 +75,8 @@ async fn serve_client(
     let write = async {
         loop {
             match all.recv().await {
-                Ok(bytes) => {
+                Ok((_, Some(to))) if to != Origin::Stream(stream_id) => {}
+                Ok((bytes, _)) => {
                     if writer.write_all(&bytes).await.is_err() {
                         return;
                     }
@@ -93,7 +95,7 @@ async fn serve_client(
     let _ = inbox.send(Received::Gone(stream_id)).await;
 }
 
-pub(super) fn connect(address: String, inbox: Sender<Received>, outbox: Receiver<Vec<u8>>) {
+pub(super) fn connect(address: String, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
     tokio::spawn(keep_open(Connection { address }, inbox, outbox));
 }
 

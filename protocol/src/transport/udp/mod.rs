@@ -14,6 +14,7 @@ use tokio::time::Instant;
 
 use self::peers::{Newcomer, Peers};
 use self::queue::DatagramQueue;
+use super::Outgoing;
 use crate::hub::{Origin, Received};
 
 const MAX_DATAGRAM: usize = 2048;
@@ -28,7 +29,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// The queues between a link and its owner.
 pub(super) struct Queues {
     pub(super) inbox: Sender<Received>,
-    pub(super) outbox: Receiver<Vec<u8>>,
+    pub(super) outbox: Receiver<Outgoing>,
     /// Senders of which the owner accepted a frame.
     pub(super) believed: Receiver<Origin>,
 }
@@ -82,9 +83,9 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
                     place.send(received);
                 }
             }
-            bytes = outbox.recv() => {
-                let Some(bytes) = bytes else { return };
-                for peer in peers.answered() {
+            outgoing = outbox.recv() => {
+                let Some((bytes, to)) = outgoing else { return };
+                for peer in peers.answered().filter(|peer| to.is_none_or(|to| to == Origin::Datagram(*peer))) {
                     // A datagram that cannot be sent counts as lost; the link's statistics and heartbeats show it.
                     let _ = socket.send_to(&bytes, peer).await;
                 }
