@@ -8,8 +8,8 @@ use ground::update::{Msg, update};
 use ground::view::theme::{Palette, Theme};
 use ground::view::view;
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage, MavSeverity,
-    TD_FLIGHT_STATUS_DATA, TdPhase,
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavMessage, MavSeverity,
+    MavType, TD_FLIGHT_STATUS_DATA, TdPhase,
 };
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
@@ -48,8 +48,12 @@ fn ten_hours_take_no_more_memory_than_one() {
             })];
             if tenth == 0 {
                 let custom_mode = phase as u32;
-                messages
-                    .push(MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
+                messages.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                    custom_mode,
+                    mavtype: MavType::MAV_TYPE_ROCKET,
+                    autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+                    ..HEARTBEAT_DATA::default()
+                }));
             }
             if tenth % 2 == 0 {
                 let q1 = 1.0;

@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 use e2e::{BareGround, Bound, Program, Running, Terminal, now, program};
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
-    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavCmd, MavMessage, MavModeFlag,
-    MavResult, TD_FLIGHT_STATUS_DATA, TdPhase,
+    ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavCmd, MavMessage,
+    MavModeFlag, MavResult, MavType, TD_FLIGHT_STATUS_DATA, TdPhase,
 };
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
@@ -106,7 +106,12 @@ fn send_telemetry(socket: &UdpSocket, ground: SocketAddr, stop: &AtomicBool) {
         }
         if count % 25 == 0 {
             let custom_mode = TdPhase::TD_PHASE_POWERED as u32;
-            messages.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode, ..HEARTBEAT_DATA::default() }));
+            messages.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                custom_mode,
+                mavtype: MavType::MAV_TYPE_ROCKET,
+                autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+                ..HEARTBEAT_DATA::default()
+            }));
         }
         for message in messages {
             // A ground that does not listen yet receives the next message.

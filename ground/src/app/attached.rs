@@ -114,12 +114,10 @@ pub async fn session(
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // If the lost station was repeating an abort, the next station must send it.
                     model.link.abort_unsent |= !viewer.watch && model.commands.is_aborting();
-                    // It is gone, not silent.
-                    model.link.station_at = None;
                     // If the station went away while sending the history, the history ends here.
                     model.history_ends();
-                    let gone = Msg::LinkDown("the ground station of this screen is gone".to_owned());
-                    update(&mut model, gone, times.theirs(clock.now()))
+                    model.link.station_gone = true;
+                    update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
                 }
             },
             () = clock.sleep_until(look_again_at) => {
@@ -332,6 +330,7 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
         log_path: path(&hello.log_path),
         tlog_path: path(&hello.tlog_path),
         us: GROUND.of_system(hello.system_ids[0]),
+        session: hello.session,
         vehicle: VEHICLE.of_system(hello.system_ids[1]),
         role: if viewer.watch { Role::Watching } else { Role::Attached },
         seat: Seat::new(hello.screen, viewer.operator.clone()),

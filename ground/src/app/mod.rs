@@ -27,6 +27,7 @@ pub mod voice;
 mod watchers;
 pub mod wire;
 
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::IsTerminal as _;
 use std::time::Duration;
 
@@ -160,7 +161,9 @@ async fn start(
     let mission = cli.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
-    let opened = Wire::open(cli.us(), endpoints, key, clock, recorder.clone(), log_time.clone()).await;
+    let opened =
+        Wire::open((cli.us(), cli.vehicle()), endpoints, key, clock, recorder.clone(), log_time.clone())
+            .await;
     let wire = match opened {
         Ok(wire) => wire,
         Err(error) => return Err(stations::explain(error, &cli.connect).await),
@@ -174,16 +177,12 @@ async fn start(
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {
-        // With several links, each has its own capacity.
-        link_capacity_bytes_s: wire
-            .endpoints()
-            .next()
-            .filter(|_| links.len() == 1)
-            .and_then(LinkAddress::capacity_bytes_s),
+        link_capacity_bytes_s: capacity_of(&wire),
         vehicle_name: demo.as_ref().map(|_| cli.demonstration().profile.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: cli.us(),
+        session: drawn_session(),
         vehicle: cli.vehicle(),
         role: Role::Station,
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
@@ -249,6 +248,16 @@ async fn start(
     station.publish_checklist(&model, clock.now());
     station.publish_place(&model, clock.now());
     Ok((station, model, wire))
+}
+
+/// The capacity of the link; with several links, each has its own.
+fn capacity_of(wire: &Wire) -> Option<u32> {
+    wire.endpoints().next().filter(|_| wire.endpoints().count() == 1).and_then(LinkAddress::capacity_bytes_s)
+}
+
+/// A random number other than 0: the standard library's hash keys differ in every process.
+fn drawn_session() -> u32 {
+    (RandomState::new().build_hasher().finish() as u32).max(1)
 }
 
 /// Says what the demonstration is, before anything else.

@@ -154,6 +154,7 @@ pub(super) fn hello(model: &Model) -> Hello {
         auto: settings.auto,
         demonstration: settings.demonstration,
         link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
+        session: settings.session,
         system_ids: [settings.us.system_id, settings.vehicle.system_id],
         link_name: settings.link_name.clone(),
         log_path: settings.log_path.as_deref().map(absolute).unwrap_or_default(),

@@ -112,7 +112,7 @@ impl Station {
             };
             let mut next = Next::Go;
             let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
-            let fetched = self.go_on_fetching(&msgs, wire);
+            let fetched = self.go_on_fetching(&msgs, boot_of(model), wire);
             for msg in report.into_iter().chain(msgs).chain(fetched) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
@@ -282,7 +282,7 @@ impl Station {
         for action in update(model, msg, now) {
             match action {
                 Action::Send(message) => {
-                    let sent = wire.send(&message);
+                    let sent = wire.send(&message, boot_of(model));
                     if let Some(server) = &mut self.server {
                         server.publish(&sent, now);
                     }
@@ -403,7 +403,7 @@ impl Station {
     }
 
     /// Gives what was heard to the download, and sends what it asks for.
-    fn go_on_fetching(&mut self, msgs: &[Msg], wire: &mut Wire) -> Option<Msg> {
+    fn go_on_fetching(&mut self, msgs: &[Msg], boot: u32, wire: &mut Wire) -> Option<Msg> {
         let now = self.clock.now();
         let download = self.download.as_mut()?;
         let taken = msgs.iter().try_for_each(|msg| match msg {
@@ -414,7 +414,7 @@ impl Station {
             Ok(()) => {
                 let (messages, word) = download.poll(now);
                 for message in &messages {
-                    wire.send(message);
+                    wire.send(message, boot);
                 }
                 word
             }
@@ -502,7 +502,7 @@ impl Station {
         self.step(model, wire, msg);
         let Some(head) = model.book.head else { return };
         for _ in 0..TOLD_AT_THE_END {
-            wire.send(&MavMessage::TD_BOOK_HEAD(head.message(model.settings.vehicle)));
+            wire.send(&MavMessage::TD_BOOK_HEAD(head.message(model.settings.vehicle)), boot_of(model));
         }
     }
 
@@ -542,6 +542,11 @@ impl Station {
             demo.stop().await;
         }
     }
+}
+
+/// The boot that the screens show; 0 if the vehicle has told none.
+fn boot_of(model: &Model) -> u32 {
+    model.vehicle.boot.number().unwrap_or(0)
 }
 
 /// Sets the time inside a record to its time stamp.

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::dialect::MavMessage;
+use protocol::dialect::{MavCmd, MavMessage};
 use protocol::frame::{Encoder, Frame, FramerCounters};
-use protocol::hub::{Hub, HubLink, News, Received};
+use protocol::hub::{Hub, HubLink, News, Origin, Received};
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
@@ -14,17 +14,22 @@ use protocol::signing::{Signing, stamp_of};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::clock::{Clock, LogTime};
+use crate::model::boot::GONE_AFTER;
 use crate::model::link::LinkReport;
 use crate::update::Msg;
 
 /// How often signing timestamps are saved, in signing time units of 10 us.
 const SAVE_TIMESTAMPS_EVERY: u64 = 100_000;
+const FLIGHT_STATUS_ID: u32 = 54_000;
+/// How many boots a link remembers.
+const BOOTS_MAX: usize = 8;
 /// The most data taken from one link before keys and clock are served again.
 const MAX_AT_ONCE: usize = 1024;
 
 /// The open links to one vehicle.
 pub struct Wire {
     open: Vec<OpenLink>,
+    vehicle: Address,
     hub: Hub,
     key_file: Option<KeyFile>,
     saved_at: u64,
@@ -41,7 +46,31 @@ struct OpenLink {
     sender: TransportSender,
     name: String,
     ended: bool,
+    /// From where each boot of the vehicle was last heard, and when.
+    boots: Vec<(u32, Origin, Duration)>,
 }
+
+impl OpenLink {
+    /// Notes from where a boot is heard.
+    fn note_boot(&mut self, boot: u32, from: Origin, now: Duration) {
+        self.boots.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < GONE_AFTER);
+        self.boots.push((boot, from, now));
+        self.boots.drain(..self.boots.len().saturating_sub(BOOTS_MAX));
+    }
+
+    /// Where this boot is; `None` if nothing is known that tells.
+    ///
+    /// # Errors
+    /// Only other boots are heard over this link.
+    fn place_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
+        let place = self.boots.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
+        let others = self.boots.iter().any(|(_, _, at)| now.saturating_sub(*at) < GONE_AFTER);
+        if place.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(place) }
+    }
+}
+
+/// Only other vehicles are heard over a link.
+struct OtherVehicles;
 
 /// What one pass takes from the links.
 #[derive(Default)]
@@ -52,12 +81,12 @@ struct Taken {
 }
 
 impl Wire {
-    /// Opens the links; `us` is our own address.
+    /// Opens the links; `us` is our own address, `vehicle` that of the vehicle.
     ///
     /// # Errors
     /// An address cannot be bound or resolved.
     pub async fn open(
-        us: Address,
+        (us, vehicle): (Address, Address),
         endpoints: Vec<LinkAddress>,
         key: Option<(KeyFile, Signing)>,
         clock: Clock,
@@ -70,10 +99,17 @@ impl Wire {
                 .await
                 .with_context(|| format!("opening the link {endpoint}"))?;
             let name = transport.address().to_string();
-            open.push(OpenLink { sender: transport.sender(), transport, name, ended: false });
+            open.push(OpenLink {
+                sender: transport.sender(),
+                transport,
+                name,
+                ended: false,
+                boots: Vec::new(),
+            });
         }
         let (key_file, signing) = key.unzip();
         Ok(Self {
+            vehicle,
             hub: Hub::new(open.len(), signing),
             open,
             key_file,
@@ -135,18 +171,27 @@ impl Wire {
         if let Received::Datagram { bytes, .. } | Received::Stream(_, bytes) = &received {
             taken.bytes += bytes.len();
         }
+        let from = match &received {
+            Received::Datagram { from, .. } => Some(Origin::Datagram(*from)),
+            Received::Stream(id, _) => Some(Origin::Stream(*id)),
+            _ => None,
+        };
         let msgs = &mut taken.msgs;
         let name = self.open[number].name.clone();
         for news in self.hub.take(number, received, self.clock.now(), self.unix_stamp()) {
             match news {
                 News::Frame(frame) => {
                     self.record(Direction::Rx, &name, &frame);
+                    self.note_boot(number, &frame, from);
                     if self.open.len() > 1 {
                         msgs.push(Msg::HeardOver(number));
                     }
                     msgs.push(Msg::Frame(frame));
                 }
-                News::Copy(frame) => self.record(Direction::Rx, &name, &frame),
+                News::Copy(frame) => {
+                    self.record(Direction::Rx, &name, &frame);
+                    self.note_boot(number, &frame, from);
+                }
                 News::Believed(origin) => {
                     taken.believed = true;
                     self.open[number].sender.believe(origin);
@@ -175,16 +220,32 @@ impl Wire {
         })
     }
 
-    /// Sends a message over every link and returns the message that counts the bytes.
-    pub fn send(&mut self, message: &MavMessage) -> Msg {
+    /// Notes from where a boot of the vehicle is heard: commands for it go there.
+    fn note_boot(&mut self, number: usize, frame: &Frame, from: Option<Origin>) {
+        if frame.source() == self.vehicle
+            && frame.message_id() == FLIGHT_STATUS_ID
+            && let (Some(from), Ok(MavMessage::TD_FLIGHT_STATUS(status))) = (from, frame.decode())
+        {
+            let now = self.clock.now();
+            self.open[number].note_boot(status.boot_number, from, now);
+        }
+    }
+
+    /// Sends a message over every link and returns the message that counts the bytes. On a link that listens, what is meant
+    /// for the vehicle goes only to where its shown `boot` was heard; a heartbeat, an abort, a hold and a disarm go to
+    /// everybody there. 0: the vehicle has told no boot.
+    pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
         let (now, stamp) = (self.clock.now(), self.unix_stamp());
         let mut sent = 0;
         for number in 0..self.open.len() {
+            let to = if concerns_all(message) { Ok(None) } else { self.open[number].place_of(boot, now) };
+            // Only other vehicles are heard over this link.
+            let Ok(to) = to else { continue };
             let bytes = self.hub.bytes_for(number, &frame, stamp);
             let count = bytes.len();
             self.record(Direction::Tx, &self.open[number].name, &frame);
-            if self.open[number].sender.send(bytes) {
+            if self.open[number].sender.send_to(bytes, to) {
                 self.hub.on_sent(number, count, now);
             }
             sent += count;
@@ -232,6 +293,19 @@ impl Wire {
             let frame = RawFrame { direction, endpoint: "ground", link: link.to_owned(), bytes };
             recorder.try_record(Record::RawFrame(frame), self.log_time.now_ns());
         }
+    }
+}
+
+/// Whether everybody on the link is to get a message.
+fn concerns_all(message: &MavMessage) -> bool {
+    match message {
+        MavMessage::HEARTBEAT(_) => true,
+        MavMessage::COMMAND_LONG(sent) => match sent.command {
+            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION | MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => true,
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => sent.param1 == 0.0,
+            _ => false,
+        },
+        _ => false,
     }
 }
 

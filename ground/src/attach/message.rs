@@ -4,7 +4,7 @@ use crate::model::action::Request;
 use crate::update::Msg;
 
 /// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 7;
+pub const VERSION: u32 = 8;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
@@ -22,6 +22,8 @@ pub struct Hello {
     pub link_capacity_bytes_s: u32,
     /// System ids of the station and of its vehicle.
     pub system_ids: [u8; 2],
+    /// The session of the station.
+    pub session: u32,
     pub link_name: String,
     /// Empty without a log.
     pub log_path: String,

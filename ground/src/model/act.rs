@@ -167,18 +167,18 @@ impl Act {
     /// Whether the key would do something now.
     pub fn works(self, model: &Model, now: Duration) -> bool {
         let commands = model.settings.role.why_not_command().is_none();
+        let acts = permits::why_not_here(model).is_none();
         match self {
-            Self::Arm => commands && permits::why_not_arm(model, now).is_none(),
-            Self::Start => commands && permits::why_not_start(model, now).is_none(),
-            Self::Disarm => commands && model.vehicle.armed().is_some_and(|armed| armed.value),
+            Self::Arm => acts && permits::why_not_arm(model, now).is_none(),
+            Self::Start => acts && permits::why_not_start(model, now).is_none(),
+            Self::Disarm => acts && model.vehicle.armed().is_some_and(|armed| armed.value),
             Self::HoldCountdown => {
                 commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
             }
-            Self::Tap => commands && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
-            Self::TakeCommand => commands && permits::why_not_take(model, now).is_none(),
-            Self::Check | Self::CheckStill | Self::RangeTest => {
-                commands && permits::why_not_check(model, now).is_none()
-            }
+            Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
+            Self::TakeCommand => acts && permits::why_not_take(model, now).is_none(),
+            Self::RangeTest => commands && permits::why_not_check(model, now).is_none(),
+            Self::Check | Self::CheckStill => acts && permits::why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
@@ -196,6 +196,11 @@ impl Act {
             | Self::Redraw
             | Self::Quit => true,
         }
+    }
+
+    pub fn definition(self) -> &'static Definition {
+        let place = DEFINITIONS.iter().position(|definition| definition.act == self);
+        &DEFINITIONS[place.unwrap_or(0)]
     }
 
     /// Whether it opens a dialog that commands the vehicle.

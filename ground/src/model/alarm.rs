@@ -17,6 +17,12 @@ pub enum AlarmKind {
     LinkDown,
     /// An attached screen is told nothing any more. The station itself does not know this alarm.
     StationSilent,
+    /// Two vehicles are heard under the vehicle's id.
+    TwoVehicles,
+    /// Another station uses our id.
+    SameId,
+    /// The vehicle has another autopilot.
+    Foreign,
     /// The vehicle acknowledged the command, but its own state does not show the effect.
     Disagreement(CommandKind),
     /// The command was sent repeatedly and not answered.
@@ -72,8 +78,31 @@ impl AlarmKind {
             Self::Battery,
             Self::VehicleLog,
             Self::CheckFailed,
+            Self::TwoVehicles,
+            Self::SameId,
+            Self::Foreign,
         ];
         others.into_iter().chain(of_commands)
+    }
+
+    /// What hides what: an abort that does not work, then whether this screen and its vehicle are what they seem, then
+    /// the vehicle, then everything else.
+    fn urgency(self) -> u8 {
+        match self {
+            Self::Unanswered(CommandKind::Abort)
+            | Self::Disagreement(CommandKind::Abort)
+            | Self::Refused(CommandKind::Abort) => 3,
+            Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign => 2,
+            Self::LinkLost
+            | Self::UplinkLost
+            | Self::LinkDown
+            | Self::LiveMotor
+            | Self::Held
+            | Self::Aborted
+            | Self::NoLight
+            | Self::Rebooted => 1,
+            _ => 0,
+        }
     }
 
     /// Whether the alarm belongs to one boot of the vehicle and ends with it.
@@ -84,6 +113,9 @@ impl AlarmKind {
                 | Self::UplinkLost
                 | Self::LinkDown
                 | Self::StationSilent
+                | Self::TwoVehicles
+                | Self::SameId
+                | Self::Foreign
                 | Self::Rebooted
                 | Self::Log
         )
@@ -144,10 +176,13 @@ impl Alarms {
         &self.list
     }
 
-    /// The newest alarm that nobody has acknowledged (past ones last); otherwise the newest that holds.
+    /// The most urgent alarm: first what nobody has acknowledged (past ones last), of that what holds, of that by its kind,
+    /// of that the newest.
     pub fn foremost(&self) -> Option<&Alarm> {
-        let newest = |past: bool| self.list.iter().rfind(|alarm| !alarm.acknowledged && alarm.past == past);
-        newest(false).or_else(|| newest(true)).or_else(|| self.list.last())
+        self.list.iter().max_by_key(|alarm| {
+            let unseen = if alarm.acknowledged { 0 } else { 2 - u8::from(alarm.past) };
+            (unseen, alarm.is_active(), alarm.kind.urgency(), alarm.raised_at)
+        })
     }
 
     /// How many alarms nobody has acknowledged.

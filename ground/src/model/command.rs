@@ -86,6 +86,27 @@ impl CommandKind {
         }
     }
 
+    /// Whether it can make something move or light: then it names the boot that it is meant for, and is sent only to
+    /// the vehicle that is shown.
+    pub fn moves(self) -> bool {
+        match self {
+            Self::Arm
+            | Self::ConfirmArm
+            | Self::Start
+            | Self::ConfirmStart
+            | Self::Tap
+            | Self::TakeCommand
+            | Self::Check
+            | Self::CheckStill => true,
+            Self::Disarm | Self::Hold | Self::Abort | Self::EndCheck => false,
+        }
+    }
+
+    /// Whether only the owner of the station's key gives it: everything but what anybody may do to stop something.
+    pub fn needs_the_owner(self) -> bool {
+        !matches!(self, Self::Hold | Self::Abort | Self::EndCheck)
+    }
+
     /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe. A
     /// confirmation is for one ask, and a tap for one moment. A check is not repeated either: it would move what somebody
     /// has just laid hands on.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::seat::Seat;
 
 /// How long a countdown may continue without a commanding screen.
-pub const UNATTENDED_MAX: Duration = Duration::from_secs(5);
+pub const UNATTENDED_MAX: Duration = Duration::from_secs(2);
 
 /// The seats at commanding screens: the station's own screen and the attached ones without `--watch`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -15,6 +15,8 @@ pub struct Crew {
     gone_at: Option<Duration>,
     /// When the next hold is to be sent; `None` while no hold is needed.
     pub(crate) hold_due: Option<Duration>,
+    /// It was said that a hold comes too late.
+    pub(crate) too_late_told: bool,
 }
 
 impl Crew {

@@ -15,6 +15,8 @@ pub const START_WORD: &str = "START";
 pub const CONFIRM_WORD: &str = "CONFIRM";
 /// The word that takes command.
 pub const TAKE_WORD: &str = "TAKE";
+/// The word that aborts a vehicle with another autopilot.
+pub const ABORT_WORD: &str = "ABORT";
 /// How long the crew has to confirm a disarm.
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
 /// How long the crew has to type the word that quits.
@@ -52,6 +54,11 @@ pub enum Dialog {
         until: Duration,
     },
     Disarm {
+        until: Duration,
+    },
+    /// An abort of a vehicle with another autopilot: the word is typed after what it would do there was read.
+    AbortForeign {
+        typed: String,
         until: Duration,
     },
     Hold {
@@ -107,6 +114,10 @@ impl Dialog {
         Self::Sign { step, void, until: now + CONFIRM_TIME_LIMIT }
     }
 
+    pub fn abort_foreign(now: Duration) -> Self {
+        Self::AbortForeign { typed: String::new(), until: now + ARM_TIME_LIMIT }
+    }
+
     pub fn disarm(now: Duration) -> Self {
         Self::Disarm { until: now + CONFIRM_TIME_LIMIT }
     }
@@ -123,6 +134,7 @@ impl Dialog {
             | Self::Start { until, .. }
             | Self::Confirm { until, .. }
             | Self::TakeCommand { until, .. }
+            | Self::AbortForeign { until, .. }
             | Self::Disarm { until }
             | Self::Hold { until }
             | Self::Check { until, .. }
@@ -139,6 +151,7 @@ impl Dialog {
             Self::Start { .. } => "start",
             Self::Confirm { .. } => "confirmation",
             Self::TakeCommand { .. } => "take-over",
+            Self::AbortForeign { .. } => "abort",
             Self::Disarm { .. } => "disarm",
             Self::Hold { .. } => "hold",
             Self::Check { .. } => "check",
@@ -158,6 +171,7 @@ impl Dialog {
             | Self::Sign { .. } => None,
             Self::Confirm { .. } => Some(CONFIRM_WORD),
             Self::TakeCommand { .. } => Some(TAKE_WORD),
+            Self::AbortForeign { .. } => Some(ABORT_WORD),
             Self::Arm { .. } => Some(ARM_WORD),
             Self::Start { .. } => Some(START_WORD),
             Self::Quit { .. } => Some(QUIT_WORD),
@@ -173,6 +187,7 @@ impl Dialog {
             | Self::Start { typed, .. }
             | Self::Confirm { typed, .. }
             | Self::TakeCommand { typed, .. }
+            | Self::AbortForeign { typed, .. }
             | Self::Quit { typed, .. } => self.word().is_some_and(|word| word.len() == typed.len()),
         }
     }
@@ -184,6 +199,7 @@ impl Dialog {
         | Self::Start { typed, .. }
         | Self::Confirm { typed, .. }
         | Self::TakeCommand { typed, .. }
+        | Self::AbortForeign { typed, .. }
         | Self::Quit { typed, .. }) = self
         else {
             return false;

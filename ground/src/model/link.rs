@@ -14,6 +14,9 @@ use super::uplink::Uplink;
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
+/// Nothing is armed or started for this long after another station was heard under our address.
+const SAME_ID_FOR: Duration = Duration::from_secs(10);
+
 /// An attached screen that was told nothing for longer than this has a silent station: twenty of its ticks. Less than the
 /// silence after which a vehicle is lost, so that the two are not mistaken for each other.
 const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
@@ -60,8 +63,10 @@ pub struct Link {
     /// The crew has asked for an abort that reached no station. The screen sends it to the next station that it
     /// finds.
     pub abort_unsent: bool,
-    /// On an attached screen: the last tick of its station. `None` in the station itself, and while there is no station.
+    /// On an attached screen: the last tick of its station. `None` in the station itself.
     pub(crate) station_at: Option<Duration>,
+    /// On an attached screen: its station has ended.
+    pub(crate) station_gone: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
     /// The last frame of the vehicle, of any kind.
@@ -73,7 +78,8 @@ pub struct Link {
     /// Since when the vehicle has been heard without a loss of the link.
     pub(crate) alive_since: Option<Duration>,
     pub(crate) loss_reported: bool,
-    pub(crate) twin_reported_at: Option<Duration>,
+    /// When another station was last heard under our address.
+    pub(crate) same_id_at: Option<Duration>,
     pub(crate) strangers: Vec<Address>,
 }
 
@@ -84,10 +90,25 @@ impl Link {
         report.map(|report| report.name.as_str())
     }
 
+    /// Whether another station uses our address, or has used it a moment ago: it may be the one that the vehicle obeys.
+    pub fn shares_our_id(&self, now: Duration) -> bool {
+        self.same_id_at.is_some_and(|at| now.saturating_sub(at) < SAME_ID_FOR)
+    }
+
     /// How long the station of this attached screen has been silent, if it is.
     pub fn station_silence(&self, now: Duration) -> Option<Duration> {
         let silence = now.saturating_sub(self.station_at?);
-        (silence > STATION_SILENT_AFTER).then_some(silence)
+        (silence > STATION_SILENT_AFTER && !self.station_gone).then_some(silence)
+    }
+
+    /// Whether the station of this attached screen has ended: the screen shows the past, and commands nothing.
+    pub fn is_station_gone(&self) -> bool {
+        self.station_gone
+    }
+
+    /// How long ago it was last heard, if it has ended.
+    pub fn station_gone_for(&self, now: Duration) -> Option<Duration> {
+        self.station_gone.then(|| now.saturating_sub(self.station_at.unwrap_or(now)))
     }
 
     /// Until when it is known what the station hears: in an attached screen its last tick, otherwise now.

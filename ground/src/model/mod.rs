@@ -21,6 +21,7 @@ pub mod dialog;
 pub mod events;
 pub mod flight_so_far;
 pub mod flown_path;
+pub mod foreign;
 pub mod history;
 pub mod judgement;
 pub mod key_timing;
@@ -97,6 +98,9 @@ pub struct Settings {
     pub tlog_path: Option<String>,
     /// The station's own MAVLink address.
     pub us: Address,
+    /// The session of the station: drawn at its start, so that another station with the same address is another one. 0:
+    /// none, in a replay.
+    pub session: u32,
     /// The vehicle's MAVLink address. No other system on the link is shown or commanded.
     pub vehicle: Address,
     pub role: Role,
@@ -137,6 +141,7 @@ impl Settings {
             log_path: None,
             tlog_path: None,
             us: GROUND,
+            session: 0,
             vehicle: VEHICLE,
             role: Role::Station,
             seat: Seat::default(),

@@ -4,14 +4,60 @@ use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdPhase};
 
+use protocol::identity::Address;
+
+use super::boot::GONE_AFTER;
+use super::seat::Seat;
 use super::two_person::Ask;
 use super::vehicle::is_on_pad;
-use super::{Model, words};
+use super::{Model, Settings, words};
+
+/// Why nothing that can move is commanded now: it is not certain which vehicle, or which station, would be obeyed.
+pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
+    let Settings { us, vehicle: of, .. } = &model.settings;
+    let vehicle = &model.vehicle;
+    if vehicle.beside(now).is_some() {
+        return Some(format!("TWO VEHICLES under id {}: switch one off", of.system_id));
+    }
+    if let Some(foreign) =
+        vehicle.foreign.as_ref().filter(|foreign| now.saturating_sub(foreign.heard_at) < GONE_AFTER)
+    {
+        return Some(format!("not a Touchdown vehicle: {}", foreign.name()));
+    }
+    if vehicle.status.is_none() {
+        return Some("it is not known yet what the vehicle is: it has told no flight status".to_owned());
+    }
+    let Address { system_id, component_id } = us;
+    let same = "another station uses our id";
+    model
+        .link
+        .shares_our_id(now)
+        .then(|| format!("{same} {system_id}/{component_id}: give one another --sysid"))
+}
+
+/// Why this seat does not act with the station's key. A hold and an abort are anybody's.
+pub fn why_not_seat(model: &Model, by: &Seat) -> Option<String> {
+    let owner = model.settings.key_owner.as_ref()?;
+    let is_theirs = by.operator == owner.name || *by == Seat::automatic();
+    let name = &owner.name;
+    (!is_theirs).then(|| {
+        format!("this station signs as {name}: only a screen of {name} does that (a hold, an abort anybody)")
+    })
+}
+
+/// Why the person at this screen commands nothing but a hold and an abort; `None` if they may more.
+pub fn why_not_here(model: &Model) -> Option<String> {
+    let by_role = model.settings.role.why_not_command().map(str::to_owned);
+    by_role.or_else(|| why_not_seat(model, &model.settings.seat)).or_else(|| why_no_key(model))
+}
 
 /// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
+    }
+    if let Some(why) = why_nothing_moves(model, now) {
+        return Some(why);
     }
     if model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("armed already".to_owned());
@@ -34,6 +80,9 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
 pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
+    }
+    if let Some(why) = why_nothing_moves(model, now) {
+        return Some(why);
     }
     if !model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("not armed".to_owned());
@@ -64,6 +113,9 @@ pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
     }
+    if let Some(why) = why_nothing_moves(model, now) {
+        return Some(why);
+    }
     if model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("armed: disarm first".to_owned());
     }
@@ -81,6 +133,9 @@ pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
 pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
+    }
+    if let Some(why) = why_nothing_moves(model, now) {
+        return Some(why);
     }
     if !model.vehicle.armed().is_some_and(|armed| armed.value) {
         return Some("not armed".to_owned());

@@ -10,6 +10,7 @@ use protocol::dialect::{
 use protocol::mission::MissionHash;
 
 use super::boot::MessageBoot;
+use super::foreign::{Foreign, may_be_ours};
 use super::motion::{Attitude, Motion};
 use super::pad_check::PadCheck;
 use super::touchdown::Touchdown;
@@ -20,11 +21,15 @@ use super::vehicle::{
 /// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted; then everything received
 /// before is dropped first. Messages of a former boot are ignored.
 pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
-    let spoken = vehicle.boot.hear(message);
+    if hear_foreign(vehicle, message, now) {
+        return false;
+    }
+    let spoken = vehicle.boot.hear(message, now);
     match spoken {
         MessageBoot::Present => {}
         MessageBoot::New => {
-            *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() }
+            let (boot, foreign) = (std::mem::take(&mut vehicle.boot), vehicle.foreign.take());
+            *vehicle = Vehicle { boot, foreign, ..Vehicle::default() };
         }
         MessageBoot::Former => return false,
     }
@@ -110,12 +115,41 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
     spoken == MessageBoot::New
 }
 
+/// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a message of our vehicles.
+fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
+    match message {
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => {
+            // Beside one of ours it is a second vehicle, and what ours tells stays.
+            if vehicle.status.is_none() {
+                let foreign = vehicle.foreign.take();
+                *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), foreign, ..Vehicle::default() };
+                vehicle.heartbeat = Some(Sample::new(heartbeat(beat), now));
+            }
+            vehicle.foreign = Some(Foreign::of(beat, vehicle.foreign.take(), now));
+            true
+        }
+        MavMessage::HEARTBEAT(_) | MavMessage::TD_FLIGHT_STATUS(_) => false,
+        _ if vehicle.as_foreign().is_some() => {
+            if let Some(foreign) = &mut vehicle.foreign {
+                foreign.hear(message, now);
+            }
+            true
+        }
+        _ => false,
+    }
+}
+
 fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
     Heartbeat {
         armed: data.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
-        phase: phase_from_number(data.custom_mode),
+        phase: phase_of(data),
         terminated: data.system_status == MavState::MAV_STATE_FLIGHT_TERMINATION,
     }
+}
+
+/// The phase in a HEARTBEAT; `None` if another autopilot has sent it.
+pub fn phase_of(data: &HEARTBEAT_DATA) -> Option<TdPhase> {
+    phase_from_number(data.custom_mode).filter(|_| may_be_ours(data))
 }
 
 /// The phase for the `custom_mode` of a HEARTBEAT; `None` for a number that is not in the dialect.

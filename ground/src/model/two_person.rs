@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TdAct, TdRole};
 
 use super::Model;
+use super::permits::why_not_seat;
 
 /// An ask or a tap is shown for this long after the vehicle was last heard of it.
 const TOLD_FOR: Duration = Duration::from_secs(3);
@@ -49,9 +50,15 @@ impl Model {
         self.vehicle.crew.as_ref().map(|crew| crew.value.people)
     }
 
-    /// The number of our operator's key; 0 for an observer.
-    pub fn own_number(&self) -> u8 {
+    /// The number of the key that this station signs with; 0 without an operator's key.
+    pub fn key_number(&self) -> u8 {
         self.settings.key_owner.as_ref().map_or(0, |owner| owner.number)
+    }
+
+    /// The number of the key of who sits at this screen; 0 for anybody but its owner.
+    pub fn own_number(&self) -> u8 {
+        let is_owner = why_not_seat(self, &self.settings.seat).is_none();
+        if is_owner || self.settings.seat.screen == 0 { self.key_number() } else { 0 }
     }
 
     /// The role of an operator, as the vehicle tells it.
@@ -82,7 +89,7 @@ impl Model {
 
     /// The ask that our operator may confirm.
     pub fn ask_to_confirm(&self, now: Duration) -> Option<Ask> {
-        let own = self.own_number();
+        let own = self.key_number();
         let differs = |ask: &Ask| {
             ask.by != own && self.role_of(own).is_some() && self.role_of(own) != self.role_of(ask.by)
         };

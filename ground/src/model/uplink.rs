@@ -33,8 +33,12 @@ pub struct Uplink {
     answered_at: Option<Duration>,
     /// Whether this station armed the vehicle.
     pub armed_by_us: bool,
-    /// The station that armed the vehicle, if it is another.
+    /// The station that armed the vehicle, if it is another. It may have our address.
     pub armed_by_other: Option<Address>,
+    /// The session of that station.
+    other_session: u32,
+    /// Whether this vehicle tells the sessions of its stations.
+    pub(crate) tells_sessions: bool,
     /// The last refused frame.
     pub refused: Option<Refused>,
 }
@@ -63,8 +67,8 @@ impl Uplink {
     pub(crate) fn overhear(&mut self, told: &TD_UPLINK_DATA) {
         let station = Address { system_id: told.target_system, component_id: told.target_component };
         if told.commands == 1 {
-            self.armed_by_other = Some(station);
-        } else if self.armed_by_other == Some(station) {
+            (self.armed_by_other, self.other_session) = (Some(station), told.session);
+        } else if self.armed_by_other == Some(station) && self.other_session == told.session {
             self.armed_by_other = None;
         }
     }

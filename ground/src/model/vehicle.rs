@@ -9,12 +9,14 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 
-use super::boot::Boot;
+use super::boot::{Boot, GONE_AFTER};
 use super::flown_path::FlownPath;
+use super::foreign::Foreign;
 use super::motion::{Attitude, BodySpeed, Motion};
 use super::pad_check::PadCheck;
 use super::touchdown::Touchdown;
 use super::trend::Trend;
+use super::words;
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
@@ -147,6 +149,8 @@ pub struct Vehicle {
     pub left_pad_at: Option<Duration>,
     /// The present boot of the vehicle.
     pub boot: Boot,
+    /// The vehicle with another autopilot that was heard under this id.
+    pub foreign: Option<Foreign>,
 }
 
 impl Vehicle {
@@ -166,6 +170,23 @@ impl Vehicle {
     /// Whether it is armed, from its heartbeat; `None` before the first.
     pub fn armed(&self) -> Option<Sample<bool>> {
         self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
+    }
+
+    /// The vehicle, if it is none of ours: it has another autopilot, and has told no flight status.
+    pub fn as_foreign(&self) -> Option<&Foreign> {
+        self.foreign.as_ref().filter(|_| self.status.is_none())
+    }
+
+    /// The second vehicle that is heard under the same id, in words.
+    pub fn beside(&self, now: Duration) -> Option<String> {
+        let is_heard = |at: Duration| now.saturating_sub(at) < GONE_AFTER;
+        let ours = self.status.as_ref().is_some_and(|status| is_heard(status.received_at));
+        let foreign = self.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
+        match self.boot.of_another_vehicle(now) {
+            Some(0) => Some("one without a boot number".to_owned()),
+            Some(number) => Some(format!("boot {}", words::boot(number))),
+            None => foreign.map(Foreign::name),
+        }
     }
 
     /// Whether it has always reported to be simulated. Unknown counts as real.
@@ -196,6 +217,18 @@ impl Vehicle {
         let status = self.status.as_ref()?;
         let known = status.value.countdown_ms != i32::MAX;
         known.then(|| Sample::new(f64::from(status.value.countdown_ms) / 1_000.0, status.received_at))
+    }
+
+    /// The time before the release, s, from which on nothing holds the countdown; `None` if the vehicle does not tell it.
+    pub fn last_hold_s(&self) -> Option<f64> {
+        let told_ms = self.status.as_ref()?.value.last_hold_ms;
+        (told_ms > 0).then(|| f64::from(told_ms) / 1_000.0)
+    }
+
+    /// Whether the countdown runs and a hold comes too late.
+    pub fn is_past_hold(&self, now: Duration) -> bool {
+        let left_s = self.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
+        left_s.zip(self.last_hold_s()).is_some_and(|(left_s, last_s)| left_s <= last_s)
     }
 
     /// Position and velocity, from the better of its two sources.

@@ -12,7 +12,7 @@ use protocol::identity::Address;
 
 pub use super::log_events::RecordedEvent;
 use super::log_events::{LogEvents, Side};
-use crate::model::telemetry::phase_from_number;
+use crate::model::telemetry::phase_of as phase_of_heartbeat;
 
 /// How often the reading progress is reported, bytes.
 const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
@@ -199,7 +199,7 @@ impl RecordingClock {
 
 fn phase_of(frame: &Frame) -> Option<TdPhase> {
     match frame.decode().ok()? {
-        MavMessage::HEARTBEAT(data) => phase_from_number(data.custom_mode),
+        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(&data),
         MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
         _ => None,
     }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::{TdCheck, TdControlLevel, TdInterlock, TdPhase};
+use protocol::identity::Address;
 
 use protocol::log::record::EventLevel;
 
@@ -39,7 +40,14 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     }
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
-        if matches!(alarm.kind, AlarmKind::UplinkLost | AlarmKind::StationSilent) {
+        if matches!(
+            alarm.kind,
+            AlarmKind::UplinkLost
+                | AlarmKind::StationSilent
+                | AlarmKind::TwoVehicles
+                | AlarmKind::SameId
+                | AlarmKind::Foreign
+        ) {
             model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
         }
         model.outbox.push(Action::Alarm(alarm.text));
@@ -47,10 +55,15 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 }
 
 fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+    if model.link.is_station_gone() {
+        let text = "STATION GONE: this screen shows the past and commands nothing".to_owned();
+        found.push((AlarmKind::StationSilent, text));
+    }
     if model.link.station_silence(now).is_some() {
         let text = "STATION SILENT: it does not answer this screen, which shows the past".to_owned();
         found.push((AlarmKind::StationSilent, text));
     }
+    found.extend(identity_conditions(model, now));
     // A silent station says nothing about the link.
     let now = model.link.known_until(now);
     if let LinkState::Lost(_) = model.link.state(now) {
@@ -65,7 +78,7 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
     if model.link.abort_unsent {
-        let text = "ABORT NOT SENT, no station; asked again".to_owned();
+        let text = "ABORT NOT SENT: no station; the next one sends it, Esc cancels it".to_owned();
         found.push((AlarmKind::Unanswered(CommandKind::Abort), text));
     }
     if model.log.failed {
@@ -73,6 +86,26 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     } else if model.log.dropped > 0 {
         found.push((AlarmKind::Log, "LOG cannot keep up: records are lost".to_owned()));
     }
+}
+
+/// It is not certain which vehicle, or which station, is obeyed.
+fn identity_conditions(model: &Model, now: Duration) -> Vec<(AlarmKind, String)> {
+    let mut found = Vec::new();
+    let id = model.settings.vehicle.system_id;
+    if let Some(other) = model.vehicle.beside(now) {
+        let text = format!("TWO VEHICLES under id {id}: also {other}; only aborts are sent: switch one off");
+        found.push((AlarmKind::TwoVehicles, text));
+    } else if let Some(foreign) = model.vehicle.as_foreign() {
+        found.push((AlarmKind::Foreign, format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())));
+    }
+    if model.link.shares_our_id(now) {
+        let Address { system_id, component_id } = model.settings.us;
+        let text = format!(
+            "another station uses our id {system_id}/{component_id}: nothing is armed or started; give it another (--sysid)"
+        );
+        found.push((AlarmKind::SameId, text));
+    }
+    found
 }
 
 /// Whether the vehicle is heard and is known not to hear this station.
@@ -94,7 +127,8 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
     };
     // Old recordings contain no uplink reports, so there is no uplink to lose.
     let recorded = model.settings.role == Role::Replaying && !model.link.uplink.is_told();
-    silent && told && !recorded
+    // Another autopilot owes us no report.
+    silent && told && !recorded && model.vehicle.as_foreign().is_none()
 }
 
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {

@@ -8,6 +8,7 @@ use protocol::log::record::EventLevel;
 use super::commands;
 use crate::model::command::CommandKind;
 use crate::model::events::Speaker;
+use crate::model::permits::why_nothing_moves;
 use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model, words};
 
@@ -77,6 +78,9 @@ fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
 }
 
 fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<String> {
+    if let Some(why) = why_nothing_moves(model, now).filter(|_| model.vehicle.status.is_some()) {
+        return Some(why);
+    }
     let Some(status) = model.vehicle.status.as_ref() else {
         return Some("the vehicle has not reported its checks".to_owned());
     };
@@ -100,6 +104,11 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
 }
 
 fn start(model: &mut Model, now: Duration) {
+    if let Some(why) = why_nothing_moves(model, now) {
+        model.auto_step = AutoStep::Done;
+        model.outcome.refusal = Some((format!("START not sent: {why}"), now));
+        return model.warn(now, format!("automatic mode: not started: {why}"));
+    }
     model.info(now, "automatic mode: starting");
     model.auto_step = AutoStep::Done;
     if model.vehicle.countdown_s().is_none() {

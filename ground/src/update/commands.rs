@@ -33,6 +33,11 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         // The automatic mode ends when a person acts.
         model.auto_step = AutoStep::Done;
     }
+    if kind == CommandKind::Abort && model.vehicle.beside(now).is_some() {
+        let id = model.settings.vehicle.system_id;
+        model.warn(now, format!("the ABORT goes to every vehicle that is heard under id {id}"));
+    }
+    let commands = &mut model.commands;
     // An abort that is commanded again while it is being sent is sent at once, and its attempts keep counting.
     let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).cloned();
     let ticket = send(model, kind, now);
@@ -62,7 +67,8 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
     let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 3], MissionHash::to_params);
     let [param4, param5, param6] = mission;
-    let params = [param1, 0.0, number, param4, param5, param6, 0.0];
+    let boot = if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 };
+    let params = [param1, 0.0, number, param4, param5, param6, boot];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
 }
 

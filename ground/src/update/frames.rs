@@ -11,12 +11,12 @@ use protocol::text::Text;
 
 use super::{Action, book, commands, pad_check, vehicle_changes};
 use crate::model::events::Speaker;
-use crate::model::{Model, telemetry};
+use crate::model::{Model, Role, telemetry};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
-/// How often a second ground station with our ids is reported at most.
-const TWIN_REPORTED_EVERY: Duration = Duration::from_secs(10);
+/// A station that the vehicle heard this recently, ms, still counts as one that uses our address.
+const SAME_ID_WITHIN_MS: u16 = 5_000;
 /// How many other systems are remembered, so that each is reported once.
 const STRANGERS_MAX: usize = 8;
 
@@ -30,7 +30,7 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
             model.link.radio = Some((radio, now));
         }
     } else if frame.source() == model.settings.us {
-        note_twin(model, now);
+        on_own_address(model, frame, now);
     } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
     } else if frame.message_id() == HEARTBEAT_ID {
@@ -38,14 +38,13 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     }
 }
 
-fn note_twin(model: &mut Model, now: Duration) {
-    if model.link.twin_reported_at.is_none_or(|at| now.saturating_sub(at) >= TWIN_REPORTED_EVERY) {
-        model.link.twin_reported_at = Some(now);
-        let Address { system_id, component_id } = model.settings.us;
-        let words = format!(
-            "another ground station uses our ids {system_id}/{component_id}: acknowledgements may belong to it"
-        );
-        model.warn(now, words);
+/// A frame from our own address: an echo of ours, unless its session is another.
+fn on_own_address(model: &mut Model, frame: &Frame, now: Duration) {
+    if let Ok(MavMessage::HEARTBEAT(beat)) = frame.decode()
+        && beat.custom_mode != model.settings.session
+        && model.settings.role != Role::Replaying
+    {
+        model.link.same_id_at = Some(now);
     }
 }
 
@@ -138,15 +137,33 @@ pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
 
 /// A report of the vehicle about its uplink. Without a target it concerns every station: the vehicle has not accepted
 /// any frame yet.
+///
+/// A station believes what is said about its own session alone: another station may have its address. The session is unknown
+/// in a replay, and an older vehicle tells none.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
-    if model
-        .settings
-        .us
-        .accepts(Address { system_id: data.target_system, component_id: data.target_component })
-    {
-        model.link.uplink.hear(data, now);
+    let target = Address { system_id: data.target_system, component_id: data.target_component };
+    let to_all = target == Address { system_id: 0, component_id: 0 };
+    let status = model.vehicle.status.as_ref();
+    let is_old = status.is_some_and(|status| status.value.last_hold_ms == 0);
+    let Model { settings, link, .. } = model;
+    link.uplink.tells_sessions |= data.session != 0;
+    if !settings.us.accepts(target) {
+        return link.uplink.overhear(data);
+    }
+    let is_ours = to_all
+        || data.session == settings.session
+        || settings.role == Role::Replaying
+        || (data.session == 0 && is_old && !link.uplink.tells_sessions);
+    let another = data.session != 0 && data.accepted_age_ms <= SAME_ID_WITHIN_MS;
+    if settings.role != Role::Replaying && (data.same_id > 0 || (!is_ours && another)) {
+        let age = if is_ours { 0 } else { data.accepted_age_ms };
+        let at = now.saturating_sub(Duration::from_millis(age.into()));
+        link.same_id_at = link.same_id_at.max(Some(at));
+    }
+    if is_ours {
+        link.uplink.hear(data, now);
     } else {
-        model.link.uplink.overhear(data);
+        link.uplink.overhear(data);
     }
 }
 

@@ -19,7 +19,10 @@ use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::pad_check::{Standing, standing};
 use crate::model::page::Page;
-use crate::model::permits::{why_not_arm, why_not_check, why_not_confirm, why_not_start, why_not_take};
+use crate::model::permits::{
+    why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take,
+    why_nothing_moves,
+};
 use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
 use crate::model::{Model, Role, quantity};
@@ -83,6 +86,9 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         return entry::on_key(model, key, now);
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
+        Dialog::Closed if key == Key::Escape && std::mem::take(&mut model.link.abort_unsent) => {
+            model.warn(now, "the abort that was not sent is cancelled");
+        }
         Dialog::Closed => on_free_key(model, key, now),
         dialog => on_dialog_key(model, dialog, key, now),
     }
@@ -145,6 +151,7 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
         Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
         Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
+        Dialog::AbortForeign { .. } => ask(model, CommandKind::Abort, now),
         Dialog::Check { moves: true, .. } => ask(model, CommandKind::Check, now),
         Dialog::Check { moves: false, .. } => ask(model, CommandKind::CheckStill, now),
         Dialog::Sign { step, void, .. } => checklist::ask(model, (*step, *void), now),
@@ -223,6 +230,11 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         return model.info(now, why);
     }
     let shown = model.page();
+    if matches!(act, Act::Arm | Act::Start | Act::Disarm | Act::Tap | Act::TakeCommand)
+        && let Some(why) = why_not_here(model)
+    {
+        return model.warn(now, format!("this screen cannot {}: {why}", act.definition().name));
+    }
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
@@ -234,7 +246,13 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => model.dialog = Dialog::start(now),
             Some(why) => model.warn(now, format!("cannot start: {why}")),
         },
-        Act::Disarm => model.dialog = Dialog::disarm(now),
+        Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
+            None => model.dialog = Dialog::disarm(now),
+            Some(why) => model.warn(now, format!("cannot disarm: {why}")),
+        },
+        Act::HoldCountdown if model.vehicle.is_past_hold(now) && act.works(model, now) => {
+            model.warn(now, "too late for a hold: Ctrl-X, then Enter, aborts");
+        }
         Act::HoldCountdown if act.works(model, now) => model.dialog = Dialog::hold(now),
         Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
@@ -247,7 +265,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             Standing::JustEnded => {
                 model.info(now, "the check has just ended; press again in 3 s for another one");
             }
-            Standing::Rests => match why_not_check(model, now) {
+            Standing::Rests => match why_not_here(model).or_else(|| why_not_check(model, now)) {
                 None => {
                     model.pages.hold(Some(Page::Checks));
                     model.dialog = Dialog::check(act == Act::Check, now);
@@ -379,7 +397,9 @@ fn test_range(model: &mut Model, now: Duration) {
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
 pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
+    let theirs = why_not_seat(model, by).filter(|_| kind.needs_the_owner());
     let why_not = match kind {
+        _ if theirs.is_some() => theirs,
         CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
         CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
         CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
@@ -390,12 +410,15 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         }
         CommandKind::TakeCommand => why_not_take(model, now),
         CommandKind::Tap => {
-            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.own_number());
-            (!ours).then(|| "no tap of this operator is waited for".to_owned())
+            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.key_number());
+            let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
+            why_nothing_moves(model, now).or_else(none)
         }
         CommandKind::Check | CommandKind::CheckStill => {
             already_sent(model, kind, now).or_else(|| why_not_check(model, now))
         }
+        // It would cut the motors of somebody else's vehicle.
+        CommandKind::Disarm if model.vehicle.as_foreign().is_some() => why_nothing_moves(model, now),
         CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
     };
     match why_not {
@@ -416,6 +439,7 @@ fn tap(model: &mut Model, by: &Seat, now: Duration) {
         command,
         target_system: model.settings.vehicle.system_id,
         target_component: model.settings.vehicle.component_id,
+        param7: model.vehicle.boot.parameter(),
         ..COMMAND_LONG_DATA::default()
     })));
     model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
@@ -464,6 +488,11 @@ fn pass_abort_chord(model: &mut Model, now: Duration) {
 }
 
 fn abort(model: &mut Model, now: Duration) {
+    // What it does to somebody else's vehicle has to be read first.
+    if model.vehicle.as_foreign().is_some() {
+        model.dialog = Dialog::abort_foreign(now);
+        return;
+    }
     model.dialog = Dialog::Closed;
     ask(model, CommandKind::Abort, now);
 }

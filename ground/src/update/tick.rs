@@ -98,7 +98,7 @@ fn heartbeat(model: &mut Model, now: Duration) {
     let every = if must_be_heard(model, now) { FAST_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
     if is_due(&mut model.due.heartbeat, every, now) {
         model.outbox.push(Action::send(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-            custom_mode: 0,
+            custom_mode: model.settings.session,
             mavtype: MavType::MAV_TYPE_GCS,
             autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
             base_mode: MavModeFlag::empty(),

@@ -50,7 +50,8 @@ impl Announced {
 pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
-    let text = format!("the vehicle has rebooted{which}: all earlier values are dropped");
+    let what = if model.vehicle.boot.is_back() { "is heard alone again" } else { "has rebooted" };
+    let text = format!("the vehicle {what}{which}: all earlier values are dropped");
     model.warn(now, text);
     model.outcome = FlightSoFar { error: model.outcome.error.take(), ..FlightSoFar::default() };
     model.history = History::default();
@@ -58,7 +59,7 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
     model.alarms.vehicle_rebooted(now);
-    model.rebooted_at = Some(now);
+    model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
     // An open dialog was opened for the former boot.
     model.dialog = Dialog::Closed;
     let void = commands::restart_after_reboot(model, now);

@@ -22,7 +22,7 @@ const NAMED_ROWS: u16 = 10;
 /// Draws the lines that fit.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let mut lines = vec![
-        identity::line(model, theme),
+        identity::line(model, theme, now),
         Line::from(vec![
             top_lines::phase(model, theme, now),
             Span::raw(" "),
@@ -74,7 +74,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let line = top_lines::abort(model, theme, now);
-    if model.abort_chord.is_begun(now) {
+    if model.abort_chord.is_begun(now) || model.link.abort_unsent {
         return line;
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {

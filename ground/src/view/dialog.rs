@@ -11,8 +11,10 @@ use ratatui::widgets::{Block, Clear};
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
 use crate::model::act::Act;
-use crate::model::dialog::{ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD};
+use crate::model::dialog::{ABORT_WORD, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD};
+use crate::model::foreign::Foreign;
 use crate::model::pad_check::PadCheck;
+use crate::model::permits::why_not_here;
 use crate::model::two_person::role_name;
 use crate::model::words;
 use crate::model::{Model, Role};
@@ -62,6 +64,19 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 plain(ANY_OTHER_KEY.to_owned()),
             ],
         ),
+        Dialog::AbortForeign { typed, .. } => {
+            let foreign = model.vehicle.as_foreign();
+            let name = foreign.map_or_else(|| "The vehicle".to_owned(), Foreign::name);
+            let does = foreign.map_or("does not say what it does", Foreign::termination);
+            (
+                "ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE",
+                vec![
+                    strong(format!("{name}: flight termination {does}.")),
+                    strong(format!("Type {ABORT_WORD} and Enter within {left:.0} s:  [{typed:<5}]")),
+                    plain(ANY_OTHER_KEY.to_owned()),
+                ],
+            )
+        }
         Dialog::Hold { .. } => (
             "HOLD the countdown",
             vec![
@@ -165,7 +180,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, V
         }
         let key = keys.name(if ask.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm });
         let words = match model.ask_to_confirm(now) {
-            Some(_) if model.settings.role.why_not_command().is_none() => strong(format!(
+            Some(_) if why_not_here(model).is_none() => strong(format!(
                 "Press {key} within {left_s:.0} s, then type {CONFIRM_WORD} and Enter to confirm."
             )),
             _ => plain(format!("Another role must confirm within {left_s:.0} s; not this screen.")),
@@ -174,7 +189,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, V
     }
     let (by, left) = model.tapping(now)?;
     let left_s = left.as_secs_f64();
-    if by == own && model.settings.role.why_not_command().is_none() {
+    if by == own && why_not_here(model).is_none() {
         let key = keys.name(Act::Tap);
         let words = format!("Tap {key}: {left_s:.1} s left, or the countdown is held.");
         return Some(("TAP at least every 2 s", vec![strong(words)]));

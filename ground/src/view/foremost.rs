@@ -11,7 +11,7 @@ use super::theme::TextRole;
 use crate::model::Model;
 use crate::model::dead_reckoning::{is_unheard, predict_position};
 use crate::model::motor::{KeepAway, hold_words};
-use crate::model::permits::why_other_mission;
+use crate::model::permits::{why_nothing_moves, why_other_mission};
 use crate::model::vehicle::{Sample, is_on_pad};
 
 /// The most letters of a word on the pad, as in `STAY OFF`.
@@ -26,6 +26,9 @@ pub fn pad(model: &Model, now: Duration) -> Vec<Item> {
 fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let vehicle = &model.vehicle;
     let word = |text: &str, role| (text.to_owned(), role);
+    if vehicle.as_foreign().is_some() {
+        return word("NOT OURS", TextRole::Alarm);
+    }
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
@@ -44,7 +47,7 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     if vehicle.armed().is_some_and(|armed| armed.value) {
         return word("ARMED", TextRole::Alarm);
     }
-    let other_mission = why_other_mission(model).is_some();
+    let other_mission = why_other_mission(model).is_some() || why_nothing_moves(model, now).is_some();
     let unsigned = model.why_checklist(now).is_some();
     if other_mission
         || unsigned

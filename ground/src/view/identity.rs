@@ -1,5 +1,7 @@
 //! The first line of every screen: mode, vehicle and boot, station and link, and who commands.
 
+use std::time::Duration;
+
 use protocol::identity::Address;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -15,18 +17,18 @@ const MODE_COLUMNS: u16 = 12;
 const CREW_COLUMNS: u16 = 14;
 
 /// Draws the line; each part has a fixed place.
-pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
-    let vehicle = vehicle(model);
-    let crew = crew(model, theme);
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let vehicle = vehicle(model, theme, now);
+    let crew = crew(model, theme, now);
     let crew_columns = CREW_COLUMNS.max(crew.width() as u16);
     let [mode_area, vehicle_area, station_area, crew_area] = area.layout(&Layout::horizontal([
         Constraint::Length(MODE_COLUMNS),
-        Constraint::Length(vehicle.len() as u16 + 1),
+        Constraint::Length(vehicle.width() as u16 + 1),
         Constraint::Fill(1),
         Constraint::Length(crew_columns),
     ]));
     draw_line(frame, mode_area, mode(model, theme).into());
-    draw_line(frame, vehicle_area, Line::styled(vehicle, theme.style(TextRole::Plain)));
+    draw_line(frame, vehicle_area, vehicle.into());
     let Address { system_id, component_id } = model.settings.us;
     let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
     draw_line(frame, station_area, Line::styled(station, theme.style(TextRole::Label)));
@@ -34,13 +36,19 @@ pub fn draw(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
 }
 
 /// The same for narrow screens.
-pub fn line(model: &Model, theme: Theme) -> Line<'static> {
+pub fn line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(words) = doubt(model, now) {
+        return Line::from(vec![
+            mode(model, theme),
+            Span::styled(format!(" {words}"), theme.style(TextRole::Alarm)),
+        ]);
+    }
     let number = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
     let system = model.settings.vehicle.system_id;
     Line::from(vec![
         mode(model, theme),
         Span::styled(format!(" {system} {number} "), theme.style(TextRole::Plain)),
-        crew(model, theme),
+        crew(model, theme, now),
         Span::styled(format!(" {}", model.settings.link_name), theme.style(TextRole::Label)),
     ])
 }
@@ -60,10 +68,23 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
     Span::styled(format!(" {word}"), theme.style(role))
 }
 
-fn vehicle(model: &Model) -> String {
+/// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
+fn doubt(model: &Model, now: Duration) -> Option<String> {
+    let id = model.settings.vehicle.system_id;
+    if model.vehicle.beside(now).is_some() {
+        return Some(format!("TWO VEHICLES under id {id}"));
+    }
+    model.vehicle.as_foreign().map(|foreign| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()))
+}
+
+fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    if let Some(words) = doubt(model, now) {
+        return Span::styled(words, theme.style(TextRole::Alarm));
+    }
     let boot = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
     let name = model.settings.vehicle_name.as_deref().unwrap_or_default();
-    format!("system {} boot {boot} {name}", model.settings.vehicle.system_id)
+    let words = format!("system {} boot {boot} {name}", model.settings.vehicle.system_id);
+    Span::styled(words, theme.style(TextRole::Plain))
 }
 
 /// Whether other screens than this one can command.
@@ -72,9 +93,15 @@ fn others_can_command(model: &Model) -> bool {
 }
 
 /// Who commands: another station that armed the vehicle, otherwise who can command here.
-fn crew(model: &Model, theme: Theme) -> Span<'static> {
+fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    if model.link.station_gone_for(now).is_some() {
+        return Span::styled(" NO STATION", theme.style(TextRole::Alarm));
+    }
     if let Some(people) = model.people() {
         let who = match model.own_number() {
+            0 if model.settings.role == Role::Attached && model.key_number() > 0 => {
+                "HOLD/ABORT ONLY".to_owned()
+            }
             0 => "OBSERVER".to_owned(),
             number => model.operator(number),
         };
@@ -82,14 +109,17 @@ fn crew(model: &Model, theme: Theme) -> Span<'static> {
         return Span::styled(format!(" {who} {mode}"), theme.style(TextRole::Title));
     }
     if let Some(other) = model.link.uplink.armed_by_other {
-        let text = format!("armed {}/{}", other.system_id, other.component_id);
+        // Another station under our own id is not this one.
+        let whose = if other == model.settings.us { "by another " } else { "" };
+        let text = format!("armed {whose}{}/{}", other.system_id, other.component_id);
         return Span::styled(format!(" {text}"), theme.style(TextRole::Caution));
     }
     let text = match model.settings.role {
         Role::Replaying => "nobody".to_owned(),
         _ if others_can_command(model) => format!("by {}", model.crew.names().join(",")),
         Role::Watching => "watches only".to_owned(),
-        _ if model.link.uplink.armed_by_us => "armed here".to_owned(),
+        _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
+        _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
         _ => "commands here".to_owned(),
     };
     Span::styled(format!(" {text}"), theme.style(TextRole::Plain))

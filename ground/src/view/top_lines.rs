@@ -5,13 +5,14 @@ use std::time::Duration;
 use ratatui::text::{Line, Span};
 
 use super::next_event;
-use super::number::{STALE_MARK, age_mark};
+use super::number::{STALE_MARK, age_mark, shortest};
 use super::theme::{TextRole, Theme};
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
+use crate::model::foreign::Foreign;
 use crate::model::link_state::LinkState;
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::pad_check::{Standing, standing};
-use crate::model::permits::why_other_mission;
+use crate::model::permits::{why_nothing_moves, why_other_mission};
 use crate::model::{Model, Role, abort_too_late, words};
 
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
@@ -22,6 +23,7 @@ pub const ABORT_KEY: &str = "Ctrl-X Enter";
 /// The key that aborts from this screen, or why none does.
 pub fn abort_key(model: &Model) -> String {
     match model.settings.role {
+        Role::Attached if model.link.is_station_gone() => "NO STATION".to_owned(),
         Role::Station | Role::Attached => format!("ABORT {ABORT_KEY}"),
         Role::Watching => "WATCHING only".to_owned(),
         Role::Replaying => "REPLAY".to_owned(),
@@ -31,6 +33,10 @@ pub fn abort_key(model: &Model) -> String {
 /// The phase, with its age.
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.phase() {
+        None if model.vehicle.as_foreign().is_some() => {
+            let mode = model.vehicle.as_foreign().map(Foreign::mode).unwrap_or_default();
+            Span::styled(format!(" {mode}"), theme.style(TextRole::Plain))
+        }
         None => Span::styled(" no vehicle", theme.style(TextRole::Label)),
         Some(phase) => {
             let (mark, stale) = age_mark(&phase, now);
@@ -73,6 +79,9 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// Both directions of the link, each with the age of its last frame: hearing the vehicle does not prove that it hears
 /// us. Whole seconds, because heartbeats come only once a second. On an attached screen, that its station is silent.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if let Some(gone) = model.link.station_gone_for(now) {
+        return Line::styled(format!("STATION GONE {}s", gone.as_secs()), theme.style(TextRole::Alarm));
+    }
     if let Some(silence) = model.link.station_silence(now) {
         let words = format!("STATION SILENT {}s", silence.as_secs());
         return Line::styled(words, theme.style(TextRole::Alarm));
@@ -105,6 +114,10 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 /// What an abort would do now, or the progress of the commanded abort.
 pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if model.link.abort_unsent {
+        let words = " ABORT NOT SENT: no station. The next one sends it; Esc cancels it";
+        return Line::styled(words, theme.style(TextRole::Alarm));
+    }
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
         return Line::styled(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), theme.style(TextRole::Alarm));
@@ -112,14 +125,30 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return command_facts(track, theme, now);
     }
-    Line::from(vec![
+    let mut spans = vec![
         Span::styled(" abort now: ", theme.style(TextRole::Label)),
         Span::styled(effect, theme.style(TextRole::Plain)),
-    ])
+    ];
+    spans.extend(hold_until(model, now).map(|words| Span::styled(words, theme.style(TextRole::Caution))));
+    Line::from(spans)
+}
+
+/// In the countdown: until when a hold works.
+fn hold_until(model: &Model, now: Duration) -> Option<String> {
+    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    let last_s = model.vehicle.last_hold_s().filter(|_| counts)?;
+    let late = model.vehicle.is_past_hold(now);
+    Some(if late { "; TOO LATE to hold".to_owned() } else { format!("; hold until T-{}", shortest(last_s)) })
 }
 
 /// What an abort would do now, marked if the report is stale.
 fn abort_effect(model: &Model, now: Duration) -> String {
+    if model.link.is_station_gone() {
+        return "NOT SENT: no station; kept for the next one".to_owned();
+    }
+    if let Some(foreign) = model.vehicle.as_foreign() {
+        return foreign.termination().to_owned();
+    }
     let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
     if let Some(why) = abort_too_late::reason(model, now) {
         return why.to_owned();
@@ -272,6 +301,9 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     let status = model.vehicle.status.as_ref()?;
     if status.is_stale(now) {
         return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
+    }
+    if let Some(why) = why_nothing_moves(model, now) {
+        return Some((format!("NO-GO: {why}"), TextRole::Caution));
     }
     let failing = words::failed_checks(status.value.checks_failed);
     if !failing.is_empty() {

@@ -37,7 +37,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             Constraint::Length(1),
             Constraint::Length(1),
         ]));
-    identity::draw(model, theme, frame, identity);
+    identity::draw(model, theme, now, frame, identity);
     draw_status(model, theme, now, frame, status);
     draw_line(frame, abort, top_lines::abort(model, theme, now));
     draw_line(frame, command, top_lines::command(model, theme, now));

@@ -224,7 +224,7 @@ fn alarms_are_listed_and_acknowledged_one_by_one() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("[9Alarms]") && screen.contains("2 of 2 not seen"), "{screen}");
     assert!(
-        screen.contains(">ALARM        DEGRADED") && screen.contains(" ALARM        NO LIGHT"),
+        screen.contains(" ALARM        DEGRADED") && screen.contains(">ALARM        NO LIGHT"),
         "{screen}"
     );
     rig.keys(&[Key::Up, Key::Char(' ')]);

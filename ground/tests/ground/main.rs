@@ -30,3 +30,4 @@ mod terminal;
 mod two_person;
 mod uplink;
 mod voice;
+mod who;

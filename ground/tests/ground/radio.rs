@@ -50,7 +50,7 @@ fn a_second_ground_station_with_our_ids_is_reported_rarely() {
         rig.run(0.1);
         rig.hear_from(GROUND, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     }
-    assert_eq!(rig.events().matches("another ground station").count(), 1);
+    assert_eq!(rig.events().matches("another station uses our id 255/190").count(), 1);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use ground::replay::player::Player;
 use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
 use ground::view::view;
-use protocol::dialect::{HEARTBEAT_DATA, MavMessage, TdPhase};
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TdPhase};
 use protocol::frame::Encoder;
 use protocol::identity::{GROUND, VEHICLE};
 use ratatui::Terminal;
@@ -21,6 +21,16 @@ use ratatui::style::Modifier;
 
 use crate::keys::ladder;
 use crate::rig::{MONO, settings};
+
+/// The heartbeat of one of our vehicles.
+fn beat(custom_mode: u32) -> HEARTBEAT_DATA {
+    HEARTBEAT_DATA {
+        custom_mode,
+        mavtype: MavType::MAV_TYPE_ROCKET,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+        ..HEARTBEAT_DATA::default()
+    }
+}
 
 const S: fn(u64) -> Duration = Duration::from_secs;
 
@@ -35,7 +45,7 @@ static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
             40..50 => TdPhase::TD_PHASE_POWERED,
             _ => TdPhase::TD_PHASE_TOUCHDOWN,
         };
-        let heartbeat = HEARTBEAT_DATA { custom_mode: phase as u32, ..HEARTBEAT_DATA::default() };
+        let heartbeat = beat(phase as u32);
         bytes.extend((1_000_000 * second).to_be_bytes());
         bytes.extend(encoder.encode(&MavMessage::HEARTBEAT(heartbeat)).as_bytes());
     }
@@ -167,7 +177,7 @@ fn a_tlog_is_played_up_to_its_damage() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("flight.tlog");
     let (mut vehicle, mut ground) = (Encoder::new(VEHICLE), Encoder::new(GROUND));
-    let heartbeat = MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 9, ..HEARTBEAT_DATA::default() });
+    let heartbeat = MavMessage::HEARTBEAT(beat(9));
     let mut bytes = Vec::new();
     for (stamp_us, ours) in [(7_000_000_u64, false), (7_400_000, true), (9_000_000, false)] {
         let encoder = if ours { &mut ground } else { &mut vehicle };
@@ -212,14 +222,7 @@ fn a_long_tlog_is_played_in_bounded_memory() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.tlog");
     let mut encoder = Encoder::new(VEHICLE);
-    let frames: Vec<_> = (0..=u8::MAX)
-        .map(|_| {
-            encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-                custom_mode: 9,
-                ..HEARTBEAT_DATA::default()
-            }))
-        })
-        .collect();
+    let frames: Vec<_> = (0..=u8::MAX).map(|_| encoder.encode(&MavMessage::HEARTBEAT(beat(9)))).collect();
     let mut bytes = Vec::new();
     for (number, frame) in (0..1_240_000_u64).zip(frames.iter().cycle()) {
         bytes.extend((1_760_000_000_000_000 + 10_000 * number).to_be_bytes());

@@ -2,6 +2,7 @@
 
 use ground::key::Key;
 use ground::model::Settings;
+use ground::model::seat::Seat;
 use ground::model::two_person::KeyOwner;
 use ground::update::Msg;
 use protocol::dialect::{
@@ -26,6 +27,7 @@ fn characters<const N: usize>(text: &str) -> [u8; N] {
 fn station_of(number: u8, mission: Option<&str>) -> Rig {
     let name = if number == ANN { "Ann" } else { "Bob" };
     let mut rig = Rig::new(Settings {
+        seat: Seat::new(1, name),
         key_owner: (number > 0).then(|| KeyOwner { number, name: name.to_owned() }),
         mission: mission.map(MissionHash::of),
         ..settings(false, true)

@@ -32,7 +32,9 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
     );
     let KeyRing { key, .. } = KeyRing::open(cli)?;
     let clock = Clock::start();
-    let mut wire = Wire::open(cli.us(), cli.connect.clone(), key, clock, None, LogTime::Run(clock)).await?;
+    let mut wire =
+        Wire::open((cli.us(), cli.vehicle()), cli.connect.clone(), key, clock, None, LogTime::Run(clock))
+            .await?;
     let mut downloading =
         Downloading::begin(name, folder.to_owned(), (cli.us(), cli.vehicle()), clock.start_unix_ns());
     let mut signals = Signals::listen()?;
@@ -58,7 +60,7 @@ pub(in crate::app) async fn run(cli: &Cli, name: Option<&str>, folder: &Path) ->
         }
         let (messages, word) = downloading.poll(now);
         for message in &messages {
-            wire.send(message);
+            wire.send(message, 0);
         }
         match word {
             Some(Word::Done(path)) => {

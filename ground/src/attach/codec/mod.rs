@@ -39,7 +39,7 @@ pub fn encode_to_screen(told: &ToScreen, now: Duration) -> Option<Vec<u8>> {
         ToScreen::Hello(hello) => {
             out.kind(0).u32(hello.version).u32(hello.screen).u8(u8::from(hello.auto));
             out.u8(u8::from(hello.demonstration)).u32(hello.link_capacity_bytes_s);
-            out.u8(hello.system_ids[0]).u8(hello.system_ids[1]);
+            out.u8(hello.system_ids[0]).u8(hello.system_ids[1]).u32(hello.session);
             out.text(&hello.link_name).text(&hello.log_path).text(&hello.tlog_path);
             out.u8(hello.key_number).text(&hello.key_owner);
             out.u8(u8::from(hello.mission.is_some()));
@@ -232,6 +232,7 @@ fn hello(rest: &mut Reader) -> Result<Hello, CodecError> {
         demonstration: rest.u8()? != 0,
         link_capacity_bytes_s: rest.u32()?,
         system_ids: [rest.u8()?, rest.u8()?],
+        session: rest.u32()?,
         link_name: rest.text()?,
         log_path: rest.text()?,
         tlog_path: rest.text()?,

@@ -6,6 +6,7 @@ pub mod checks;
 pub mod descent;
 pub mod find;
 pub mod flying;
+pub mod foreign;
 pub mod help;
 pub mod landing;
 pub mod link;
@@ -33,7 +34,7 @@ use crate::model::page::Page;
 /// Draws the present page between the top lines and the alarm line.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     match model.page() {
-        Page::Pad => pad::draw(model, theme, now, frame, area),
+        Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw(model, theme, now, frame, area),
         Page::Ascent => ascent::draw(model, theme, now, frame, area),
         Page::Descent => descent::draw(model, theme, now, frame, area),
         Page::Landing => landing::draw(model, theme, now, frame, area),
@@ -52,7 +53,10 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
-        Page::Pad => pad::lines(model, theme, now),
+        Page::Pad => match model.vehicle.as_foreign() {
+            Some(vehicle) => foreign::lines(vehicle, theme, now),
+            None => pad::lines(model, theme, now),
+        },
         Page::Ascent => ascent::lines(model, theme, now),
         Page::Descent => descent::lines(model, theme, now),
         Page::Landing => landing::lines(model, theme, now, columns, rows),

@@ -11,6 +11,7 @@ use super::{is_roomy, titled};
 use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::command::CommandKind;
+use crate::model::permits::why_not_here;
 use crate::model::vehicle::{Vehicle, is_on_pad};
 use crate::model::words;
 use crate::view::number::{STALE_MARK, fixed};
@@ -306,7 +307,9 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
         lines.push(Line::styled(words, theme.style(TextRole::Plain)));
     }
-    lines.push(match model.settings.role.why_not_command() {
+    let watches = model.settings.role.why_not_command();
+    let only_stops = why_not_here(model).map(|_| "HOLD and ABORT only from here");
+    lines.push(match watches.or(only_stops) {
         Some(why) => Line::styled(format!(" {why}"), theme.style(TextRole::Label)),
         None => Line::from(vec![
             Span::styled(format!(" {}", keys.name(Act::Disarm)), theme.style(TextRole::Key)),

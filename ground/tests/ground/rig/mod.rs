@@ -25,6 +25,9 @@ use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 
+/// The session of the station.
+pub(crate) const SESSION: u32 = 77;
+
 pub(crate) const MONO: Theme = Theme { palette: Palette::None, ascii: false };
 
 pub(crate) struct Rig {
@@ -49,6 +52,8 @@ pub(crate) struct Rig {
     pub(crate) speaks: bool,
     /// Whether it reports that it hears this station.
     pub(crate) hears: bool,
+    /// Whether it was this station that armed it.
+    pub(crate) armed_here: bool,
     heard_at: Duration,
     encoder: Encoder,
 }
@@ -73,6 +78,7 @@ impl Rig {
             hold: TdHold::TD_HOLD_NONE,
             speaks: true,
             hears: true,
+            armed_here: true,
             heard_at: Duration::ZERO,
             encoder: Encoder::new(VEHICLE),
         }
@@ -219,7 +225,7 @@ impl Rig {
             self.heard_at = fresh;
         }
         let age_ms = (self.now.saturating_sub(self.heard_at)).as_millis().min(65_534) as u16;
-        self.uplink_of(GROUND, age_ms, self.armed);
+        self.uplink_of(GROUND, age_ms, self.armed && self.armed_here);
     }
 
     pub(crate) fn uplink_of(&mut self, station: Address, accepted_age_ms: u16, commands: bool) {
@@ -230,6 +236,7 @@ impl Rig {
             target_system: station.system_id,
             target_component: station.component_id,
             commands: u8::from(commands),
+            session: if station == GROUND { SESSION } else { 0 },
             ..TD_UPLINK_DATA::default()
         }));
     }
@@ -345,7 +352,7 @@ fn letter(cell: &Cell) -> char {
 
 pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {
     let log_path = Some("flight.mcap".to_owned());
-    Settings { log_path, auto, interactive, ..Settings::on_screen("udpin:127.0.0.1:14550") }
+    Settings { log_path, auto, interactive, session: SESSION, ..Settings::on_screen("udpin:127.0.0.1:14550") }
 }
 
 pub(crate) fn is_arm(command: &COMMAND_LONG_DATA) -> bool {

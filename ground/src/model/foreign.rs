@@ -1,0 +1,281 @@
+//! A vehicle with another autopilot: it is shown as what its standard messages say, and never armed or started from here.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType};
+
+use super::vehicle::Sample;
+use super::words;
+
+/// The most names of modes that are kept; PX4 and ArduPilot have about thirty.
+const MODES_MAX: usize = 64;
+
+/// What another autopilot tells in standard messages.
+#[derive(Debug, Clone)]
+pub struct Foreign {
+    pub autopilot: MavAutopilot,
+    pub mavtype: MavType,
+    pub armed: bool,
+    custom_mode: u32,
+    /// `AVAILABLE_MODES`: names by number.
+    modes: BTreeMap<u32, String>,
+    /// The last heartbeat.
+    pub heard_at: Duration,
+    /// The newest text of each message, with its name.
+    pub told: BTreeMap<&'static str, Sample<String>>,
+}
+
+/// Whether a heartbeat is one that our vehicles send. Whether it is ours only its `TD_FLIGHT_STATUS` shows.
+pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
+    beat.autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC && beat.mavtype == MavType::MAV_TYPE_ROCKET
+}
+
+impl Foreign {
+    pub(crate) fn of(beat: &HEARTBEAT_DATA, before: Option<Self>, now: Duration) -> Self {
+        let same =
+            before.filter(|before| (before.autopilot, before.mavtype) == (beat.autopilot, beat.mavtype));
+        let (modes, told) = same.map_or_else(Default::default, |same| (same.modes, same.told));
+        Self {
+            autopilot: beat.autopilot,
+            mavtype: beat.mavtype,
+            armed: beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
+            custom_mode: beat.custom_mode,
+            modes,
+            heard_at: now,
+            told,
+        }
+    }
+
+    /// Takes another standard message.
+    pub(crate) fn hear(&mut self, message: &MavMessage, now: Duration) {
+        let degrees = |rad: f32| f64::from(rad).to_degrees();
+        let (name, text) = match message {
+            MavMessage::AVAILABLE_MODES(mode) if self.modes.len() < MODES_MAX => {
+                let end = mode.mode_name.iter().position(|byte| *byte == 0).unwrap_or(mode.mode_name.len());
+                self.modes.insert(mode.custom_mode, protocol::text::printable(&mode.mode_name[..end]));
+                return;
+            }
+            MavMessage::CURRENT_MODE(mode) => {
+                self.custom_mode = mode.custom_mode;
+                return;
+            }
+            MavMessage::ATTITUDE(data) => {
+                let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(degrees);
+                ("attitude", format!("roll {roll:.0} deg, pitch {pitch:.0} deg, yaw {yaw:.0} deg"))
+            }
+            MavMessage::GLOBAL_POSITION_INT(data) => {
+                let [latitude, longitude] = [data.lat, data.lon].map(|e7| f64::from(e7) * 1e-7);
+                let [above_home_m, above_sea_m] =
+                    [data.relative_alt, data.alt].map(|mm| f64::from(mm) * 1e-3);
+                let place = format!("{latitude:.6}, {longitude:.6}");
+                ("position", format!("{place}, {above_home_m:.1} m above home, {above_sea_m:.0} m above sea"))
+            }
+            MavMessage::VFR_HUD(data) => {
+                let (speed, climb, throttle) = (data.groundspeed, data.climb, data.throttle);
+                ("speed", format!("{speed:.1} m/s over ground, climbs {climb:.1} m/s, throttle {throttle} %"))
+            }
+            MavMessage::GPS_RAW_INT(data) => {
+                let fix = words::lower_case(&data.fix_type, "GPS_FIX_TYPE_");
+                ("GNSS", format!("{fix}, {} satellites", data.satellites_visible))
+            }
+            MavMessage::SYS_STATUS(data) => {
+                ("battery", battery(data.voltage_battery, data.battery_remaining))
+            }
+            MavMessage::BATTERY_STATUS(data) => {
+                let cells = data.voltages.iter().filter(|millivolts| **millivolts != u16::MAX);
+                let millivolts = cells.fold(0_u16, |sum, cell| sum.saturating_add(*cell));
+                let known = if millivolts == 0 { u16::MAX } else { millivolts };
+                ("battery", battery(known, data.battery_remaining))
+            }
+            _ => return,
+        };
+        self.told.insert(name, Sample::new(text, now));
+    }
+
+    /// As in `ArduPilot quadrotor`.
+    pub fn name(&self) -> String {
+        let autopilot = match self.autopilot {
+            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => "ArduPilot".to_owned(),
+            MavAutopilot::MAV_AUTOPILOT_PX4 => "PX4".to_owned(),
+            other => words::lower_case(&other, "MAV_AUTOPILOT_"),
+        };
+        format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
+    }
+
+    /// The name of its mode: as it tells it, otherwise from the tables of the two great autopilots.
+    pub fn mode(&self) -> String {
+        let told = self.modes.get(&self.custom_mode).filter(|name| !name.is_empty()).map(String::as_str);
+        let known = || match self.autopilot {
+            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => ardupilot_mode(self.mavtype, self.custom_mode),
+            MavAutopilot::MAV_AUTOPILOT_PX4 => px4_mode(self.custom_mode),
+            _ => None,
+        };
+        told.or_else(known).map_or_else(|| format!("mode {}", self.custom_mode), str::to_owned)
+    }
+
+    /// What `MAV_CMD_DO_FLIGHTTERMINATION` would do there.
+    pub fn termination(&self) -> &'static str {
+        match self.mavtype {
+            _ if turns_rotors(self.mavtype) => "CUTS ITS MOTORS: in the air it falls",
+            MavType::MAV_TYPE_FIXED_WING => "stops its motor and sets its surfaces to crash",
+            MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => "stops it where it is",
+            _ => "ends its flight as it is set to: it may fall",
+        }
+    }
+}
+
+fn battery(millivolts: u16, percent: i8) -> String {
+    let volts = if millivolts == u16::MAX {
+        "voltage not told".to_owned()
+    } else {
+        format!("{:.2} V", f64::from(millivolts) * 1e-3)
+    };
+    if percent < 0 { volts } else { format!("{volts}, {percent} % left") }
+}
+
+fn turns_rotors(mavtype: MavType) -> bool {
+    matches!(
+        mavtype,
+        MavType::MAV_TYPE_QUADROTOR
+            | MavType::MAV_TYPE_HEXAROTOR
+            | MavType::MAV_TYPE_OCTOROTOR
+            | MavType::MAV_TYPE_TRICOPTER
+            | MavType::MAV_TYPE_DODECAROTOR
+            | MavType::MAV_TYPE_DECAROTOR
+            | MavType::MAV_TYPE_HELICOPTER
+            | MavType::MAV_TYPE_COAXIAL
+    )
+}
+
+/// <https://ardupilot.org/copter/docs/parameters.html#fltmode1>, and the same pages for plane and rover. Only what people
+/// fly: other modes are shown by number.
+fn ardupilot_mode(mavtype: MavType, number: u32) -> Option<&'static str> {
+    let copter = [
+        "STABILIZE",
+        "ACRO",
+        "ALT_HOLD",
+        "AUTO",
+        "GUIDED",
+        "LOITER",
+        "RTL",
+        "CIRCLE",
+        "",
+        "LAND",
+        "",
+        "DRIFT",
+        "",
+        "SPORT",
+        "FLIP",
+        "AUTOTUNE",
+        "POSHOLD",
+        "BRAKE",
+        "THROW",
+        "AVOID_ADSB",
+        "GUIDED_NOGPS",
+        "SMART_RTL",
+    ];
+    let plane = [
+        "MANUAL",
+        "CIRCLE",
+        "STABILIZE",
+        "TRAINING",
+        "ACRO",
+        "FBWA",
+        "FBWB",
+        "CRUISE",
+        "AUTOTUNE",
+        "",
+        "AUTO",
+        "RTL",
+        "LOITER",
+        "TAKEOFF",
+        "AVOID_ADSB",
+        "GUIDED",
+        "",
+        "QSTABILIZE",
+        "QHOVER",
+        "QLOITER",
+        "QLAND",
+        "QRTL",
+    ];
+    let rover = [
+        "MANUAL",
+        "ACRO",
+        "",
+        "STEERING",
+        "HOLD",
+        "LOITER",
+        "FOLLOW",
+        "SIMPLE",
+        "",
+        "",
+        "AUTO",
+        "RTL",
+        "SMART_RTL",
+    ];
+    let table: &[&str] = match mavtype {
+        MavType::MAV_TYPE_FIXED_WING => &plane,
+        MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => &rover,
+        _ if turns_rotors(mavtype) => &copter,
+        _ => &[],
+    };
+    table.get(usize::try_from(number).ok()?).copied().filter(|name| !name.is_empty())
+}
+
+/// PX4 packs a main mode into the third byte and a sub-mode into the fourth (`px4_custom_mode.h`).
+fn px4_mode(number: u32) -> Option<&'static str> {
+    let [_, _, main, sub] = number.to_le_bytes();
+    Some(match (main, sub) {
+        (1, _) => "MANUAL",
+        (2, _) => "ALTITUDE",
+        (3, _) => "POSITION",
+        (4, 1) => "READY",
+        (4, 2) => "TAKEOFF",
+        (4, 3) => "HOLD",
+        (4, 4) => "MISSION",
+        (4, 5) => "RETURN",
+        (4, 6) => "LAND",
+        (5, _) => "ACRO",
+        (6, _) => "OFFBOARD",
+        (7, _) => "STABILIZED",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beat(autopilot: MavAutopilot, mavtype: MavType, custom_mode: u32) -> HEARTBEAT_DATA {
+        HEARTBEAT_DATA { autopilot, mavtype, custom_mode, ..HEARTBEAT_DATA::default() }
+    }
+
+    /// The numbers are those of the autopilots' own documentation.
+    #[test]
+    fn val_ardupilot_and_px4_modes_have_their_names() {
+        use {MavAutopilot as A, MavType as T};
+        for (autopilot, mavtype, number, name) in [
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 1, "ACRO"),
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_HEXAROTOR, 6, "RTL"),
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 9, "LAND"),
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 8, "mode 8"),
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_FIXED_WING, 5, "FBWA"),
+            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_GROUND_ROVER, 4, "HOLD"),
+            (A::MAV_AUTOPILOT_PX4, T::MAV_TYPE_QUADROTOR, 0x0304_0000, "HOLD"),
+            (A::MAV_AUTOPILOT_PX4, T::MAV_TYPE_FIXED_WING, 0x0001_0000, "MANUAL"),
+            (A::MAV_AUTOPILOT_GENERIC, T::MAV_TYPE_QUADROTOR, 3, "mode 3"),
+        ] {
+            let foreign = Foreign::of(&beat(autopilot, mavtype, number), None, Duration::ZERO);
+            assert_eq!(foreign.mode(), name, "{}", foreign.name());
+        }
+    }
+
+    #[test]
+    fn only_the_heartbeat_of_a_rocket_without_a_known_autopilot_may_be_ours() {
+        use {MavAutopilot as A, MavType as T};
+        assert!(may_be_ours(&beat(A::MAV_AUTOPILOT_GENERIC, T::MAV_TYPE_ROCKET, 0)));
+        assert!(!may_be_ours(&beat(A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_ROCKET, 0)));
+        assert!(!may_be_ours(&beat(A::MAV_AUTOPILOT_GENERIC, T::MAV_TYPE_QUADROTOR, 0)));
+    }
+}

@@ -1,0 +1,553 @@
+//! Who commands which vehicle: two vehicles under one id, two stations under one id, whose key a screen uses, and vehicles
+//! with another autopilot.
+
+use std::time::Duration;
+
+use ground::key::Key;
+use ground::model::command::CommandKind;
+use ground::model::seat::Seat;
+use ground::model::two_person::KeyOwner;
+use ground::model::{Role, Settings};
+use ground::update::{Action, Msg, Request};
+use protocol::dialect::{
+    ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
+    MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_OPERATOR_DATA, TD_UPLINK_DATA,
+    TIMESYNC_DATA, TdAct, TdInterlock, TdPhase, TdRole, VFR_HUD_DATA,
+};
+use protocol::identity::GROUND;
+
+use crate::keys::ladder;
+use crate::rig::{Rig, SESSION, is_abort, is_arm, settings, typed};
+
+const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
+const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+const TAP: MavCmd = MavCmd::MAV_CMD_TD_TAP;
+const TAKE: MavCmd = MavCmd::MAV_CMD_TD_TAKE_COMMAND;
+const CHECK: MavCmd = MavCmd::MAV_CMD_TD_PAD_CHECK;
+
+/// Whether it can make something move or light.
+fn moves(command: &COMMAND_LONG_DATA) -> bool {
+    match command.command {
+        ARM | CHECK => command.param1 > 0.5,
+        START | TAP | TAKE => true,
+        _ => false,
+    }
+}
+
+fn first_line(rig: &Rig, columns: u16, rows: u16) -> String {
+    rig.screen(columns, rows).lines().next().unwrap_or_default().to_owned()
+}
+
+/// The vehicle of the rig and a second one under its id, for some seconds.
+fn beside(rig: &mut Rig, boot_number: u32, seconds: u32) {
+    for _ in 0..10 * seconds {
+        rig.run(0.1);
+        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+            boot_number,
+            time_boot_ms: 900_000 + rig.boot_ms(),
+            phase: TdPhase::TD_PHASE_PAD_IDLE,
+            interlocks: TdInterlock::TD_INTERLOCK_PIN_OUT,
+            countdown_ms: i32::MAX,
+            ..TD_FLIGHT_STATUS_DATA::default()
+        }));
+    }
+}
+
+#[test]
+fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
+    let mut rig = Rig::crewed();
+    beside(&mut rig, 9, 2);
+    for page in "123456789?".chars() {
+        rig.key(Key::Char(page));
+        for (columns, rows) in [(80, 24), (140, 45), (40, 12)] {
+            let line = first_line(&rig, columns, rows);
+            assert!(line.contains("TWO VEHICLES under id 1"), "{page}: {line}");
+        }
+    }
+    rig.key(Key::Char('1'));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("NO-GO: TWO VEHICLES") && !screen.contains(" GO: "), "{screen}");
+    rig.take_commands();
+    rig.keys(&ladder());
+    rig.keys(&[typed("CTAKE"), vec![Key::Enter], typed("X"), vec![Key::Enter]].concat());
+    for kind in CommandKind::ALL {
+        rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+    }
+    rig.abort();
+    let sent = rig.take_commands();
+    assert!(!sent.iter().any(moves), "{sent:?}");
+    assert!(sent.iter().any(is_abort));
+    assert!(rig.events().contains("cannot arm: TWO VEHICLES under id 1: switch one off"), "{}", rig.events());
+    assert!(rig.events().contains("the ABORT goes to every vehicle that is heard under id 1"));
+}
+
+/// The crew switches the second vehicle off, whichever is shown.
+#[test]
+fn two_vehicles_end_when_one_is_silent() {
+    let mut rig = Rig::crewed();
+    beside(&mut rig, 9, 2);
+    assert_eq!(rig.model.vehicle.boot.number(), Some(9));
+    rig.run(11.0);
+    assert!(first_line(&rig, 80, 24).contains("boot 1A2B3C4D"), "{}", first_line(&rig, 80, 24));
+    assert!(rig.events().contains("is heard alone again, boot 1A2B3C4D"), "{}", rig.events());
+    assert!(rig.screen(80, 24).contains(" GO: every arming check passes"), "{}", rig.screen(80, 24));
+    rig.take_commands();
+    rig.keys(&ladder());
+    assert!(rig.take_commands().iter().any(is_arm));
+}
+
+#[test]
+fn what_can_move_something_names_the_boot_and_what_stops_does_not() {
+    let mut rig = Rig::new(settings(false, true));
+    rig.boot_number = 0x00AB_CDEF;
+    rig.run(1.0);
+    for kind in [CommandKind::Arm, CommandKind::Check, CommandKind::CheckStill] {
+        rig.msg(Msg::Requested { kind, by: Seat::default() });
+        rig.run(1.0);
+    }
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.armed_here = false;
+    rig.run(1.0);
+    for kind in [CommandKind::Start, CommandKind::TakeCommand, CommandKind::Hold, CommandKind::EndCheck] {
+        rig.msg(Msg::Requested { kind, by: Seat::default() });
+    }
+    rig.msg(Msg::Requested { kind: CommandKind::Disarm, by: Seat::default() });
+    rig.msg(Msg::Requested { kind: CommandKind::Abort, by: Seat::default() });
+    let sent = rig.take_commands();
+    for command in [ARM, CHECK, START, TAKE] {
+        assert!(sent.iter().any(|sent| sent.command == command && moves(sent)), "{command:?}");
+    }
+    for command in sent {
+        let boot = if moves(&command) { 11_259_375.0_f32 } else { 0.0 };
+        assert_eq!(command.param7.to_bits(), boot.to_bits(), "{command:?}");
+    }
+}
+
+/// A report of the vehicle about a station with our address.
+fn report(rig: &mut Rig, session: u32, same_id: u8, commands: bool, accepted_age_ms: u16) {
+    rig.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+        accepted_age_ms,
+        refused_age_ms: u16::MAX,
+        target_system: GROUND.system_id,
+        target_component: GROUND.component_id,
+        commands: u8::from(commands),
+        session,
+        same_id,
+        ..TD_UPLINK_DATA::default()
+    }));
+}
+
+#[test]
+fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_is_gone() {
+    let frame = |rig: &mut Rig| {
+        rig.hear_from(
+            GROUND,
+            &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 5, ..HEARTBEAT_DATA::default() }),
+        );
+    };
+    let of_another = |rig: &mut Rig| report(rig, 5, 0, false, 100);
+    let counted = |rig: &mut Rig| report(rig, SESSION, 1, false, 100);
+    let signs: [fn(&mut Rig); 3] = [frame, of_another, counted];
+    for sign in signs {
+        let mut rig = Rig::crewed();
+        sign(&mut rig);
+        rig.run(0.2);
+        let screen = rig.screen(100, 30);
+        assert!(screen.contains("ALARM another station uses our id 255/190"), "{screen}");
+        assert!(!screen.contains(" GO: "), "{screen}");
+        rig.keys(&ladder());
+        assert_eq!(rig.take_commands(), []);
+        rig.run(10.0);
+        rig.keys(&ladder());
+        assert!(rig.take_commands().iter().any(is_arm));
+    }
+}
+
+#[test]
+fn an_echo_of_our_own_frames_and_a_station_that_has_long_been_silent_are_no_other_station() {
+    let mut rig = Rig::crewed();
+    let echo = HEARTBEAT_DATA { custom_mode: SESSION, ..HEARTBEAT_DATA::default() };
+    rig.hear_from(GROUND, &MavMessage::HEARTBEAT(echo));
+    report(&mut rig, 5, 0, false, 5_100);
+    rig.run(0.1);
+    rig.keys(&ladder());
+    assert!(rig.take_commands().iter().any(is_arm), "{}", rig.events());
+}
+
+/// The other one armed and started, and dies in the countdown.
+#[test]
+fn what_another_session_armed_is_never_armed_here() {
+    let mut rig = Rig::crewed();
+    rig.armed_here = false;
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.countdown_ms = 8_000;
+    for tenth in 0..100 {
+        report(&mut rig, 5, 0, true, tenth * 100);
+        rig.run(0.1);
+        for (columns, rows) in [(80, 24), (140, 45), (40, 12)] {
+            let screen = rig.screen(columns, rows);
+            assert!(!screen.contains("armed here"), "{screen}");
+        }
+    }
+    assert!(first_line(&rig, 100, 30).contains("armed by another 255/190"), "{}", first_line(&rig, 100, 30));
+    // Without a screen here, the countdown of the other one is not held from here.
+    rig.msg(Msg::Crew(vec![Seat::new(1, "ann")]));
+    rig.msg(Msg::Crew(Vec::new()));
+    rig.take_commands();
+    rig.run(5.0);
+    assert_eq!(rig.take_commands(), []);
+}
+
+#[test]
+fn the_heartbeat_tells_the_session_of_the_station() {
+    let mut rig = Rig::crewed();
+    let beat = rig.actions.iter().find_map(|action| match action {
+        Action::Send(message) => match &**message {
+            MavMessage::HEARTBEAT(beat) => Some(beat.custom_mode),
+            _ => None,
+        },
+        _ => None,
+    });
+    assert_eq!(beat, Some(SESSION));
+    rig.actions.clear();
+}
+
+/// A station that signs as Ann, or, without her, as an observer.
+fn station_of(number: u8, name: &str, role: Role, operator: &str) -> Rig {
+    let mut rig = Rig::new(Settings {
+        seat: Seat::new(1, operator),
+        role,
+        key_owner: (number > 0).then(|| KeyOwner { number, name: name.to_owned() }),
+        ..settings(false, true)
+    });
+    rig.run(1.0);
+    for (number, role, name) in [(1, TdRole::TD_ROLE_RANGE_SAFETY, "Ann"), (2, TdRole::TD_ROLE_FLIGHT, "Bob")]
+    {
+        let mut bytes = [0; 16];
+        bytes[..3].copy_from_slice(name.as_bytes());
+        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { number, role, name: bytes.into() }));
+    }
+    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() }));
+    rig
+}
+
+#[test]
+fn a_screen_of_another_operator_says_beforehand_that_it_only_stops_and_the_station_refuses_the_rest() {
+    let mut screen = station_of(1, "Ann", Role::Attached, "Bob");
+    let shown = screen.screen(80, 24);
+    assert!(shown.contains("HOLD/ABORT ONLY TWO-PERSON"), "{shown}");
+    assert!(shown.contains("HOLD and ABORT only from here"), "{shown}");
+    screen.actions.clear();
+    for key in "ASDTCXE".chars() {
+        screen.keys(&[
+            Key::Char(key),
+            Key::Char('A'),
+            Key::Char('R'),
+            Key::Char('M'),
+            Key::Enter,
+            Key::Escape,
+        ]);
+    }
+    let asked =
+        |rig: &Rig| rig.actions.iter().any(|action| matches!(action, Action::Request(Request::Command(_))));
+    assert!(!asked(&screen), "{:?}", screen.actions);
+    let said = "this screen cannot arm: this station signs as Ann";
+    assert!(screen.events().contains(said), "{}", screen.events());
+    screen.abort();
+    assert!(screen.actions.contains(&Action::Request(Request::Command(CommandKind::Abort))));
+    // The station does not rely on the screen.
+    let mut station = station_of(1, "Ann", Role::Station, "Ann");
+    station.take_commands();
+    for operator in ["Bob", "", "ann", "flight on pts/3"] {
+        for kind in CommandKind::ALL.into_iter().filter(|kind| kind.needs_the_owner()) {
+            station.msg(Msg::Requested { kind, by: Seat::new(2, operator) });
+        }
+    }
+    assert_eq!(station.take_commands(), []);
+    assert!(station.events().contains("cannot arm: this station signs as Ann"), "{}", station.events());
+    station.msg(Msg::Requested { kind: CommandKind::Hold, by: Seat::new(2, "Bob") });
+    station.msg(Msg::Requested { kind: CommandKind::Abort, by: Seat::new(2, "Bob") });
+    assert_eq!(station.take_commands().len(), 2);
+    station.run(1.0);
+    station.msg(Msg::Requested { kind: CommandKind::Arm, by: Seat::new(3, "Ann") });
+    assert!(station.take_commands().iter().any(is_arm), "Ann attaches a second screen");
+}
+
+#[test]
+fn an_observer_s_station_holds_and_aborts_and_a_watcher_does_not() {
+    let mut observer = station_of(0, "", Role::Station, "Cyd");
+    let shown = observer.screen(80, 24);
+    assert!(shown.contains("OBSERVER") && shown.contains("ABORT Ctrl-X Enter"), "{shown}");
+    assert!(shown.contains("HOLD and ABORT only from here"), "{shown}");
+    observer.take_commands();
+    observer.keys(&[Key::Char('D'), Key::Enter]);
+    assert_eq!(observer.take_commands(), []);
+    observer.countdown_ms = 9_000;
+    observer.run(0.2);
+    observer.keys(&[Key::Char('H'), Key::Enter]);
+    observer.abort();
+    assert_eq!(observer.take_commands().iter().filter(|sent| !is_abort(sent)).count(), 1);
+    let watcher = station_of(0, "", Role::Watching, "Cyd").screen(80, 24);
+    assert!(watcher.contains("WATCHING only") && !watcher.contains("ABORT Ctrl-X"), "{watcher}");
+}
+
+fn copter(custom_mode: u32) -> MavMessage {
+    MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode,
+        mavtype: MavType::MAV_TYPE_QUADROTOR,
+        autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
+        ..HEARTBEAT_DATA::default()
+    })
+}
+
+/// It answers TIMESYNC, so that its uplink is proven.
+fn answer_timesync(rig: &mut Rig) {
+    let ts1 = i64::try_from(rig.now.as_nanos()).unwrap_or(0);
+    rig.now += Duration::from_millis(20);
+    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
+}
+
+/// A copter in a mode whose number is a phase of ours: ACRO is PAD_IDLE, LAND is POWERED.
+fn beside_a_copter() -> Rig {
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    for mode in [1, 9, 6, 0, 1] {
+        rig.hear(&copter(mode));
+        rig.hear(&MavMessage::VFR_HUD(VFR_HUD_DATA { alt: 584.0, climb: 1.5, ..VFR_HUD_DATA::default() }));
+        rig.hear(&MavMessage::ATTITUDE(ATTITUDE_DATA { roll: 0.1, ..ATTITUDE_DATA::default() }));
+        rig.hear(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+            lat: 473_977_420,
+            lon: 85_455_940,
+            alt: 584_000,
+            relative_alt: 12_500,
+            ..GLOBAL_POSITION_INT_DATA::default()
+        }));
+        answer_timesync(&mut rig);
+        rig.run(0.1);
+    }
+    rig
+}
+
+#[test]
+fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
+    let mut rig = beside_a_copter();
+    assert!(rig.model.link.uplink.is_proven(rig.now), "or this test proves nothing");
+    assert!(rig.model.vehicle.phase().is_none() && rig.model.vehicle.height_m().is_none());
+    for (columns, rows) in [(80, 24), (40, 12)] {
+        let line = first_line(&rig, columns, rows);
+        assert!(line.contains("NOT A TOUCHDOWN VEHICLE: Ardu"), "{line}");
+    }
+    let screen = rig.screen(80, 24);
+    for words in ["ACRO", "ARMED", "12.5 m above home", "roll 6 deg", "CUTS ITS MOTORS"] {
+        assert!(screen.contains(words), "{words}: {screen}");
+    }
+    assert!(!screen.contains("PAD_IDLE") && !screen.contains(" GO"), "{screen}");
+    rig.take_commands();
+    rig.keys(&ladder());
+    rig.keys(&[Key::Char('D'), Key::Enter]);
+    for kind in CommandKind::ALL.into_iter().filter(|kind| *kind != CommandKind::Abort) {
+        rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+    }
+    assert!(!rig.take_commands().iter().any(|sent| moves(sent) || sent.command == ARM));
+    assert!(
+        rig.events().contains("cannot arm: not a Touchdown vehicle: ArduPilot quadrotor"),
+        "{}",
+        rig.events()
+    );
+}
+
+#[test]
+fn an_abort_of_a_copter_asks_first_and_says_what_it_would_do() {
+    let mut rig = beside_a_copter();
+    rig.take_commands();
+    rig.abort();
+    assert_eq!(rig.take_commands(), []);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("ArduPilot quadrotor: flight termination CUTS ITS MOTORS"), "{screen}");
+    rig.keys(&[typed("ABORT"), vec![Key::Enter]].concat());
+    assert!(rig.take_commands().iter().any(is_abort));
+}
+
+/// Before its first flight status it may still be somebody else's.
+#[test]
+fn a_heartbeat_alone_does_not_make_a_vehicle_ours() {
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    rig.heartbeat();
+    answer_timesync(&mut rig);
+    rig.keys(&ladder());
+    assert_eq!(rig.take_commands(), []);
+    assert!(rig.events().contains("it has told no flight status"), "{}", rig.events());
+    rig.flight_status();
+    rig.uplink();
+    rig.keys(&ladder());
+    assert!(rig.take_commands().iter().any(is_arm), "{}", rig.events());
+}
+
+#[test]
+fn a_copter_beside_our_vehicle_under_its_id_is_a_second_vehicle() {
+    let mut rig = Rig::crewed();
+    rig.hear(&copter(1));
+    rig.run(0.1);
+    assert!(first_line(&rig, 80, 24).contains("TWO VEHICLES under id 1"), "{}", first_line(&rig, 80, 24));
+    assert!(rig.screen(80, 24).contains("PAD_IDLE"), "what ours tells stays");
+    rig.keys(&ladder());
+    assert_eq!(rig.take_commands(), []);
+    rig.abort();
+    assert!(rig.take_commands().iter().any(is_abort), "at once: one of them is ours");
+}
+
+/// SplitMix64 (Steele, Lea and Flood, 2014).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (mixed ^ (mixed >> 31)) % bound
+    }
+
+    fn of<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.below(choices.len() as u64) as usize]
+    }
+}
+
+/// A million random steps of two stations with their screens and one vehicle: nothing that can move is ever sent for a seat
+/// that is not the owner of the station's key, and what the vehicle takes for two people is never one.
+#[test]
+fn no_screen_acts_with_the_key_of_another_person() {
+    const PEOPLE: [&str; 6] = ["Ann", "Bob", "Cyd", "", "ann", "Ann on pts/3"];
+    const KINDS: [CommandKind; 12] = CommandKind::ALL;
+    let mut random = Random(1);
+    let mut stations =
+        [(1, "Ann"), (2, "Bob")].map(|(number, name)| station_of(number, name, Role::Station, name));
+    // The ask that waits at the vehicle: the key, and the person who really asked.
+    let mut waits: Option<(u8, &str)> = None;
+    let (mut sent, mut agreed) = (0, 0);
+    for step in 0..1_000_000_u32 {
+        let place = random.below(2) as usize;
+        let (key, owner) = [(1, "Ann"), (2, "Bob")][place];
+        let station = &mut stations[place];
+        station.now += Duration::from_millis(random.below(200));
+        if step % 64 < 8 {
+            station.armed = random.below(2) == 1;
+            station.armed_here = random.below(2) == 1;
+            station.phase =
+                if station.armed { TdPhase::TD_PHASE_PAD_ARMED } else { TdPhase::TD_PHASE_PAD_IDLE };
+            station.countdown_ms = random.of(&[i32::MAX, 5_000]);
+            station.heartbeat();
+            station.flight_status();
+            station.uplink();
+            let act = random.of(&[TdAct::TD_ACT_NONE, TdAct::TD_ACT_ARM, TdAct::TD_ACT_START]);
+            let asked_by = waits.map_or(0, |(key, _)| key);
+            station.hear(&MavMessage::TD_CREW(TD_CREW_DATA {
+                people: 2,
+                ask_number: 7,
+                ask_left_ms: 9_000,
+                act: if asked_by > 0 { act } else { TdAct::TD_ACT_NONE },
+                asked_by,
+                tapped_by: random.below(3) as u8,
+                tap_left_ms: 2_000,
+                ..TD_CREW_DATA::default()
+            }));
+            station.msg(Msg::Tick);
+            station.actions.clear();
+            continue;
+        }
+        let by = random.of(&PEOPLE);
+        let kind = random.of(&KINDS);
+        station.msg(Msg::Requested { kind, by: Seat::new(1 + random.below(4) as u32, by) });
+        for command in
+            station.take_commands().iter().filter(|command| moves(command) && command.confirmation == 0)
+        {
+            assert_eq!(by, owner, "step {step}: {kind:?} {command:?}");
+            sent += 1;
+            match waits {
+                _ if command.command != ARM => {}
+                Some((asked, person)) if command.param3 > 0.0 && asked != key => {
+                    assert_ne!(person, by, "step {step}: one person is two");
+                    agreed += 1;
+                    waits = None;
+                }
+                _ => waits = Some((key, by)),
+            }
+        }
+    }
+    assert!(sent > 1_000 && agreed > 100, "{sent} sent, {agreed} agreed: or this proves nothing");
+}
+
+/// A million random steps of vehicles with other autopilots, which may send anything, also our own messages: they are never
+/// armed or started.
+#[test]
+fn no_foreign_vehicle_is_ever_armed_or_started() {
+    const AUTOPILOTS: [MavAutopilot; 4] = [
+        MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        MavAutopilot::MAV_AUTOPILOT_PX4,
+        MavAutopilot::MAV_AUTOPILOT_INVALID,
+        MavAutopilot::MAV_AUTOPILOT_GENERIC,
+    ];
+    const TYPES: [MavType; 4] = [
+        MavType::MAV_TYPE_QUADROTOR,
+        MavType::MAV_TYPE_FIXED_WING,
+        MavType::MAV_TYPE_ROCKET,
+        MavType::MAV_TYPE_GENERIC,
+    ];
+    let mut random = Random(2);
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    let mut aborts = 0;
+    for step in 0..1_000_000_u32 {
+        rig.now += Duration::from_millis(random.below(100));
+        match random.below(8) {
+            // Like any vehicle it sends a heartbeat at least now and then.
+            0..=2 => {
+                let autopilot = random.of(&AUTOPILOTS);
+                let mut mavtype = random.of(&TYPES);
+                if autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC && mavtype == MavType::MAV_TYPE_ROCKET {
+                    mavtype = MavType::MAV_TYPE_QUADROTOR;
+                }
+                let armed = random.below(2) == 1;
+                rig.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                    custom_mode: random.below(14) as u32,
+                    autopilot,
+                    mavtype,
+                    base_mode: if armed {
+                        MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED
+                    } else {
+                        MavModeFlag::empty()
+                    },
+                    ..HEARTBEAT_DATA::default()
+                }));
+            }
+            3 => answer_timesync(&mut rig),
+            4 if random.below(4) == 0 => {
+                rig.boot_number = random.below(3) as u32;
+                rig.phase = random.of(&[TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED]);
+                rig.flight_status();
+                rig.uplink();
+            }
+            5 => rig.keys(
+                &random
+                    .of(&[['A', 'A', 'R', 'M'], ['S', 'T', 'A', 'R'], ['C', 'X', 'E', 'T']])
+                    .map(Key::Char),
+            ),
+            6 => rig.key(Key::Enter),
+            _ => {
+                let kind = random.of(&CommandKind::ALL);
+                rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+            }
+        }
+        if step % 16 == 0 {
+            rig.msg(Msg::Tick);
+        }
+        for command in rig.take_commands() {
+            assert!(!moves(&command), "step {step}: {command:?}");
+            aborts += u32::from(is_abort(&command));
+        }
+    }
+    assert!(aborts > 1_000, "{aborts} aborts: or this proves nothing");
+}
