@@ -18,7 +18,7 @@ fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_s
     watching.wait_for("GO: every arming check passes");
     first.signal(Signal::SIGKILL);
     first.wait();
-    screen.wait_for("LINK DOWN: the ground station of this screen is gone");
+    screen.wait_for("STATION GONE: this screen shows the past");
     // This page has no list of events.
     screen.type_bytes(b"2");
     screen.wait_for("[2Descent]");

@@ -75,7 +75,7 @@ fn stations_are_listed_and_stopped_and_an_armed_one_only_by_force() {
     assert_eq!(stopped.code, Some(0), "{}", stopped.output);
     assert!(stopped.output.contains("held.mcap"), "{}", stopped.output);
     assert!(station.run(&["status"]).output.contains("no ground station of yours runs"));
-    screen.wait_for("LINK DOWN: the ground station of this screen is gone");
+    screen.wait_for("STATION GONE: this screen shows the past");
     let ended = station.daemon.wait();
     assert!(ended.output.contains("ARM commanded, attempt 1 (screen 1, anna)"), "{}", ended.output);
 }
