@@ -22,6 +22,7 @@ pub enum Key {
     CtrlC,
     CtrlL,
     CtrlX,
+    CtrlY,
 }
 
 impl Key {
@@ -42,6 +43,7 @@ impl Key {
             KeyCode::Char('c' | 'C') if ctrl => Some(Self::CtrlC),
             KeyCode::Char('l' | 'L') if ctrl => Some(Self::CtrlL),
             KeyCode::Char('x' | 'X') if ctrl => Some(Self::CtrlX),
+            KeyCode::Char('y' | 'Y') if ctrl => Some(Self::CtrlY),
             KeyCode::Char(c) if !ctrl && !c.is_control() => {
                 // Some terminals report the key with Shift instead of the capital letter.
                 let shift = event.modifiers.contains(KeyModifiers::SHIFT);
@@ -98,6 +100,7 @@ impl Key {
             Self::CtrlC => "Ctrl-C".to_owned(),
             Self::CtrlL => "Ctrl-L".to_owned(),
             Self::CtrlX => "Ctrl-X".to_owned(),
+            Self::CtrlY => "Ctrl-Y".to_owned(),
         }
     }
 }

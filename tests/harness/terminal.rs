@@ -29,6 +29,12 @@ const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
 /// A crew that sees no effect of its keys types them again after this time.
 const RETYPE_AFTER: Duration = Duration::from_secs(3);
+/// The program asks this when the keys of a word came faster than a hand types.
+const HURRIED_QUESTION: &str = "DID YOU TYPE THIS?";
+/// A person reads the question before answering it.
+const READING_TIME: Duration = Duration::from_millis(800);
+/// How long a bad connection holds keys back.
+const STALL: Duration = Duration::from_millis(500);
 /// The pause between two keys that a person types.
 const KEY_INTERVAL: Duration = Duration::from_millis(150);
 
@@ -116,16 +122,44 @@ impl Terminal {
         }
     }
 
-    /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine two keys may
-    /// arrive together and are then ignored by the program.
+    /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine keys may arrive
+    /// together, and the program asks whether a person typed them: it is told so.
     pub fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
         for typed in 1..=20 {
             self.type_by_hand(keys);
+            self.confirm_if_asked(words);
             if self.wait_within(RETYPE_AFTER, |window| window.shows(words).then_some(())).is_some() {
                 return typed;
             }
         }
         panic!("no `{words}` on:\n{}", self.window().rows().join("\n"));
+    }
+
+    /// Waits until these words are shown, or the question whether a person typed the keys, and answers the question.
+    /// Returns whether it was asked.
+    pub fn confirm_if_asked(&mut self, words: &str) -> bool {
+        let asked = self.wait_within(RETYPE_AFTER, |window| {
+            let asked = window.shows(HURRIED_QUESTION);
+            (asked || window.shows(words)).then_some(asked)
+        });
+        if asked == Some(true) {
+            pause(READING_TIME);
+            self.type_bytes(b"\x19");
+        }
+        asked == Some(true)
+    }
+
+    /// Types these keys by hand over a connection that delivers them in pieces of these lengths, each after a stall of
+    /// half a second.
+    pub fn type_in_bunches(&mut self, keys: &[u8], lengths: &[usize]) {
+        let mut rest = keys;
+        for length in lengths {
+            let (bunch, later) = rest.split_at(*length);
+            pause(STALL);
+            self.type_bytes(bunch);
+            rest = later;
+        }
+        assert!(rest.is_empty(), "the lengths are those of all keys");
     }
 
     /// Holds a key down for this many repeats. The keyboard repeats it after half a second and then every 33 ms.

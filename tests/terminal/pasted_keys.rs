@@ -1,8 +1,9 @@
-//! Pasted text, held keys and bytes that arrive too fast: only typed keys arm, start or quit.
+//! Pasted text, held keys and bytes that arrive too fast: they arm, start or quit nothing by themselves, and keys that
+//! a bad connection delivers in bunches are not lost.
 
 use std::process::Command;
 
-use e2e::{START, Signal, Terminal};
+use e2e::{ARM, START, Signal, Terminal};
 
 use super::rig::{Rig, SIZE, ground};
 
@@ -30,6 +31,23 @@ fn a_paste_into_an_armed_station_starts_nothing() {
     rig.terminal.wait_for("a paste was dropped");
     rig.wait_for_keys();
     assert_eq!(rig.sent(START, 0.0), 0, "a countdown was started by a paste");
+}
+
+/// A connection that holds typed keys back for half a second at a time.
+#[test]
+fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
+    let mut rig = Rig::new("paper-calibrated");
+    rig.terminal.wait_for("GO: every arming check passes");
+    rig.terminal.type_in_bunches(b"AARM\r", &[2, 3]);
+    assert!(rig.terminal.confirm_if_asked(" ARMED "), "keys that came together were taken for typed ones");
+    rig.terminal.wait_for("[x] armed, says HEARTBEAT");
+    rig.terminal.type_in_bunches(b"SSTART\r", &[1, 4, 2]);
+    assert!(rig.terminal.confirm_if_asked("START  commanded"));
+    rig.wait_for_fact("START", "observed yes");
+    assert_eq!(rig.sent(ARM, 1.0), 1);
+    // What holds or disarms is not asked again.
+    rig.terminal.type_in_bunches(b"D\r", &[2]);
+    rig.terminal.wait_for(" disarmed");
 }
 
 /// A console that does not put brackets around pasted text.

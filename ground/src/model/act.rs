@@ -220,4 +220,25 @@ impl Act {
                 | Self::VoidStep
         )
     }
+
+    /// Whether it changes only what is shown, or opens a dialog: it works however fast its key arrives.
+    pub fn only_shows_or_asks(self, model: &Model) -> bool {
+        match self {
+            Self::Tap | Self::RangeTest => false,
+            Self::Quit => model.is_at_risk(),
+            act if act.opens_ladder() => true,
+            act => matches!(
+                act,
+                Self::Checklist
+                    | Self::Show(_)
+                    | Self::Hold
+                    | Self::Follow
+                    | Self::Filter
+                    | Self::Palette
+                    | Self::Pin
+                    | Self::NextTheme
+                    | Self::Redraw
+            ),
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::two_person::Ask;
+use crate::key::Key;
 
 /// How long the crew has to type the word that arms.
 pub const ARM_TIME_LIMIT: Duration = Duration::from_secs(10);
@@ -23,6 +24,14 @@ pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
 pub const QUIT_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// The word that quits while the vehicle is armed or in flight.
 pub const QUIT_WORD: &str = "QUIT";
+/// The key that confirms what was completed by keys that arrived faster than a hand types; no text contains it.
+pub const AGAIN_KEY: Key = Key::CtrlY;
+/// That key counts this long after the question: a paste has no such pause before it, and who reads first needs longer.
+pub const AGAIN_AFTER: Duration = Duration::from_millis(500);
+/// How long the crew has for that key.
+pub const AGAIN_TIME_LIMIT: Duration = Duration::from_secs(10);
+/// Letters of a word whose dialog does not open, or has closed, are swallowed for this long after the one before.
+const REST_WITHIN: Duration = Duration::from_secs(1);
 
 /// The open dialog. It accepts the next letter of its word (in either case), or Enter after the whole word. Any other
 /// key closes it. The abort chord works in every dialog.
@@ -83,6 +92,13 @@ pub enum Dialog {
         typed: String,
         until: Duration,
     },
+    /// Keys that arrived faster than a hand types have completed a dialog: [`AGAIN_KEY`] confirms it.
+    Again {
+        of: Box<Dialog>,
+        /// The key counts from this time on.
+        from: Duration,
+        until: Duration,
+    },
 }
 
 impl Dialog {
@@ -126,6 +142,16 @@ impl Dialog {
         Self::Quit { typed: String::new(), until: now + QUIT_TIME_LIMIT }
     }
 
+    /// The question whether the keys that completed this dialog were typed by a person.
+    pub fn again(self, now: Duration) -> Self {
+        Self::Again { of: Box::new(self), from: now + AGAIN_AFTER, until: now + AGAIN_TIME_LIMIT }
+    }
+
+    /// Whether it acts only on keys that were typed by hand, or else asks again. Whatever stops something acts at once.
+    pub fn needs_a_hand(&self) -> bool {
+        !matches!(self, Self::Hold { .. } | Self::Disarm { .. } | Self::AbortForeign { .. })
+    }
+
     /// When the dialog closes by itself.
     pub fn until(&self) -> Option<Duration> {
         match self {
@@ -139,7 +165,8 @@ impl Dialog {
             | Self::Hold { until }
             | Self::Check { until, .. }
             | Self::Sign { until, .. }
-            | Self::Quit { until, .. } => Some(*until),
+            | Self::Quit { until, .. }
+            | Self::Again { until, .. } => Some(*until),
         }
     }
 
@@ -158,6 +185,7 @@ impl Dialog {
             Self::Sign { void: false, .. } => "signature",
             Self::Sign { void: true, .. } => "voiding",
             Self::Quit { .. } => "quit",
+            Self::Again { of, .. } => of.name(),
         }
     }
 
@@ -168,7 +196,8 @@ impl Dialog {
             | Self::Disarm { .. }
             | Self::Hold { .. }
             | Self::Check { .. }
-            | Self::Sign { .. } => None,
+            | Self::Sign { .. }
+            | Self::Again { .. } => None,
             Self::Confirm { .. } => Some(CONFIRM_WORD),
             Self::TakeCommand { .. } => Some(TAKE_WORD),
             Self::AbortForeign { .. } => Some(ABORT_WORD),
@@ -181,14 +210,22 @@ impl Dialog {
     /// Whether Enter now confirms.
     pub fn is_complete(&self) -> bool {
         match self {
-            Self::Closed => false,
+            Self::Closed | Self::Again { .. } => false,
             Self::Disarm { .. } | Self::Hold { .. } | Self::Check { .. } | Self::Sign { .. } => true,
+            _ => self.word().is_some_and(|word| word.len() == self.typed().len()),
+        }
+    }
+
+    /// The beginning of the word that has been typed.
+    fn typed(&self) -> &str {
+        match self {
             Self::Arm { typed, .. }
             | Self::Start { typed, .. }
             | Self::Confirm { typed, .. }
             | Self::TakeCommand { typed, .. }
             | Self::AbortForeign { typed, .. }
-            | Self::Quit { typed, .. } => self.word().is_some_and(|word| word.len() == typed.len()),
+            | Self::Quit { typed, .. } => typed,
+            _ => "",
         }
     }
 
@@ -209,5 +246,57 @@ impl Dialog {
             typed.push(letter);
         }
         fits
+    }
+}
+
+/// What is left of a typed word whose dialog did not open, or has closed: the crew types on, and no letter of it may act
+/// as a key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RestOfWord {
+    /// The words that the crew may be typing, and how many of their letters have passed.
+    words: Vec<(&'static str, usize)>,
+    /// Why nothing is done; it is said again after the word.
+    pub why: String,
+    until: Duration,
+}
+
+impl RestOfWord {
+    /// The whole word: its dialog did not open.
+    pub fn refused(words: &[&'static str], why: String, now: Duration) -> Self {
+        let words = words.iter().map(|word| (*word, 0)).collect();
+        Self { words, why, until: now + REST_WITHIN }
+    }
+
+    /// The dialog has closed while its word was typed; `wrong` is the letter that closed it.
+    pub fn of(dialog: &Dialog, wrong: Option<char>, why: String, now: Duration) -> Option<Self> {
+        let word = dialog.word()?;
+        let typed = dialog.typed().len();
+        let mut words = vec![(word, typed.max(1))];
+        // The crew may have meant the other word of the same key.
+        let other =
+            wrong.filter(|letter| typed == 0 && CONFIRM_WORD.starts_with(letter.to_ascii_uppercase()));
+        words.extend(other.map(|_| (CONFIRM_WORD, 1)));
+        Some(Self { words, why, until: now + REST_WITHIN })
+    }
+
+    /// Whether this letter belongs to the word: its first, or after that any later one, because letters may be missing
+    /// or wrong.
+    pub fn takes(&mut self, letter: char, now: Duration) -> bool {
+        let letter = letter.to_ascii_uppercase();
+        let goes_on = |(word, passed): &(&'static str, usize)| {
+            let ahead = if *passed == 0 { word.get(..1)? } else { word.get(*passed..)? };
+            Some((*word, passed + ahead.find(letter)? + 1))
+        };
+        let words: Vec<_> = self.words.iter().filter_map(goes_on).collect();
+        let takes = self.waits(now) && !words.is_empty();
+        if takes {
+            (self.words, self.until) = (words, now + REST_WITHIN);
+        }
+        takes
+    }
+
+    /// Whether the crew may still be typing the word.
+    pub fn waits(&self, now: Duration) -> bool {
+        now <= self.until
     }
 }

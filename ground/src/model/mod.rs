@@ -68,7 +68,7 @@ use checklist::Checklist;
 use chord::AbortChord;
 use command::Commands;
 use crew::Crew;
-use dialog::Dialog;
+use dialog::{Dialog, RestOfWord};
 use events::{Events, Speaker};
 use flight_so_far::FlightSoFar;
 use history::History;
@@ -225,6 +225,8 @@ pub struct Model {
     pub link: Link,
     pub commands: Commands,
     pub dialog: Dialog,
+    /// What is left of a typed word that is no longer wanted.
+    pub rest_of_word: Option<RestOfWord>,
     pub abort_chord: AbortChord,
     pub key_timing: KeyTiming,
     /// Who can command, and from which screens.
@@ -244,6 +246,8 @@ pub struct Model {
     pub look_back: Option<LookBack>,
     /// The checklist of the mission, as the station keeps it; `None` without one.
     pub checklist: Option<Checklist>,
+    /// Why a step was not signed or voided, and when.
+    pub(crate) sign_refused: Option<(String, Duration)>,
     /// The last place of the vehicle: of this flight, or kept from before a restart.
     pub place: Option<LastPlace>,
     /// When it is looked at next.
@@ -282,6 +286,7 @@ impl Model {
             link: Link::default(),
             commands: Commands::default(),
             dialog: Dialog::Closed,
+            rest_of_word: None,
             abort_chord: AbortChord::default(),
             key_timing: KeyTiming::default(),
             crew: Crew::default(),
@@ -296,6 +301,7 @@ impl Model {
             recall: Recall::default(),
             look_back: None,
             checklist: None,
+            sign_refused: None,
             place: None,
             place_due: None,
             range_test: None,

@@ -48,7 +48,13 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
         Key::Escape => return,
         Key::Enter => {
             let entry = palette::found(model, &typed).into_iter().nth(chosen);
-            return entry.map_or((), |entry| perform(model, entry.does, now));
+            return match entry.map(|entry| entry.does) {
+                Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
+                    keys::drop_run(model, now);
+                }
+                Some(does) => perform(model, does, now),
+                None => {}
+            };
         }
         Key::Up => chosen = chosen.saturating_sub(1),
         Key::Down => chosen = (chosen + 1).min(palette::found(model, &typed).len().saturating_sub(1)),

@@ -2,7 +2,9 @@
 //!
 //! No single key is dangerous. Arming, starting, and quitting in flight take a letter, a typed word and Enter;
 //! disarming takes a letter and Enter; an abort takes Ctrl-X and Enter (or Ctrl-X twice); each within a time limit.
-//! Except for the abort, keys count only if they were typed by hand: neither pasted nor repeated by the keyboard.
+//! The abort counts however its keys arrive. Other keys count if they were typed by hand. Keys that arrive faster may be
+//! a paste, or typed over a connection that delivers them in bunches: what they complete is asked again, except for
+//! what holds or disarms.
 
 use std::time::Duration;
 
@@ -14,7 +16,9 @@ use crate::key::Key;
 use crate::model::act::Act;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
-use crate::model::dialog::Dialog;
+use crate::model::dialog::{
+    AGAIN_AFTER, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, RestOfWord, START_WORD, TAKE_WORD,
+};
 use crate::model::events::Speaker;
 use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::pad_check::{Standing, standing};
@@ -56,7 +60,7 @@ pub(super) fn on_paste(model: &mut Model, now: Duration) {
 }
 
 fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
-    if touch != KeyOrigin::TooFast || matches!(key, Key::CtrlX | Key::Enter) {
+    if touch != KeyOrigin::Dropped || matches!(key, Key::CtrlX | Key::Enter) {
         model.record_operator(now, "key", &model.settings.seat.clone(), &key.name());
     }
     expire(model, now);
@@ -66,31 +70,53 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     if on_abort_key(model, key, now) {
         return;
     }
-    match touch {
-        _ if key.scrolls() => {}
-        KeyOrigin::Typed => {}
-        KeyOrigin::Repeat => return,
-        KeyOrigin::TooFast => {
-            cancel(model, now);
-            if model.key_timing.reports_drop(now) {
-                model.info(now, "keys faster than a hand types them were dropped: a paste?");
-            }
-            return;
-        }
+    let touch = if key.scrolls() { KeyOrigin::Typed } else { touch };
+    if touch == KeyOrigin::Dropped {
+        return;
     }
     let is_free = model.pages.entry.is_none() && model.dialog == Dialog::Closed;
     if key == Key::CtrlL && !is_free {
         model.outbox.push(Action::Redraw);
     }
     if model.pages.entry.is_some() && model.dialog == Dialog::Closed {
-        return entry::on_key(model, key, now);
+        if touch != KeyOrigin::Repeat {
+            model.key_timing.hurried = touch != KeyOrigin::Typed;
+            entry::on_key(model, key, now);
+        }
+        return;
     }
     match std::mem::replace(&mut model.dialog, Dialog::Closed) {
         Dialog::Closed if key == Key::Escape && std::mem::take(&mut model.link.abort_unsent) => {
             model.warn(now, "the abort that was not sent is cancelled");
         }
-        Dialog::Closed => on_free_key(model, key, now),
-        dialog => on_dialog_key(model, dialog, key, now),
+        Dialog::Closed if on_rest_of_word(model, key, now) || touch == KeyOrigin::Repeat => {}
+        Dialog::Closed => on_free_key(model, key, touch, now),
+        dialog => on_dialog_key(model, dialog, key, touch, now),
+    }
+}
+
+/// Swallows what is left of a word that is no longer wanted, and says again why. Returns whether the key was part of it.
+fn on_rest_of_word(model: &mut Model, key: Key, now: Duration) -> bool {
+    let Some(mut rest) = model.rest_of_word.take() else { return false };
+    match key {
+        Key::Enter if rest.waits(now) => model.warn(now, rest.why),
+        Key::Char(letter) if rest.takes(letter, now) => model.rest_of_word = Some(rest),
+        _ => return false,
+    }
+    true
+}
+
+/// A request is refused: the word that the crew would have typed is swallowed.
+fn refuse(model: &mut Model, words: &[&'static str], why: String, now: Duration) {
+    model.warn(now, why.clone());
+    model.rest_of_word = Some(RestOfWord::refused(words, why, now));
+}
+
+/// Keys that arrive too fast and mean nothing here: a paste.
+pub(super) fn drop_run(model: &mut Model, now: Duration) {
+    model.key_timing.drop_run();
+    if model.key_timing.reports_drop(now) {
+        model.info(now, "keys faster than a hand types them were dropped: a paste? If not, type them again");
     }
 }
 
@@ -124,23 +150,57 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
 
 /// A key while a dialog is open: the next letter of its word, or Enter after the whole word; every other key cancels
 /// it.
-fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, now: Duration) {
+fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrigin, now: Duration) {
+    let by_hand = touch == KeyOrigin::Typed;
     match key {
-        Key::Enter if dialog.is_complete() => confirmed(model, &dialog, now),
-        Key::Char(letter) if dialog.take(letter) => model.dialog = dialog,
+        key if key == AGAIN_KEY && matches!(dialog, Dialog::Again { .. }) => {
+            on_again(model, dialog, by_hand, now)
+        }
+        Key::Enter if dialog.is_complete() && touch != KeyOrigin::Repeat => {
+            model.key_timing.hurried |= !by_hand;
+            if model.key_timing.hurried && dialog.needs_a_hand() {
+                model.dialog = dialog.again(now);
+            } else {
+                confirmed(model, &dialog, now);
+            }
+        }
+        Key::Char(letter) if dialog.take(letter) => {
+            model.key_timing.hurried |= !by_hand;
+            model.dialog = dialog;
+        }
+        _ if touch == KeyOrigin::Repeat => model.dialog = dialog,
         _ => {
             let (name, word) = (dialog.name(), dialog.word());
             let wanted = word.filter(|_| matches!(key, Key::Enter | Key::Char(_)));
             let wanted = wanted.map_or_else(String::new, |word| format!("; the word is {word}"));
-            model.info(now, format!("{name}: cancelled, nothing was done{wanted}"));
+            let why = format!("{name}: cancelled, nothing was done{wanted}");
+            if let Key::Char(letter) = key {
+                model.rest_of_word = RestOfWord::of(&dialog, Some(letter), why.clone(), now);
+            }
+            model.info(now, why);
+            if !by_hand {
+                drop_run(model, now);
+            }
         }
+    }
+}
+
+/// The key that confirms a dialog that was completed too fast for a hand.
+fn on_again(model: &mut Model, dialog: Dialog, by_hand: bool, now: Duration) {
+    match dialog {
+        Dialog::Again { of, from, .. } if by_hand && now >= from => confirmed(model, &of, now),
+        Dialog::Again { of, until, .. } => {
+            model.info(now, format!("{}: press {} again, after a pause", of.name(), AGAIN_KEY.name()));
+            model.dialog = Dialog::Again { of, from: now + AGAIN_AFTER, until };
+        }
+        _ => {}
     }
 }
 
 /// The crew has completed every step of this dialog.
 fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
     match dialog {
-        Dialog::Closed => {}
+        Dialog::Closed | Dialog::Again { .. } => {}
         Dialog::Arm { .. } => ask(model, CommandKind::Arm, now),
         Dialog::Start { .. } => ask(model, CommandKind::Start, now),
         Dialog::Confirm { ask: waits, .. } => match why_not_confirm(model, waits, now) {
@@ -177,7 +237,9 @@ fn cancel(model: &mut Model, now: Duration) {
 fn expire(model: &mut Model, now: Duration) {
     if model.dialog.until().is_some_and(|until| now > until) {
         let dialog = std::mem::replace(&mut model.dialog, Dialog::Closed);
-        model.info(now, format!("{}: time is up, nothing was done", dialog.name()));
+        let why = format!("{}: time is up, nothing was done", dialog.name());
+        model.rest_of_word = RestOfWord::of(&dialog, None, why.clone(), now);
+        model.info(now, why);
     }
 }
 
@@ -197,8 +259,13 @@ fn pass_quit(model: &mut Model, now: Duration) {
     }
 }
 
-fn on_free_key(model: &mut Model, key: Key, now: Duration) {
-    if let Some(act) = model.settings.keys.act(key) {
+fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
+    let act = model.settings.keys.act(key);
+    model.key_timing.hurried = touch != KeyOrigin::Typed;
+    if model.key_timing.hurried && !act.is_some_and(|act| act.only_shows_or_asks(model)) {
+        return drop_run(model, now);
+    }
+    if let Some(act) = act {
         return perform(model, act, now);
     }
     let shown = model.page();
@@ -240,11 +307,11 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
         Act::Arm => match why_not_arm(model, now) {
             None => model.dialog = Dialog::arm(now),
-            Some(why) => model.warn(now, format!("cannot arm: {why}")),
+            Some(why) => refuse(model, &words(model, ARM_WORD), format!("cannot arm: {why}"), now),
         },
         Act::Start => match why_not_start(model, now) {
             None => model.dialog = Dialog::start(now),
-            Some(why) => model.warn(now, format!("cannot start: {why}")),
+            Some(why) => refuse(model, &words(model, START_WORD), format!("cannot start: {why}"), now),
         },
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
             None => model.dialog = Dialog::disarm(now),
@@ -258,7 +325,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => match why_not_take(model, now) {
             None => model.dialog = Dialog::take_command(now),
-            Some(why) => model.warn(now, format!("cannot take command: {why}")),
+            Some(why) => refuse(model, &[TAKE_WORD], format!("cannot take command: {why}"), now),
         },
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
@@ -315,13 +382,19 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
+/// The words that the crew may type after a key: its own, or the one that confirms what a second person asks.
+fn words(model: &Model, word: &'static str) -> Vec<&'static str> {
+    let confirms = (model.people() == Some(2)).then_some(CONFIRM_WORD);
+    std::iter::once(word).chain(confirms).collect()
+}
+
 /// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
 /// moment both ask: the vehicle takes the first ask, and the other one is told of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     match why_not_confirm(model, &ask, now) {
         None => model.dialog = Dialog::confirm(ask, now),
-        Some(why) => model.warn(now, format!("cannot confirm: {why}")),
+        Some(why) => refuse(model, &[CONFIRM_WORD], format!("cannot confirm: {why}"), now),
     }
     true
 }

@@ -89,8 +89,8 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
 fn must_be_heard(model: &Model, now: Duration) -> bool {
     let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
     let on_pad = model.vehicle.phase().is_some_and(|phase| is_on_pad(phase.value));
-    let arming = matches!(model.dialog, Dialog::Arm { .. } | Dialog::Confirm { .. });
-    model.link.state(now).carries() && on_pad && (armed || arming)
+    let asks = model.dialog != Dialog::Closed;
+    model.link.state(now).carries() && on_pad && (armed || asks)
 }
 
 /// Heartbeats are sent from the run loop, so that a hanging ground station sends none.

@@ -7,7 +7,7 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, checklist, commands};
 use crate::model::command::is_aborted;
-use crate::model::dialog::Dialog;
+use crate::model::dialog::{Dialog, RestOfWord};
 use crate::model::events::Speaker;
 use crate::model::flight_so_far::FlightSoFar;
 use crate::model::flown_path::FlownPath;
@@ -61,6 +61,8 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.alarms.vehicle_rebooted(now);
     model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
     // An open dialog was opened for the former boot.
+    let why = format!("{}: cancelled by the reboot", model.dialog.name());
+    model.rest_of_word = RestOfWord::of(&model.dialog, None, why, now);
     model.dialog = Dialog::Closed;
     let void = commands::restart_after_reboot(model, now);
     if !void.is_empty() {

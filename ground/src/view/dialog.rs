@@ -11,7 +11,9 @@ use ratatui::widgets::{Block, Clear};
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
 use crate::model::act::Act;
-use crate::model::dialog::{ABORT_WORD, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD};
+use crate::model::dialog::{
+    ABORT_WORD, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD,
+};
 use crate::model::foreign::Foreign;
 use crate::model::pad_check::PadCheck;
 use crate::model::permits::why_not_here;
@@ -119,6 +121,15 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 ],
             )
         }
+        Dialog::Again { of, .. } => (
+            "DID YOU TYPE THIS?",
+            vec![
+                plain(format!("The keys for the {} came faster than a hand types:", of.name())),
+                plain("a paste, or a connection that delivers them in bunches.".to_owned()),
+                strong(format!("{} within {left:.0} s: yes, do it.", AGAIN_KEY.name())),
+                plain("Any other key cancels. Nothing has been sent.".to_owned()),
+            ],
+        ),
     };
     Some(dialog)
 }

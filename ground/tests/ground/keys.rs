@@ -402,27 +402,6 @@ fn a_paste_is_dropped_with_an_event_and_cancels_the_dialog() {
     assert!(rig.take_commands().is_empty());
 }
 
-/// A paste on a console that does not mark pastes: at once, or one letter per 1 ms (9,600 baud) or 8 ms (1,200 baud).
-#[test]
-fn a_ladder_faster_than_a_hand_types_does_nothing() {
-    for apart_ms in [0, 1, 8, 20] {
-        for ladder in [ladder(), start_ladder(), quit_ladder()] {
-            let mut rig = if ladder == crate::keys::ladder() { Rig::crewed() } else { armed_on_pad() };
-            rig.take_commands();
-            for key in &ladder {
-                rig.now += Duration::from_millis(apart_ms);
-                rig.press(*key);
-            }
-            rig.run(1.0);
-            assert!(rig.take_commands().is_empty() && !leaves(&rig), "{apart_ms} ms: {ladder:?}");
-            assert!(rig.events().contains("faster than a hand types"));
-        }
-    }
-    let mut rig = armed_on_pad();
-    rig.msg(Msg::Keys(start_ladder()));
-    assert!(rig.take_commands().is_empty());
-}
-
 #[test]
 fn a_held_q_neither_quits_nor_leaves_while_armed() {
     for delay_ms in [250, 500, 600] {

@@ -1,5 +1,5 @@
-//! Properties of the keyboard: only a complete ladder that was typed by hand arms, starts, disarms or quits, and an
-//! abort always works.
+//! Properties of the keyboard: only a complete ladder that was typed by hand, or confirmed by another key after a pause,
+//! arms, starts or quits; only a complete one disarms; and an abort always works.
 //!
 //! The ladders are defined here a second time, as a small oracle that reads a history of keys backwards and does not
 //! use dialogs.
@@ -34,7 +34,7 @@ fn typed_by_hand(history: &[Input]) -> Vec<(Option<Key>, Duration)> {
         let before = k.checked_sub(1).map(|before| history[before]);
         let gap = before.map_or(Duration::MAX, |before| came.at.saturating_sub(before.at));
         let repeats = before.is_some_and(|before| before.key == came.key) && gap < Duration::from_millis(120);
-        if repeats && !came.together {
+        if repeats {
             continue;
         }
         let struck = !came.together && gap >= Duration::from_millis(25);
@@ -53,6 +53,49 @@ fn ends_in_ladder(history: &[Input], opens: &[Key], word: &str, within_s: u64) -
         && rungs[1..=word.len()].iter().map(|(key, _)| *key).zip(word.chars()).all(letter)
         && rungs[word.len() + 1].0 == Some(Key::Enter)
         && rungs[word.len() + 1].1.saturating_sub(rungs[0].1) <= Duration::from_secs(within_s)
+}
+
+/// Whether the history ends in these keys at any speed. Repeats of a held key may be among them.
+fn ends_at_any_speed(history: &[Input], opens: &[Key], word: &str, within_s: u64) -> bool {
+    let fits = |key: Key, wanted: Option<char>| match (key, wanted) {
+        (Key::Char(letter), Some(wanted)) => letter.eq_ignore_ascii_case(&wanted),
+        (key, None) => key == Key::Enter,
+        _ => false,
+    };
+    let wanted: Vec<Option<char>> = word.chars().map(Some).chain([None]).collect();
+    let Some(end) = history.last().map(|last| last.at) else { return false };
+    let mut left = history;
+    for rung in wanted.into_iter().rev() {
+        let Some((input, mut before)) = left.split_last() else { return false };
+        if !input.key.is_some_and(|key| fits(key, rung)) {
+            return false;
+        }
+        // `A`, then `A` of `ARM`: the one may be a repeat of the other.
+        while before.len() > 1 && before[before.len() - 2..].iter().all(|same| same.key == input.key) {
+            before = &before[..before.len() - 1];
+        }
+        left = before;
+    }
+    left.last().is_some_and(|input| {
+        let opened = input.key.is_some_and(|key| opens.contains(&key));
+        opened && end - input.at <= Duration::from_secs(within_s)
+    })
+}
+
+/// Whether the history ends in these keys at any speed, and then Ctrl-Y after a pause.
+fn ends_in_confirmed_ladder(history: &[Input], opens: &[Key], word: &str, within_s: u64) -> bool {
+    let Some((last, before)) = history.split_last() else { return false };
+    let pause = before.last().map_or(Duration::ZERO, |input| last.at - input.at);
+    let by_hand = last.key == Some(Key::CtrlY) && !last.together && pause >= Duration::from_millis(500);
+    let mut before = before;
+    while let [earlier @ .., input] = before {
+        let repeats = earlier.last().is_some_and(|one| one.key == input.key && input.key == Some(Key::Enter));
+        if input.key != Some(Key::CtrlY) && !repeats {
+            break;
+        }
+        before = earlier;
+    }
+    by_hand && ends_at_any_speed(before, opens, word, within_s)
 }
 
 /// Whether the history ends in an abort chord: Ctrl-X and Enter within 2 s, or Ctrl-X twice but not held. Other keys
@@ -100,6 +143,7 @@ fn key_of(byte: u8) -> Option<Key> {
         0x0C => Some(Key::CtrlL),
         0x0D => Some(Key::Enter),
         0x18 => Some(Key::CtrlX),
+        0x19 => Some(Key::CtrlY),
         0x1B => Some(Key::Escape),
         0x7F => Some(Key::Backspace),
         b' '..=b'~' => Some(Key::Char(char::from(byte))),
@@ -134,6 +178,7 @@ fn stream() -> impl Strategy<Value = Stream> {
         1 => part.prop_map(Stream::Together),
         2 => (keys, 0_u64..60).prop_map(|(keys, apart_ms)| Stream::TooFast(keys, apart_ms)),
         1 => Just(Stream::Marked),
+        2 => Just(Stream::ByHand(vec![Key::CtrlY])),
         2 => (0_u64..3_000).prop_map(Stream::Pause),
     ]
 }
@@ -162,16 +207,13 @@ impl Watched {
                 let at = self.rig.now;
                 self.history.extend(keys.iter().map(|key| Input { key: Some(*key), at, together }));
                 self.rig.msg(if let [key] = keys[..] { Msg::Key(key) } else { Msg::Keys(keys.clone()) });
-                // Among keys of one read only an abort chord counts.
-                let begin = self.history.len() - keys.len();
-                let chord = (begin..=self.history.len()).any(|end| ends_in_chord(&self.history[..end]));
-                self.check(chord)
+                self.check(keys.len())
             }
             Stream::Marked => {
                 self.pass(50)?;
                 self.history.push(Input { key: None, at: self.rig.now, together: true });
                 self.rig.msg(Msg::Pasted);
-                self.check(false)
+                self.check(1)
             }
             Stream::Pause(ms) => self.pass(ms),
         }
@@ -181,7 +223,7 @@ impl Watched {
         self.pass(ms)?;
         self.history.push(Input { key: Some(key), at: self.rig.now, together: false });
         self.rig.press(key);
-        self.check(false)
+        self.check(1)
     }
 
     /// Lets time pass with ticks.
@@ -193,28 +235,38 @@ impl Watched {
                 self.rig.flight_status();
             }
             self.rig.msg(Msg::Tick);
-            self.check(false)?;
+            self.check(0)?;
         }
         self.rig.now += Duration::from_millis(ms % 10);
         Ok(())
     }
 
-    fn check(&mut self, chord_among: bool) -> Result<(), TestCaseError> {
+    /// Compares what was done with the history as it was after each of the latest keys.
+    fn check(&mut self, latest: usize) -> Result<(), TestCaseError> {
         let leaves = leaves(&self.rig);
         let history = &self.history;
+        let whens: Vec<&[Input]> =
+            (history.len() - latest.min(history.len())..=history.len()).map(|end| &history[..end]).collect();
+        let chord = whens.iter().any(|history| ends_in_chord(history));
+        let by_hand = |opens: &[Key], word, within_s| {
+            whens.iter().any(|history| {
+                ends_in_ladder(history, opens, word, within_s)
+                    || ends_in_confirmed_ladder(history, opens, word, within_s)
+            })
+        };
         let is = |sent: &COMMAND_LONG_DATA, command| sent.command == command;
         for sent in self.rig.take_commands() {
             let allowed = if is_abort(&sent) {
-                chord_among || ends_in_chord(history)
+                chord
             } else if is_arm(&sent) {
-                ends_in_ladder(history, &[Key::Char('A')], "ARM", 10)
+                by_hand(&[Key::Char('A')], "ARM", 10)
             } else if is(&sent, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
-                ends_in_ladder(history, &[Key::Char('D')], "", 5)
+                whens.iter().any(|history| ends_at_any_speed(history, &[Key::Char('D')], "", 5))
             } else if is(&sent, MavCmd::MAV_CMD_TD_PAD_CHECK) {
                 let key = if sent.param1 > 1.5 { 'E' } else { 'X' };
-                sent.param1 > 0.5 && ends_in_ladder(history, &[Key::Char(key)], "", 5)
+                sent.param1 > 0.5 && by_hand(&[Key::Char(key)], "", 5)
             } else {
-                ends_in_ladder(history, &[Key::Char('S')], "START", 10)
+                by_hand(&[Key::Char('S')], "START", 10)
             };
             // A resent command was allowed when it was first sent.
             prop_assert!(allowed || sent.confirmation > 0, "{sent:?} by {history:?}");
@@ -223,10 +275,9 @@ impl Watched {
         let at_risk = self.rig.model.is_at_risk();
         // The palette does what the key does: at risk it opens the same ladder.
         let by_palette = ends_in_ladder(history, &[Key::Char(':')], "QUIT", 60);
-        let quits = ends_in_ladder(history, &opens, "QUIT", 10)
-            || (!at_risk && (by_palette || ends_in_quit(history)));
+        let quits = by_hand(&opens, "QUIT", 10) || (!at_risk && (by_palette || ends_in_quit(history)));
         prop_assert!(!leaves || quits, "left by {history:?}");
-        if chord_among || ends_in_chord(history) {
+        if chord {
             // The abort counts as answered, so that its resends do not look like new ones.
             self.rig.model.commands = ground::model::command::Commands::default();
         }
@@ -252,6 +303,7 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
         Key::CtrlC,
         Key::CtrlL,
         Key::CtrlX,
+        Key::CtrlY,
         Key::Char(' '),
         Key::Char('h'),
         Key::Char('0'),

@@ -11,6 +11,7 @@ mod daemon;
 mod disarm;
 mod finding;
 mod flights;
+mod hurried_keys;
 mod identity;
 mod in_space;
 mod keys;
