@@ -229,6 +229,7 @@ async fn act(
             Action::Send(_)
             | Action::Record(_)
             | Action::KeepChecklist(_)
+            | Action::RefuseSignature(_)
             | Action::Enter(_)
             | Action::KeepPlace(_)
             | Action::WriteReport

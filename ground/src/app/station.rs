@@ -301,6 +301,11 @@ impl Station {
                 Action::KeepPlace(place) => self.keep_place(model, &place, now),
                 Action::Enter(line) => self.enter(&line),
                 Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
+                Action::RefuseSignature(why) => {
+                    if let Some(server) = &mut self.server {
+                        server.publish(&Msg::SignRefused(why), now);
+                    }
+                }
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
                         recorder.sync_soon();

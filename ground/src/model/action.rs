@@ -47,6 +47,8 @@ pub enum Action {
     Record(Record),
     /// The checklist has changed: keep the change, and show it on every screen.
     KeepChecklist(ChecklistEntry),
+    /// Tell the screens why a step of the checklist is not signed or voided.
+    RefuseSignature(String),
     /// Keep the last place of the vehicle in the files for maps.
     KeepPlace(Box<LastPlace>),
     /// Show the flight just flown again, on this screen.

@@ -143,6 +143,7 @@ impl Dialog {
     }
 
     /// The question whether the keys that completed this dialog were typed by a person.
+    #[must_use]
     pub fn again(self, now: Duration) -> Self {
         Self::Again { of: Box::new(self), from: now + AGAIN_AFTER, until: now + AGAIN_TIME_LIMIT }
     }

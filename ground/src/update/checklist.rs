@@ -18,6 +18,12 @@ pub(super) fn open_dialog(model: &mut Model, void: bool, now: Duration) {
         return model.info(now, "there is no checklist (--checklist)");
     };
     model.pages.checklist = true;
+    if model.settings.role == Role::Station
+        && let seat = model.settings.seat.clone()
+        && let Err(why) = signature(model, (step, void), &seat, now)
+    {
+        return refuse(model, (step, void), &seat, &why, now);
+    }
     model.dialog = Dialog::sign(step, void, now);
 }
 
@@ -39,6 +45,7 @@ pub(super) fn ask(model: &mut Model, (step, void): (usize, bool), now: Duration)
 pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, now: Duration) {
     match signature(model, (step, void), by, now) {
         Ok(signature) => {
+            model.sign_refused = None;
             let entry = if void {
                 ChecklistEntry::Voided { step, signature: signature.clone() }
             } else {
@@ -51,13 +58,22 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
             let level = if void { EventLevel::Warning } else { EventLevel::Info };
             model.tell(now, Speaker::Ground, level, text);
         }
-        Err(why) => {
-            let what = if void { "voided" } else { "signed" };
-            let text = format!("step {} is not {what}: {why}{}", step + 1, by.in_brackets());
-            model.record_operator(now, "not signed", by, &text);
-            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-        }
+        Err(why) => refuse(model, (step, void), by, &why, now),
     }
+}
+
+fn refuse(model: &mut Model, (step, void): (usize, bool), by: &Seat, why: &str, now: Duration) {
+    let what = if void { "voided" } else { "signed" };
+    let text = format!("step {} is not {what}: {why}{}", step + 1, by.in_brackets());
+    model.record_operator(now, "not signed", by, &text);
+    model.outbox.push(Action::RefuseSignature(text.clone()));
+    on_refused(model, text, now);
+}
+
+/// The station has refused a signature: every screen says why.
+pub(super) fn on_refused(model: &mut Model, why: String, now: Duration) {
+    model.tell(now, Speaker::Ground, EventLevel::Warning, why.clone());
+    model.sign_refused = Some((why, now));
 }
 
 fn words(model: &Model, step: usize, signature: &Signature, verb: &str, by: &Seat) -> String {

@@ -154,7 +154,7 @@ fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrig
     let by_hand = touch == KeyOrigin::Typed;
     match key {
         key if key == AGAIN_KEY && matches!(dialog, Dialog::Again { .. }) => {
-            on_again(model, dialog, by_hand, now)
+            on_again(model, dialog, by_hand, now);
         }
         Key::Enter if dialog.is_complete() && touch != KeyOrigin::Repeat => {
             model.key_timing.hurried |= !by_hand;

@@ -90,6 +90,8 @@ pub enum Msg {
     },
     /// An attached screen asks for the parameters.
     ParametersWanted,
+    /// The station has not signed or voided a step of the checklist; the reason.
+    SignRefused(String),
     /// Time passes on an attached screen: its dialogs and its abort chord may expire.
     ScreenTick,
     /// The terminal is gone; the station keeps running without it.
@@ -153,6 +155,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Place(place) => model.place = Some(*place),
         Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
         Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),
+        Msg::SignRefused(why) => checklist::on_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {

@@ -14,6 +14,9 @@ use crate::model::two_person::role_name;
 /// Columns of the mark and the number.
 const FRONT_COLUMNS: usize = 9;
 
+/// How long the reason why a step was not signed stands below the steps.
+const REFUSAL_SHOWN: Duration = Duration::from_secs(15);
+
 /// How far the checklist is, as a title.
 pub fn title(model: &Model, now: Duration) -> String {
     let (done, all) = model.steps_done(now).unwrap_or_default();
@@ -53,7 +56,11 @@ pub fn rows(
         }
         lines.extend(step);
     }
-    lines.push(Line::styled(format!(" {}", below(&list.steps[chosen])), theme.style(TextRole::Label)));
+    let refused = model.sign_refused.as_ref().filter(|(_, at)| now.saturating_sub(*at) < REFUSAL_SHOWN);
+    lines.push(match refused {
+        Some((why, _)) => Line::styled(format!(" {why}"), theme.style(TextRole::Caution)),
+        None => Line::styled(format!(" {}", below(&list.steps[chosen])), theme.style(TextRole::Label)),
+    });
     lines
 }
 

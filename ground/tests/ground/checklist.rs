@@ -1,5 +1,7 @@
 //! The checklist: who signs what, with which values; NO-GO until it is done; the same on every screen.
 
+use std::path::Path;
+
 use ground::checklist_file::parse;
 use ground::key::Key;
 use ground::model::checklist::{Checklist, ChecklistEntry, Mark};
@@ -7,6 +9,7 @@ use ground::model::seat::Seat;
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg, Request};
 use ground::view::theme::{Palette, Theme};
+use protocol::crew_file::CrewFile;
 use protocol::dialect::{MavMessage, TD_MISSION_DATA, TdPhase, TdRole};
 use protocol::mission::MissionHash;
 
@@ -120,6 +123,63 @@ fn a_step_is_signed_on_the_pad_page_with_a_key_and_enter() {
     rig.run(6.0);
     rig.key(Key::Enter);
     assert!(matches!(list(&rig).steps[0].mark, Mark::Signed(_)));
+}
+
+/// At the station itself and on an attached screen.
+#[test]
+fn a_step_of_another_role_is_refused_on_the_page_with_the_reason() {
+    let mut rig = station(LIST, Role::Station);
+    rig.keys(&[Key::Char('k'), Key::Down, Key::Char('G')]);
+    let why = "step 2 is not signed: FLIGHT signs it, Ann is RANGE SAFETY";
+    for size in [(80, 24), (120, 40)] {
+        let screen = rig.screen(size.0, size.1);
+        assert!(screen.contains(why) && !screen.contains("SIGN a step"), "{screen}");
+    }
+    // A dialog that was open before the vehicle was armed elsewhere, and a screen that does not know the roles.
+    asked(&mut rig, 1, false, "Ann");
+    let told = rig.actions.iter().rev().find_map(|action| match action {
+        Action::RefuseSignature(why) => Some(why.clone()),
+        _ => None,
+    });
+    let mut attached = station(LIST, Role::Attached);
+    attached.keys(&[Key::Char('k'), Key::Down, Key::Char('G'), Key::Enter]);
+    attached.msg(Msg::SignRefused(told.expect("the screens are told")));
+    assert!(attached.screen(80, 24).contains(why), "{}", attached.screen(80, 24));
+    assert!(attached.events().contains(why));
+    attached.run(20.0);
+    assert!(attached.screen(80, 24).contains("signs"), "{}", attached.screen(80, 24));
+}
+
+/// The blocks of TOML on a page that begin with this text.
+fn toml_block(page: &str, begins: &str) -> String {
+    let blocks = page.split("```toml\n").skip(1).filter_map(|block| block.split("```").next());
+    blocks.into_iter().find(|block| block.starts_with(begins)).expect("the example").to_owned()
+}
+
+/// Whoever copies the examples of the page can arm.
+#[test]
+fn the_example_crew_can_finish_both_example_checklists() {
+    let page = include_str!("../../../CREW.md");
+    let crew = toml_block(page, "# crew.toml");
+    let crew = CrewFile::from_toml(&crew, Path::new("crew.toml")).expect("an example that is read");
+    for list in [include_str!("../../checklist-example.toml"), &toml_block(page, "name = ")] {
+        let mut rig = station(list, Role::Station);
+        rig.model.settings.crew_roles =
+            crew.members.iter().map(|member| (member.name.clone(), member.role)).collect();
+        for (place, step) in list_of(list).steps.iter().enumerate() {
+            let signer = crew.members.iter().find(|member| step.role.is_none_or(|role| role == member.role));
+            let signer =
+                signer.unwrap_or_else(|| panic!("nobody of the example crew signs `{}`", step.words));
+            upright(&mut rig, 90.0);
+            asked(&mut rig, place, false, &signer.name);
+        }
+        let (done, all) = rig.model.steps_done(rig.now).expect("a checklist");
+        assert_eq!(done, all, "{}", rig.events());
+    }
+}
+
+fn list_of(text: &str) -> Checklist {
+    parse(text).expect("a checklist")
 }
 
 #[test]

@@ -78,14 +78,14 @@ fn ends_at_any_speed(history: &[Input], opens: &[Key], word: &str, within_s: u64
     }
     left.last().is_some_and(|input| {
         let opened = input.key.is_some_and(|key| opens.contains(&key));
-        opened && end - input.at <= Duration::from_secs(within_s)
+        opened && end.saturating_sub(input.at) <= Duration::from_secs(within_s)
     })
 }
 
 /// Whether the history ends in these keys at any speed, and then Ctrl-Y after a pause.
 fn ends_in_confirmed_ladder(history: &[Input], opens: &[Key], word: &str, within_s: u64) -> bool {
     let Some((last, before)) = history.split_last() else { return false };
-    let pause = before.last().map_or(Duration::ZERO, |input| last.at - input.at);
+    let pause = before.last().map_or(Duration::ZERO, |input| last.at.saturating_sub(input.at));
     let by_hand = last.key == Some(Key::CtrlY) && !last.together && pause >= Duration::from_millis(500);
     let mut before = before;
     while let [earlier @ .., input] = before {

@@ -80,6 +80,7 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         }
         Msg::AlarmAcknowledged(kind) => drop(out.kind(11).u8(alarm_number(*kind))),
         Msg::ParametersWanted => drop(out.kind(12)),
+        Msg::SignRefused(why) => drop(out.kind(26).text(why)),
         Msg::ScreenGone => drop(out.kind(13)),
         Msg::HeardOver(number) => drop(out.kind(14).u64(*number as u64)),
         Msg::OneLinkDown(why) => drop(out.kind(15).text(why)),
@@ -186,6 +187,7 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
             let (goes_on, text) = (rest.u8()? != 0, rest.text()?);
             ToScreen::Msg(Msg::Download(if goes_on { Ok(text) } else { Err(text) }))
         }
+        26 => ToScreen::Msg(Msg::SignRefused(rest.text()?)),
         25 => ToScreen::Msg(Msg::RangeTest(seat(&mut rest)?)),
         22 => {
             let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;

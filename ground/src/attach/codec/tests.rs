@@ -178,6 +178,7 @@ fn msg() -> impl Strategy<Value = Msg> {
             Msg::Tick,
             Msg::AlarmAcknowledged(AlarmKind::LinkLost),
             Msg::ParametersWanted,
+            Msg::SignRefused("step 2 is not signed: FLIGHT signs it".to_owned()),
             Msg::ScreenGone
         ]),
         heartbeat,
