@@ -65,7 +65,9 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
                 hash.update(angle_rad.to_le_bytes());
             }
             let booster = commands.booster;
-            hash.update([commands.ignite, commands.parachute, booster.ignite, booster.separate].map(u8::from));
+            hash.update(
+                [commands.ignite, commands.parachute, booster.ignite, booster.separate].map(u8::from),
+            );
         }
         if !flight.goes_on() {
             break;
