@@ -68,6 +68,36 @@ pub enum Damage {
         /// The parser's message.
         reason: String,
     },
+    /// The log can be read to its end, and its summary counts other messages or chunks.
+    #[error("its summary counts {counted}, and {read} are there: a part was cut out or is there twice")]
+    Miscounted { counted: String, read: String },
+    /// The log was recovered from one that lacked something.
+    #[error("it was recovered from a damaged log: {0}")]
+    Recovered(String),
+}
+
+/// Why a record or a chunk cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    #[error(transparent)]
+    Mcap(#[from] mcap::McapError),
+    /// A chunk would unpack to more than is held in memory.
+    #[error("a chunk of {0} bytes, more than the {RECORD_LIMIT_BYTES} that are read")]
+    TooLarge(u64),
+    #[error("a record of type 0, which does not exist")]
+    TypeZero,
+}
+
+impl RecordError {
+    /// As an error of the library.
+    pub fn into_mcap(self) -> mcap::McapError {
+        match self {
+            Self::Mcap(error) => error,
+            other => {
+                mcap::McapError::Io(std::io::Error::new(std::io::ErrorKind::InvalidData, other.to_string()))
+            }
+        }
+    }
 }
 
 /// Reads a log's items in file order.
@@ -78,6 +108,8 @@ pub struct LogReader<R: Read> {
     schemas: BTreeMap<u16, (String, Arc<[u8]>)>,
     channels: BTreeMap<u16, LogChannel>,
     saw_data_end: bool,
+    /// Messages so far.
+    messages: u64,
     damage: Option<Damage>,
     ended: bool,
 }
@@ -99,6 +131,7 @@ impl<R: Read> LogReader<R> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             saw_data_end: false,
+            messages: 0,
             damage: None,
             ended: false,
         }
@@ -215,12 +248,22 @@ impl<R: Read> LogReader<R> {
                 self.channels.insert(channel.id, known);
                 None
             }
-            McapRecord::Message { header, data } => Some(LogItem::Message {
-                channel_id: header.channel_id,
-                log_time_ns: header.log_time,
-                sequence: header.sequence,
-                data: data.into_owned(),
-            }),
+            McapRecord::Message { header, data } => {
+                self.messages += 1;
+                Some(LogItem::Message {
+                    channel_id: header.channel_id,
+                    log_time_ns: header.log_time,
+                    sequence: header.sequence,
+                    data: data.into_owned(),
+                })
+            }
+            // A tool that cut a part out, or a disk that lost it, has not always changed the count.
+            McapRecord::Statistics(told) if self.saw_data_end && told.message_count != self.messages => {
+                let messages = |count: u64| format!("{count} messages");
+                let (counted, read) = (messages(told.message_count), messages(self.messages));
+                self.damage = Some(Damage::Miscounted { counted, read });
+                None
+            }
             McapRecord::Metadata(metadata) => {
                 Some(LogItem::Metadata { name: metadata.name, entries: metadata.metadata })
             }
@@ -257,6 +300,43 @@ pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'sta
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
     mcap::parse_record(opcode, data).map(McapRecord::into_owned)
+}
+
+/// Calls `keep` for every record of a chunk, from its body, if its checksum is right. It holds one record and what the
+/// chunk unpacks to, at most [`RECORD_LIMIT_BYTES`].
+///
+/// # Errors
+/// The chunk cannot be read, or `keep` failed. Without a checksum in the chunk some records may have been kept by then.
+pub fn records_of_chunk(
+    body: &[u8],
+    mut keep: impl FnMut(McapRecord<'static>) -> mcap::McapResult<()>,
+) -> Result<(), RecordError> {
+    const UNPACKED_AT: usize = 16;
+    let unpacked = body.get(UNPACKED_AT..).and_then(|rest| rest.first_chunk());
+    let unpacked = unpacked.map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    if unpacked > RECORD_LIMIT_BYTES as u64 {
+        return Err(RecordError::TooLarge(unpacked));
+    }
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(RECORD_LIMIT_BYTES);
+    let mut reader = LinearReader::new_with_options(options);
+    let head: Vec<u8> =
+        std::iter::once(mcap::records::op::CHUNK).chain((body.len() as u64).to_le_bytes()).collect();
+    let mut input = head.as_slice().chain(body);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(need) => {
+                let read = input.read(reader.insert(need)).unwrap_or(0);
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { opcode: 0, .. } => return Err(RecordError::TypeZero),
+            LinearReadEvent::Record { data, opcode } => keep(parse_record(opcode, data)?)?,
+        }
+    }
+    Ok(())
 }
 
 /// Returns whether an attachment has room for two times, two length-prefixed strings, the length of its data and a

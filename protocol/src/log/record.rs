@@ -127,6 +127,10 @@ pub const METADATA_SCHEMA: &str = "schema";
 pub const SCHEMA_VERSION_ENTRY: &str = "version";
 /// Name of the metadata record that describes the run (profile, seed, start).
 pub const METADATA_RUN: &str = "run";
+/// Name of the metadata record of a log that was recovered from a damaged one.
+pub const METADATA_RECOVERY: &str = "recovery";
+/// The entry that says what the damaged log lacked; empty if it was whole.
+pub const RECOVERY_FAULT_ENTRY: &str = "fault";
 /// Name of the attachment with the profile's text.
 pub const ATTACHMENT_PROFILE: &str = "profile.toml";
 /// Name of the attachment with the scenario: the text that the random draws are made from.

@@ -9,7 +9,8 @@ use std::sync::atomic::Ordering;
 use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 use replay::gate::{
-    Baseline, Change, Checked, GateError, GateProgress, GateState, Judged, Outcome, find, fly_all, judge,
+    Baseline, Change, Checked, GateError, GateProgress, GateState, Judged, Outcome, Skipped, find, fly_all,
+    judge,
 };
 use replay::output::{Destination, NewFile, Overwrite};
 use replay::print::{GateReport, JunitCase, gate_cases, print_gate, print_json, print_junit};
@@ -62,7 +63,10 @@ impl Ask {
             Err(_) if self.accept && !self.baseline.exists() => Baseline::default(),
             Err(error) => return Err(error.into()),
         };
-        let flights = find(&self.directory)?;
+        let (flights, skipped) = find(&self.directory)?;
+        for Skipped { name, reason } in &skipped {
+            say(&format!("left out: {name}: {reason}"));
+        }
         let junit = self.junit.as_deref().map(|path| junit_file(path, self.force)).transpose()?;
         let mut state = match &self.state {
             None => GateState::in_memory(),

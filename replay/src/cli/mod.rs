@@ -314,7 +314,7 @@ fn warn_of_completeness(name: &str, found: &Completeness) {
 /// Warns that only the part of a log before its damage is used.
 fn warn_of_damage(file: &str, damage: Option<&str>) {
     if let Some(damage) = damage {
-        say(&format!("warning: {file} is damaged: {damage}; everything before was used"));
+        say(&format!("warning: {file} is damaged: {damage}; what can be read was used"));
     }
 }
 

@@ -8,6 +8,7 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use tick_log::sortie;
 
+use super::state::name_of;
 use super::{Checked, Flown, GateError, Outcome};
 use crate::info::VerdictFacts;
 use crate::refly::margin;
@@ -59,7 +60,10 @@ pub(super) fn fly(directory: &Path, number: u64) -> Result<Outcome, GateError> {
         && bits(row.touchdown_time_s) == bits(touchdown.map(|touchdown| touchdown.time_s))
         && bits(row.touchdown_vertical_m_s) == bits(touchdown.map(|touchdown| touchdown.vertical_m_s));
     let verdict = sortie::verdict(&flight).as_ref().map(VerdictFacts::of);
+    let (seed, number) = (recipe.seed.to_le_bytes(), number.to_le_bytes());
+    let parts = [recipe.mission_toml.as_bytes(), recipe.dispersion_toml.as_bytes(), &seed, &number];
     Ok(Outcome {
+        flight: Some(name_of(parts)),
         checked: if same { Checked::Identical } else { Checked::Diverged },
         flown: verdict.map(|verdict| Flown {
             landed: verdict.landed,

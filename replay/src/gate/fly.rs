@@ -2,16 +2,21 @@
 
 use std::path::Path;
 
+use super::state::name_of;
 use super::{Checked, Flown, Found, Outcome, campaign};
-use crate::log::{LogError, Recording};
+use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
 use crate::verify::{Obstacle, Verification, verify};
+
+/// This many of the first records of the flight computer name a flight: its power-up and half a second.
+const NAMING_RECORDS: usize = 100;
 
 /// What this build makes of a flight. Whatever is wrong is part of the outcome.
 pub(super) fn fly(found: &Found) -> Outcome {
     match found.number {
         None => log(&found.path),
         Some(number) => campaign::fly(&found.path, number).unwrap_or_else(|error| Outcome {
+            flight: None,
             checked: Checked::Unverified,
             flown: None,
             problem: Some(words(error)),
@@ -58,11 +63,29 @@ fn log(path: &Path) -> Outcome {
             None
         }
     };
-    Outcome { checked, flown, problem }
+    Outcome { flight: flight_of(path), checked, flown, problem }
+}
+
+/// Which flight a log holds: its run and the first records of its flight computer.
+fn flight_of(path: &Path) -> Option<String> {
+    let mut log = FlightLog::open(path).ok()?;
+    let mut records = Vec::new();
+    while records.len() < NAMING_RECORDS
+        && let Ok(Some(stamped)) = log.next_entry()
+    {
+        if matches!(
+            stamped.entry,
+            Entry::ComputerStart(_) | Entry::ComputerFrame(_) | Entry::PilotTick(_) | Entry::Tick(_)
+        ) {
+            records.push(stamped.data);
+        }
+    }
+    let run = log.head().run.iter().flat_map(|(fact, value)| [fact.as_bytes(), value.as_bytes()]);
+    (!records.is_empty()).then(|| name_of(run.chain(records.iter().map(Vec::as_slice))))
 }
 
 fn no_flight(why: String) -> Outcome {
-    Outcome { checked: Checked::NoFlight, flown: None, problem: Some(why) }
+    Outcome { flight: None, checked: Checked::NoFlight, flown: None, problem: Some(why) }
 }
 
 /// An error and its causes.

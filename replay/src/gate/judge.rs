@@ -80,8 +80,14 @@ impl Judged {
 
 /// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same.
 pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
+    // Another flight under the name of one is no change of that one.
+    let same_flight = |name: &str, before: &Outcome| {
+        outcomes
+            .get(name)
+            .is_some_and(|now| before.flight.is_none() || now.flight.is_none() || now.flight == before.flight)
+    };
     let of_now = outcomes.iter().map(|(name, now)| {
-        let before = baseline.flights.get(name);
+        let before = baseline.flights.get(name).filter(|before| same_flight(name, before));
         let change = match before {
             Some(before) => change(before, now, tolerance),
             None if now.checked == Checked::NoFlight => Change::NoFlight,
@@ -91,7 +97,7 @@ pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, toleranc
             && before.is_some_and(|before| before.checked == Checked::Identical);
         Judged { name: name.clone(), change, newly_diverged, before: before.cloned(), now: Some(now.clone()) }
     });
-    let missing = baseline.flights.iter().filter(|(name, _)| !outcomes.contains_key(*name));
+    let missing = baseline.flights.iter().filter(|(name, before)| !same_flight(name, before));
     let missing = missing.map(|(name, before)| Judged {
         name: name.clone(),
         change: Change::Missing,
@@ -148,7 +154,7 @@ mod tests {
 
     fn outcome(checked: Checked, landed: bool, margin: f64) -> Outcome {
         let flown = Flown { landed, ending: String::new(), margin: Some(format!("{margin:?}")) };
-        Outcome { checked, flown: Some(flown), problem: None }
+        Outcome { flight: None, checked, flown: Some(flown), problem: None }
     }
 
     fn judged(before: Outcome, now: Outcome) -> Judged {
@@ -178,7 +184,7 @@ mod tests {
         assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)).change, Change::NowLands);
         // What cannot be read did not land differently.
         for checked in [Unverified, Checked::NoFlight] {
-            let gone = Outcome { checked, flown: None, problem: Some("empty".to_owned()) };
+            let gone = Outcome { flight: None, checked, flown: None, problem: Some("empty".to_owned()) };
             for before in [&before, &crashed] {
                 let judged = judged(before.clone(), gone.clone());
                 assert_eq!((judged.change, judged.fails(true)), (Change::Lost, true), "{checked:?}");
@@ -202,13 +208,31 @@ mod tests {
     #[test]
     fn a_file_without_a_flight_is_called_that() {
         let without = |checked| {
-            BTreeMap::from([("ground.mcap".to_owned(), Outcome { checked, flown: None, problem: None })])
+            BTreeMap::from([(
+                "ground.mcap".to_owned(),
+                Outcome { flight: None, checked, flown: None, problem: None },
+            )])
         };
         for before in [BTreeMap::new(), without(Checked::Unverified)] {
             let judged = judge(&without(Checked::NoFlight), &Baseline::of(before), 0.02).remove(0);
             assert_eq!((judged.change, judged.fails(false)), (Change::NoFlight, false));
         }
         assert_eq!(Baseline::of(without(Checked::NoFlight)).flights, BTreeMap::new());
+    }
+
+    #[test]
+    fn another_flight_under_the_name_of_one_is_new_and_that_one_is_missing() {
+        let named = |flight: &str, landed| {
+            let outcome = outcome(Checked::Identical, landed, 0.5);
+            BTreeMap::from([("a".to_owned(), Outcome { flight: Some(flight.to_owned()), ..outcome })])
+        };
+        let judged = judge(&named("landed", true), &Baseline::of(named("crashed", false)), 0.02);
+        let mut changes: Vec<_> = judged.iter().map(|judged| judged.change.word()).collect();
+        changes.sort_unstable();
+        assert_eq!(changes, ["MISSING", "new"]);
+        assert!(judged.iter().any(|judged| judged.fails(true)));
+        let same = judge(&named("landed", true), &Baseline::of(named("landed", false)), 0.02);
+        assert_eq!(same[0].change, Change::NowLands);
     }
 
     #[test]

@@ -14,7 +14,7 @@ mod run;
 mod state;
 
 pub use baseline::{Baseline, BaselineError};
-pub use find::{Found, GateError, find};
+pub use find::{Found, GateError, Skipped, find};
 pub use judge::{Change, Judged, judge};
 pub use run::{GateProgress, fly_all};
 pub use state::GateState;
@@ -68,6 +68,9 @@ impl Flown {
 /// What this build makes of a flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
+    /// Which flight it is, by its content; `None` if the file has none, and in baselines of earlier releases.
+    #[serde(default)]
+    pub flight: Option<String>,
     pub checked: Checked,
     /// `None` if it did not come down, or cannot be flown again.
     pub flown: Option<Flown>,

@@ -88,6 +88,12 @@ pub(super) fn key(found: &Found) -> io::Result<String> {
     Ok(format!("{} {digest:016x} {build:016x}", found.name))
 }
 
+/// Names a flight by its content.
+pub(super) fn name_of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
+    let digest = parts.into_iter().flatten().copied().fold(FNV_START, fnv_byte);
+    format!("{digest:016x}")
+}
+
 const FNV_START: u64 = 0xcbf2_9ce4_8422_2325;
 
 /// FNV-1a, 64 bits: tells files apart, but does not protect against forgery.

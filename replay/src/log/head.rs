@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use protocol::log::build::build_info;
-use protocol::log::reader::LogItem;
+use protocol::log::reader::{Damage, LogItem};
 use protocol::log::record::{
-    ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RUN, METADATA_SCHEMA,
-    SCHEMA_VERSION_ENTRY,
+    ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RECOVERY, METADATA_RUN,
+    METADATA_SCHEMA, RECOVERY_FAULT_ENTRY, SCHEMA_VERSION_ENTRY,
 };
 use serde::Serialize;
 
@@ -26,6 +26,8 @@ pub struct Head {
     /// The whole text of the dispersions.
     pub scenario_toml: Option<String>,
     pub attachments: Vec<AttachmentFacts>,
+    /// The log was recovered from one that lacked something.
+    pub recovered: Option<Damage>,
 }
 
 /// An attachment, without its content.
@@ -75,6 +77,10 @@ impl Head {
             LogItem::Metadata { name, entries } if name == METADATA_BUILD => self.build = entries,
             LogItem::Metadata { name, entries } if name == METADATA_SCHEMA => self.schema = entries,
             LogItem::Metadata { name, entries } if name == METADATA_RUN => self.run.extend(entries),
+            LogItem::Metadata { name, entries } if name == METADATA_RECOVERY => {
+                let fault = entries.get(RECOVERY_FAULT_ENTRY).filter(|fault| !fault.is_empty());
+                self.recovered = self.recovered.take().or(fault.cloned().map(Damage::Recovered));
+            }
             LogItem::Attachment { name, data } => {
                 self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
                 match name.as_str() {

@@ -27,7 +27,6 @@ pub(crate) use heard::{Found, Heard, Verdicts, frame_of, heard_message};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
 pub(crate) use schema::{computer_descriptor, pilot_descriptor, tick_descriptor};
-pub(crate) use summary::chunk_offsets;
 pub use summary::{SummaryFacts, summary_of};
 pub use tick_order::{Ordered, TickOrder};
 pub use tick_ranges::{Gap, TickRanges};
@@ -114,9 +113,10 @@ impl<R: Read> FlightLog<R> {
         self.reader.channel(id)
     }
 
-    /// Why the log could not be read to its end; `None` for a whole log, once the entries are exhausted.
+    /// Why the log could not be read to its end, or that it was recovered from one that lacked something; `None` for a whole
+    /// log, once the entries are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
-        self.reader.damage()
+        self.reader.damage().or(self.head.recovered.as_ref())
     }
 
     /// The latest time of any entry so far, ns since the Unix epoch.

@@ -37,14 +37,7 @@ pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     })
 }
 
-/// The start offsets of the chunks in a file, in order, from its summary; empty without a summary.
-pub(crate) fn chunk_offsets(path: &Path) -> Vec<u64> {
-    let indexes = read_summary(path).map(|summary| summary.chunk_indexes).unwrap_or_default();
-    let mut offsets: Vec<u64> = indexes.iter().map(|index| index.chunk_start_offset).collect();
-    offsets.sort_unstable();
-    offsets
-}
-
+/// The summary at the end of a file; `None` if the file has none that can be read.
 fn read_summary(path: &Path) -> Option<mcap::Summary> {
     let mut file = File::open(path).ok()?;
     let size = file.metadata().ok()?.len();

@@ -33,13 +33,11 @@ pub fn print_recovery(recovery: &Recovery, output: &mut impl Write) -> io::Resul
             shown(&lost.reason)
         )?;
     }
-    match (recovery.ended, recovery.lost.is_empty()) {
-        (true, true) => writeln!(output, "the log was whole: nothing is lost"),
-        (true, false) => Ok(()),
-        (false, _) => writeln!(
-            output,
-            "the log has no end mark: its recorder was stopped or the file was cut, and what came after {} is lost",
-            recovery.kept_s.map_or_else(|| "its beginning".to_owned(), |kept_s| format!("{kept_s:.3} s"))
-        ),
+    if recovery.was_whole() {
+        return writeln!(output, "the log was whole: nothing is lost");
     }
+    if let Some(fault) = recovery.fault() {
+        writeln!(output, "the log was DAMAGED: {fault}; the recovered log says so, too")?;
+    }
+    Ok(())
 }

@@ -1,19 +1,22 @@
 //! Recovers a whole log from a damaged one.
 //!
-//! A recorder that was killed leaves a log without its end; a bad disk may damage the middle. Every chunk with a
-//! correct checksum is kept, also after a broken one. The report lists what is lost, with its time span if the file
-//! still has it. Nothing is invented: a message is kept unchanged or not at all.
+//! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the middle. Every chunk with a
+//! correct checksum is kept, also after a broken one. What the file says about itself is believed: its checksums, and the
+//! chunks and messages that its summary counts. The report lists what is lost, and so does the recovered log itself
+//! ([`METADATA_RECOVERY`]). Nothing is invented: a message is kept unchanged or not at all.
 
-mod walk;
+mod scan;
 mod write;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mcap::records::op;
 use serde::Serialize;
 
 use crate::log::LogError;
 use crate::output::Destination;
-use walk::{Piece, Walk};
+use scan::{ChunkName, Good, Records};
 use write::Rescue;
 
 /// Why nothing could be recovered.
@@ -22,6 +25,14 @@ pub enum RecoverError {
     /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// No message could be kept.
+    #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
+    Nothing {
+        /// The file.
+        name: String,
+        /// What is wrong with it first.
+        reason: Option<String>,
+    },
     /// The file cannot be created.
     #[error("{}: cannot be created", path.display())]
     Create {
@@ -41,17 +52,17 @@ pub enum RecoverError {
 /// A stretch of a file that could not be kept.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lost {
-    /// Its first byte.
+    /// Its first byte; of a chunk that is not there, its first byte in the file as it was.
     pub from_byte: u64,
     /// Its length.
     pub bytes: u64,
-    /// The times of its messages, s after the first message of the log; `None` if the file does not tell.
+    /// The times of its messages, s after the first message kept; `None` if the file does not tell.
     pub span_s: Option<(f64, f64)>,
     pub reason: String,
 }
 
 /// Report of a recovery.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Recovery {
     /// The damaged log.
     pub input: String,
@@ -67,48 +78,175 @@ pub struct Recovery {
     pub kept_s: Option<f64>,
     /// What was lost.
     pub lost: Vec<Lost>,
+    /// Messages that the summary counts and that were not kept; `None` without a summary.
+    pub messages_lost: Option<u64>,
+    /// Messages of a channel that nothing describes.
+    pub undecodable: u64,
+    /// Chunks that were there twice; one of each is kept.
+    pub repeated: u64,
+    /// Chunks were not in the order of the summary; they are now.
+    pub reordered: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
     pub ended: bool,
+}
+
+impl Recovery {
+    /// Whether the log was whole.
+    pub fn was_whole(&self) -> bool {
+        let Self { lost, messages_lost, undecodable, repeated, reordered, ended, .. } = self;
+        lost.is_empty() && messages_lost.unwrap_or(0) + undecodable + repeated == 0 && !reordered && *ended
+    }
+
+    /// What was wrong with the log, for the recovered one; `None` if it was whole.
+    pub fn fault(&self) -> Option<String> {
+        let mut faults = Vec::new();
+        faults.extend(self.lost.first().map(|lost| {
+            let bytes: u64 = self.lost.iter().map(|lost| lost.bytes).sum();
+            format!(
+                "{} stretches of {bytes} bytes are lost, the first from byte {}",
+                self.lost.len(),
+                lost.from_byte
+            )
+        }));
+        faults.extend(
+            self.messages_lost.filter(|lost| *lost > 0).map(|lost| format!("{lost} messages are lost")),
+        );
+        if self.undecodable > 0 {
+            faults.push(format!("{} messages of an unknown channel were dropped", self.undecodable));
+        }
+        if self.repeated > 0 {
+            faults.push(format!("{} chunks were there twice", self.repeated));
+        }
+        if self.reordered {
+            faults.push("its chunks were out of order".to_owned());
+        }
+        if !self.ended {
+            faults.push("it had no end mark, so its end may be lost".to_owned());
+        }
+        (!faults.is_empty()).then(|| faults.join("; "))
+    }
 }
 
 /// Recovers a log into a new file.
 ///
 /// # Errors
-/// The input is not an MCAP file or cannot be read; the output exists and may not be replaced, or cannot be written.
+/// The input is not an MCAP file, cannot be read, or holds no message that can be kept; the output exists and may not be
+/// replaced, or cannot be written.
 pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<Recovery, RecoverError> {
     let destination = output.into();
-    let output = destination.path;
-    let mut walk = Walk::open(input)?;
-    let mut rescue = Rescue::create(destination, input)?;
-    let mut lost = Vec::new();
-    let mut ended = false;
-    while let Some(piece) = walk.next_piece()? {
-        match piece {
-            Piece::Records { records, chunk } => rescue.keep(records, chunk)?,
-            Piece::Lost { from_byte, bytes, span_ns, reason } => {
-                lost.push((from_byte, bytes, span_ns, reason));
-            }
-            Piece::End => ended = true,
-        }
-    }
-    let first_ns = rescue.first_ns();
-    let since_s = |ns: u64| (ns as f64 - first_ns.unwrap_or(ns) as f64) / 1e9;
-    let lost = lost.into_iter().map(|(from_byte, bytes, span_ns, reason)| Lost {
-        from_byte,
-        bytes,
-        span_s: span_ns.map(|(from, until)| (since_s(from), since_s(until))),
-        reason,
-    });
+    let mut records = Records::open(input)?;
+    let contents = records.contents()?;
+    let told = contents.told;
+    let ended = contents.ended;
+    let first_reason = contents.lost.first().map(|lost| lost.reason.clone());
     let mut recovery = Recovery {
         input: input.display().to_string(),
-        output: output.to_owned(),
-        messages: 0,
-        chunks: 0,
-        records_about: 0,
-        kept_s: None,
-        lost: lost.collect(),
+        output: destination.path.to_owned(),
         ended,
+        ..Recovery::default()
     };
+    let (good, repeated) = without_repeats(contents.good);
+    recovery.repeated = repeated;
+    let missing = missing_chunks(&told.chunks, &good);
+    let (good, reordered) = in_order(good, &told.chunks);
+    recovery.reordered = reordered;
+    let mut rescue = Rescue::create(destination, input, &told)?;
+    for piece in good {
+        let body = records.body(piece.at)?;
+        rescue.keep(piece.opcode, &body)?;
+    }
+    if rescue.first_ns().is_none() {
+        return Err(RecoverError::Nothing { name: recovery.input, reason: first_reason });
+    }
+    recovery.messages_lost = told.messages.map(|told| told.saturating_sub(rescue.messages()));
+    // With every message kept, a chunk that the summary does not know is one whose head was changed.
+    let missing = if recovery.messages_lost == Some(0) { Vec::new() } else { missing };
+    recovery.lost = lost_of(&contents.lost, &missing, rescue.first_ns());
     rescue.finish(&mut recovery)?;
     Ok(recovery)
+}
+
+/// The first of equal chunks each, and how many were left out.
+fn without_repeats(good: Vec<Good>) -> (Vec<Good>, u64) {
+    let mut seen = std::collections::BTreeSet::new();
+    let before = good.len();
+    let kept: Vec<Good> =
+        good.into_iter().filter(|piece| piece.chunk.is_none_or(|chunk| seen.insert(chunk))).collect();
+    let repeated = before - kept.len();
+    (kept, repeated as u64)
+}
+
+/// The chunks of the summary that are not there.
+fn missing_chunks(told: &[(u64, u64, ChunkName)], good: &[Good]) -> Vec<(u64, u64, ChunkName)> {
+    let mut there: BTreeMap<ChunkName, u32> = BTreeMap::new();
+    for (name, _) in good.iter().filter_map(|piece| piece.chunk) {
+        *there.entry(name).or_default() += 1;
+    }
+    let is_missing = |(_, _, name): &&(u64, u64, ChunkName)| match there.get_mut(name) {
+        Some(count) if *count > 0 => {
+            *count -= 1;
+            false
+        }
+        _ => true,
+    };
+    told.iter().filter(is_missing).copied().collect()
+}
+
+/// The pieces with the chunks in the order of the summary, and whether they were in another one. Without a summary, and
+/// in a file with messages outside of chunks, the order stays.
+fn in_order(good: Vec<Good>, told: &[(u64, u64, ChunkName)]) -> (Vec<Good>, bool) {
+    let place: BTreeMap<ChunkName, u64> = told.iter().map(|(offset, _, name)| (*name, *offset)).collect();
+    let places: Option<Vec<u64>> =
+        good.iter().filter_map(|piece| piece.chunk).map(|(name, _)| place.get(&name).copied()).collect();
+    let loose = good.iter().any(|piece| piece.opcode == op::MESSAGE);
+    if loose || places.is_none_or(|places| places.is_sorted()) {
+        return (good, false);
+    }
+    let (mut chunks, mut all): (Vec<Good>, Vec<Good>) =
+        good.into_iter().partition(|piece| piece.chunk.is_some());
+    chunks.sort_by_key(|piece| piece.chunk.and_then(|(name, _)| place.get(&name)));
+    all.extend(chunks);
+    (all, true)
+}
+
+/// What is lost, with times after the first message kept: the stretches, and the chunks of the summary that no stretch
+/// covers.
+fn lost_of(
+    stretches: &[scan::LostStretch],
+    missing: &[(u64, u64, ChunkName)],
+    first_ns: Option<u64>,
+) -> Vec<Lost> {
+    let since_s = |ns: u64| (ns as f64 - first_ns.unwrap_or(ns) as f64) / 1e9;
+    let mut lost: Vec<Lost> = Vec::new();
+    let mut spans: Vec<Option<(u64, u64)>> = stretches.iter().map(|stretch| stretch.span_ns).collect();
+    let mut uncovered = Vec::new();
+    for (offset, bytes, name) in missing {
+        let span = (name.first_ns, name.last_ns);
+        let covers = |(place, stretch): (usize, &scan::LostStretch)| {
+            let holds = (stretch.from_byte..stretch.from_byte + stretch.bytes).contains(offset);
+            (stretch.span_ns == Some(span) || holds).then_some(place)
+        };
+        match stretches.iter().enumerate().find_map(covers) {
+            Some(place) => {
+                let (from, until) = spans[place].unwrap_or(span);
+                spans[place] = Some((from.min(span.0), until.max(span.1)));
+            }
+            None => uncovered.push((*offset, *bytes, span)),
+        }
+    }
+    let in_seconds = |(from, until): (u64, u64)| (since_s(from), since_s(until));
+    lost.extend(stretches.iter().zip(spans).map(|(stretch, span_ns)| Lost {
+        from_byte: stretch.from_byte,
+        bytes: stretch.bytes,
+        span_s: span_ns.map(in_seconds),
+        reason: stretch.reason.clone(),
+    }));
+    lost.extend(uncovered.into_iter().map(|(from_byte, bytes, span_ns)| Lost {
+        from_byte,
+        bytes,
+        span_s: Some(in_seconds(span_ns)),
+        reason: "a chunk that the summary names is not there".to_owned(),
+    }));
+    lost.sort_by_key(|lost| lost.from_byte);
+    lost
 }

@@ -4,20 +4,23 @@ use std::collections::BTreeMap;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Metadata, Record};
+use mcap::records::{MessageHeader, Metadata, Record, op};
+use protocol::log::reader::{parse_record, records_of_chunk};
+use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 
+use super::scan::Told;
 use super::{RecoverError, Recovery};
 use crate::output::{Destination, NewFile};
 
-/// Name of the metadata record that says that a log was recovered.
-const METADATA_RECOVERY: &str = "recovery";
 /// Chunk size as in the recorder's own logs.
 const CHUNK_BYTES: u64 = 64 * 1024;
 
 type Writer = mcap::Writer<BufWriter<NewFile>>;
 
-pub(super) struct Rescue {
+pub(super) struct Rescue<'a> {
     path: PathBuf,
+    /// What the file's own summary tells of its channels, for messages whose channel record is lost.
+    told: &'a Told,
     /// Created when the library's name is known, which is the first record of a file.
     state: State,
     /// The file's schemas and channels by their numbers there.
@@ -27,6 +30,8 @@ pub(super) struct Rescue {
     messages: u64,
     chunks: u64,
     records_about: u64,
+    /// Messages whose channel nothing describes.
+    undecodable: u64,
 }
 
 enum State {
@@ -35,13 +40,18 @@ enum State {
     Gone,
 }
 
-impl Rescue {
-    pub(super) fn create(destination: Destination, input: &Path) -> Result<Self, RecoverError> {
+impl<'a> Rescue<'a> {
+    pub(super) fn create(
+        destination: Destination,
+        input: &Path,
+        told: &'a Told,
+    ) -> Result<Self, RecoverError> {
         let path = destination.path;
         let file = NewFile::create(destination, input)
             .map_err(|source| RecoverError::Create { path: path.to_owned(), source })?;
         Ok(Self {
             path: path.to_owned(),
+            told,
             state: State::Waiting(file),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
@@ -49,6 +59,7 @@ impl Rescue {
             messages: 0,
             chunks: 0,
             records_about: 0,
+            undecodable: 0,
         })
     }
 
@@ -56,12 +67,20 @@ impl Rescue {
         self.span_ns.map(|(first, _)| first)
     }
 
-    pub(super) fn keep(&mut self, records: Vec<Record<'static>>, chunk: bool) -> Result<(), RecoverError> {
-        self.chunks += u64::from(chunk);
-        for record in records {
-            self.keep_record(record).map_err(|source| self.failed(source))?;
-        }
-        Ok(())
+    pub(super) fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    /// Keeps a record, or every record of a chunk.
+    pub(super) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+        let kept = if opcode == op::CHUNK {
+            self.chunks += 1;
+            // It was read before without an error; a file that has changed since then is lost here.
+            records_of_chunk(body, |record| self.keep_record(record)).map_err(|error| error.into_mcap())
+        } else {
+            parse_record(opcode, body).and_then(|record| self.keep_record(record))
+        };
+        kept.map_err(|source| self.failed(source))
     }
 
     fn keep_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
@@ -105,8 +124,8 @@ impl Rescue {
     }
 
     fn message(&mut self, header: MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
-        // A message without its channel cannot be decoded.
-        let Some(channel_id) = self.channels.get(&header.channel_id).copied() else {
+        let Some(channel_id) = self.channel(header.channel_id)? else {
+            self.undecodable += 1;
             return Ok(());
         };
         self.writer("")?.write_to_known_channel(&MessageHeader { channel_id, ..header }, data)?;
@@ -114,6 +133,22 @@ impl Rescue {
         let (first, last) = self.span_ns.unwrap_or((header.log_time, header.log_time));
         self.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
         Ok(())
+    }
+
+    /// The new number of a channel; of one whose record is lost, from the summary.
+    fn channel(&mut self, id: u16) -> mcap::McapResult<Option<u16>> {
+        if let Some(known) = self.channels.get(&id) {
+            return Ok(Some(*known));
+        }
+        let Some(told) = self.told.channels.get(&id) else { return Ok(None) };
+        let schema = match self.told.schemas.get(&told.schema_id) {
+            Some((schema, data)) => self.writer("")?.add_schema(&schema.name, &schema.encoding, data)?,
+            None => 0,
+        };
+        let new =
+            self.writer("")?.add_channel(schema, &told.topic, &told.message_encoding, &told.metadata)?;
+        self.channels.insert(id, new);
+        Ok(Some(new))
     }
 
     /// The writer; created with this library's name if necessary.
@@ -139,6 +174,7 @@ impl Rescue {
         recovery.messages = self.messages;
         recovery.chunks = self.chunks;
         recovery.records_about = self.records_about;
+        recovery.undecodable = self.undecodable;
         recovery.kept_s = self.span_ns.map(|(first, last)| last.saturating_sub(first) as f64 / 1e9);
         self.close(recovery).map_err(|source| self.failed(source))
     }
@@ -151,6 +187,7 @@ impl Rescue {
             ("from".to_owned(), recovery.input.clone()),
             ("ended".to_owned(), recovery.ended.to_string()),
             ("lost".to_owned(), lost.collect::<Vec<_>>().join("; ")),
+            (RECOVERY_FAULT_ENTRY.to_owned(), recovery.fault().unwrap_or_default()),
         ]);
         let writer = self.writer("")?;
         writer.write_metadata(&Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts })?;

@@ -38,6 +38,7 @@ use std::io::Read;
 use std::path::Path;
 
 use flight::FlightVerifier;
+use protocol::log::reader::Damage;
 use report::FileFacts;
 
 use crate::log::{Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
@@ -55,7 +56,9 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
         Ok(whole.head().clone())
     })?;
     let read = reports.iter().map(|report| report.ticks_recorded).sum();
-    for report in reports.iter_mut().filter(|report| report.damage.is_some()) {
+    // A recovered log is read to its end; what is lost is not in it.
+    let unread = !matches!(log.damage(), Some(Damage::Recovered(_)));
+    for report in reports.iter_mut().filter(|report| unread && report.damage.is_some()) {
         report.unread = Some(Unread::of(path, read, log.last_log_time_ns()));
     }
     // A log that is too long to be flown again, or has several flights, has still been compared.

@@ -211,9 +211,13 @@ fn a_recovery_is_reported_and_never_overwrites() {
     assert!(stdout.contains("kept ") && stdout.contains("no end mark"), "{stdout}");
     let (code, stdout, _) = run(&mut replay("verify", &output));
     assert!(
-        code == 0 && stdout.contains(&format!("{ticks} of {ticks} ticks identical of an INCOMPLETE flight")),
+        code == 0
+            && stdout.contains(&format!("{ticks} of {ticks} ticks identical of the readable part"))
+            && stdout.contains("it was recovered from a damaged log"),
         "{stdout}"
     );
+    let (code, _, _) = run(replay("verify", &output).arg("--strict"));
+    assert_eq!(code, 1, "the repair does not make a whole flight of it");
     let (code, _, stderr) = run(replay("recover", &cut).arg(&output));
     assert!(code == 2 && stderr.contains("cannot be created"), "{stderr}");
     let (code, _, stderr) =

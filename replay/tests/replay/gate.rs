@@ -238,3 +238,42 @@ fn a_campaign_is_flown_again_from_its_order() {
     let (code, stdout, _) = gate(&campaign, &baseline, &[]);
     assert!(code == 1 && stdout.contains("DIVERGED"), "{stdout}");
 }
+
+/// A pipe would be waited for without end, a link to its own directory would count every flight again, and a link to nothing
+/// is no flight.
+#[test]
+fn every_regular_file_counts_once_and_what_is_left_out_is_told() {
+    let season = Season::new();
+    let logs = season.logs();
+    let pipe = logs.join("pipe.mcap");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    std::os::unix::fs::symlink(".", logs.join("self")).unwrap();
+    std::os::unix::fs::symlink("nowhere.mcap", logs.join("dangling.mcap")).unwrap();
+    std::os::unix::fs::symlink("week-1/nominal.mcap", logs.join("again.mcap")).unwrap();
+    let (found, skipped) = replay::gate::find(&logs).unwrap();
+    let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
+    assert_eq!(names, ["week-1/dispersed.mcap", "week-1/nominal.mcap", "week-2/mk2.mcap"]);
+    let skipped: Vec<(&str, &str)> = skipped.iter().map(|left| (left.name.as_str(), left.reason)).collect();
+    assert_eq!(
+        skipped,
+        [
+            ("again.mcap", "a log that is here already"),
+            ("dangling.mcap", "a link to nothing"),
+            ("pipe.mcap", "not a regular file"),
+            ("self", "a directory that is here already"),
+        ]
+    );
+    let (code, _, stderr) = season.gate(&["--accept"]);
+    assert!(code == 0 && stderr.contains("left out: pipe.mcap: not a regular file"), "{stderr}");
+}
+
+/// A crash whose file is replaced by another flight that landed has not been mended.
+#[test]
+fn another_flight_under_the_name_of_a_crash_is_not_that_crash_landing() {
+    let season = Season::new();
+    assert_eq!(season.gate(&["--accept"]).0, 0);
+    std::fs::copy(&DISPERSED.log, season.logs().join("week-1/nominal.mcap")).unwrap();
+    let (code, table, _) = season.gate(&[]);
+    assert_eq!(code, 1, "{table}");
+    assert!(table.contains("MISSING") && table.contains("new") && !table.contains("FLIPPED"), "{table}");
+}

@@ -63,6 +63,40 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     assert!(code == 2 && said.contains("is not a flight log"), "{said}");
 }
 
+/// A hundred kilobytes that say that they unpack to four gigabytes, of records of no type.
+#[test]
+fn a_chunk_that_unpacks_to_gigabytes_does_not_fill_the_memory() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("bomb.mcap");
+    let (at, _) = WHOLE.synced[4];
+    for unpacked in [48_u64 << 20, 4 << 30] {
+        // Zeros, packed by lz4 into sequences of 255 bytes each.
+        let file = std::io::Cursor::new(Vec::new());
+        let mut writer =
+            mcap::WriteOptions::new().compression(Some(mcap::Compression::Lz4)).create(file).unwrap();
+        let schema = writer.add_schema("zeros", "", b"").unwrap();
+        let channel = writer.add_channel(schema, "/zeros", "", &std::collections::BTreeMap::new()).unwrap();
+        let header =
+            mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
+        writer.write_to_known_channel(&header, &vec![0; 48 << 20]).unwrap();
+        writer.finish().unwrap();
+        let bomb = writer.into_inner().into_inner();
+        let chunk = &mcap::Summary::read(&bomb).unwrap().unwrap().chunk_indexes[0];
+        let begins = usize::try_from(chunk.chunk_start_offset).unwrap();
+        let mut chunk = bomb[begins..begins + usize::try_from(chunk.chunk_length).unwrap()].to_vec();
+        chunk[9 + 16..][..8].copy_from_slice(&unpacked.to_le_bytes());
+        std::fs::write(&path, [&WHOLE.bytes[..usize::try_from(at).unwrap()], &chunk].concat()).unwrap();
+        for arguments in [&["info"][..], &["verify"], &["evaluate"]] {
+            let (code, said) = within(400, arguments, &path);
+            assert!(code <= 2, "{arguments:?}: {said}");
+        }
+        let output = directory.path().join(format!("{unpacked}.mcap"));
+        let command = [&["recover"][..], &[path.to_str().unwrap()]].concat();
+        let (code, said) = within(400, &command, &output);
+        assert_eq!(code, 0, "{said}");
+    }
+}
+
 /// Writes a log of at least this many bytes; returns its number of ticks.
 fn write_long_log(path: &Path, bytes: u64) -> u64 {
     let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());

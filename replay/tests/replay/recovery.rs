@@ -1,13 +1,19 @@
 //! Tests the recovery of whole logs from damaged ones.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use proptest::prelude::*;
-use replay::log::Recording;
+use protocol::log::reader::Damage;
+use replay::info::info;
+use replay::log::{FlightLog, Recording};
 use replay::recover::recover;
 use replay::verify::{Verification, verify};
 
+use crate::command_line::{replay, run};
 use crate::flown::{WHOLE, only};
+use crate::from_apogee::LANDED;
 use crate::simulated::DISPERSED;
 
 /// Recovers bytes; `None` if they were refused.
@@ -39,8 +45,9 @@ fn a_cut_log_recovers_what_was_synced() {
     for (at, ticks) in &WHOLE.synced[..WHOLE.synced.len() - 1] {
         let cut = &WHOLE.bytes[..usize::try_from(*at).unwrap() + 3];
         let (recovery, again) = recovered(cut, directory.path()).unwrap();
-        assert_eq!((again.ticks.len(), again.damage), (*ticks, None), "cut after {at}");
+        assert_eq!(again.ticks.len(), *ticks, "cut after {at}");
         assert!(!recovery.ended);
+        assert!(again.damage.unwrap().contains("it had no end mark"), "the recovered log says so");
         let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
         // Data that was not yet on the disk is missing, although no checksum shows it any more.
         assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
@@ -64,9 +71,9 @@ fn chunks_after_a_broken_chunk_are_kept() {
     assert!((from_s - before as f64 * 0.1).abs() < 1e-6 && (until_s - from_s - 0.4).abs() < 1e-6);
 }
 
-/// The length of a record is broken, so nobody knows where the next begins; the summary at the end does.
+/// The length of a record is broken: the next chunk is found by what it looks like.
 #[test]
-fn after_a_broken_record_the_summary_locates_the_next_chunk() {
+fn after_a_broken_length_the_next_chunk_is_found() {
     let directory = tempfile::tempdir().unwrap();
     let mut bytes = WHOLE.bytes.clone();
     let (at, before) = WHOLE.synced[3];
@@ -74,6 +81,172 @@ fn after_a_broken_record_the_summary_locates_the_next_chunk() {
     let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
     assert!(again.ticks.len() > before, "{recovery:?}");
     assert!(recovery.ended && recovery.lost.len() == 1, "{recovery:?}");
+}
+
+/// What a log holds: topic, time, number and bytes of each message.
+type Messages = BTreeSet<(String, u64, u32, Vec<u8>)>;
+
+fn messages_of(path: &Path) -> (Messages, Option<Damage>) {
+    let mut log = FlightLog::open(path).unwrap();
+    let mut messages = Messages::new();
+    while let Some(stamped) = log.next_entry().unwrap() {
+        let topic = log.channel(stamped.channel_id).map_or_else(String::new, |channel| channel.topic.clone());
+        messages.insert((topic, stamped.log_time_ns, stamped.sequence, stamped.data));
+    }
+    (messages, log.damage().cloned())
+}
+
+/// A whole log: its bytes, its messages, and where each of its chunks lies.
+struct Original {
+    bytes: Vec<u8>,
+    messages: Messages,
+    chunks: Vec<std::ops::Range<usize>>,
+}
+
+impl Original {
+    fn of(bytes: Vec<u8>) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("original.mcap");
+        std::fs::write(&path, &bytes).unwrap();
+        let (messages, damage) = messages_of(&path);
+        assert_eq!(damage, None);
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let place = |bytes: u64| usize::try_from(bytes).unwrap();
+        let mut chunks: Vec<_> = summary
+            .chunk_indexes
+            .iter()
+            .map(|index| {
+                let begins = place(index.chunk_start_offset);
+                begins..begins + place(index.chunk_length)
+            })
+            .collect();
+        chunks.sort_by_key(|chunk| chunk.start);
+        assert!(chunks.len() > 3);
+        Self { bytes, messages, chunks }
+    }
+}
+
+static ORIGINALS: LazyLock<[Original; 3]> = LazyLock::new(|| {
+    let read = |path: &PathBuf| Original::of(std::fs::read(path).unwrap());
+    [Original::of(WHOLE.bytes.clone()), read(&DISPERSED.log), read(&LANDED.log)]
+});
+
+/// One thing that can happen to a chunk.
+#[derive(Debug, Clone, Copy)]
+enum Harm {
+    /// It and its index are gone.
+    Gone,
+    /// It is there twice.
+    Twice,
+    /// It has changed places with the next.
+    Swapped,
+    /// One bit of it is turned.
+    Flipped,
+    /// Some of its bytes are missing.
+    Shortened,
+    /// Some bytes were written into it.
+    Inserted,
+    /// It says that it unpacks to 4 GB.
+    Inflated,
+    /// The file ends within it.
+    Cut,
+}
+
+fn harmed(original: &Original, harm: Harm, chunk: usize, place: usize) -> Vec<u8> {
+    let bytes = &original.bytes;
+    let chunk = chunk % (original.chunks.len() - 1);
+    let (this, next) = (original.chunks[chunk].clone(), original.chunks[chunk + 1].clone());
+    let within = this.start + place % this.len();
+    let mut harmed = bytes.clone();
+    match harm {
+        Harm::Gone => drop(harmed.drain(this.start..next.start)),
+        Harm::Twice => drop(harmed.splice(next.start..next.start, bytes[this.start..next.start].to_vec())),
+        Harm::Swapped => {
+            let swapped = [&bytes[next.clone()], &bytes[this.end..next.start], &bytes[this.clone()]].concat();
+            harmed[this.start..next.end].copy_from_slice(&swapped);
+        }
+        Harm::Flipped => harmed[within] ^= 1 << (place % 8),
+        Harm::Shortened => drop(harmed.drain(within..(within + 1 + place % 300).min(this.end))),
+        Harm::Inserted => drop(harmed.splice(within..within, vec![0x55; 1 + place % 300])),
+        Harm::Inflated => harmed[this.start + 9 + 16..][..8].copy_from_slice(&(4_u64 << 30).to_le_bytes()),
+        Harm::Cut => harmed.truncate(within),
+    }
+    harmed
+}
+
+/// Recovers a harmed log, and asserts what has to hold of every recovery.
+fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], what: &str) {
+    let directory = tempfile::tempdir().unwrap();
+    let (input, output) = (directory.path().join("in.mcap"), directory.path().join("out.mcap"));
+    std::fs::write(&input, bytes).unwrap();
+    let strictly = |path: &PathBuf| run(replay("verify", path).arg("--strict")).0;
+    assert_ne!(strictly(&input), 0, "{what}: the harmed log itself");
+    let Ok(recovery) = recover(&input, &output) else { return };
+    let (kept, damage) = messages_of(&output);
+    assert!(kept.is_subset(&original.messages), "{what}: something was invented");
+    assert!(!recovery.was_whole(), "{what}: {recovery:?}");
+    assert!(matches!(damage, Some(Damage::Recovered(_))), "{what}: {damage:?}");
+    assert!(!info(&output).unwrap().completeness.complete, "{what}");
+    assert_ne!(strictly(&output), 0, "{what}: the recovered log");
+    let lost = original.messages.len() - kept.len();
+    if let Some(told) = recovery.messages_lost {
+        assert_eq!(told, lost as u64, "{what}: {recovery:?}");
+    }
+    // What is lost lies where the report says; without a summary some losses have no time.
+    let first_ns = kept.iter().map(|(_, at_ns, ..)| *at_ns).min().unwrap();
+    let in_a_span = |at_ns: u64| {
+        let at_s = (at_ns as f64 - first_ns as f64) / 1e9;
+        let spans = recovery.lost.iter().map(|lost| lost.span_s);
+        spans
+            .into_iter()
+            .any(|span| span.is_none_or(|(from, until)| (from - 1e-6..=until + 1e-6).contains(&at_s)))
+    };
+    let untold = original.messages.difference(&kept).find(|(_, at_ns, ..)| !in_a_span(*at_ns));
+    let untold = untold.map(|(topic, at_ns, ..)| (topic, (*at_ns as f64 - first_ns as f64) / 1e9));
+    // Without an end mark nobody knows what came later; without a channel's record its messages have no place.
+    let open_end = !recovery.ended || recovery.undecodable > 0;
+    assert!(untold.is_none() || open_end, "{what}: {untold:?} is lost and not told: {recovery:?}");
+}
+
+#[test]
+fn a_chunk_that_is_gone_is_told_wherever_it_was() {
+    for original in &*ORIGINALS {
+        for chunk in [0, original.chunks.len() / 2, original.chunks.len() - 2] {
+            for harm in [Harm::Gone, Harm::Twice, Harm::Swapped] {
+                let bytes = harmed(original, harm, chunk, 0);
+                assert_nothing_is_laundered(original, &bytes, &format!("chunk {chunk} {harm:?}"));
+            }
+        }
+    }
+}
+
+/// The bytes that are missing cost their own chunk, and no more.
+#[test]
+fn bytes_missing_in_a_chunk_lose_that_chunk_alone() {
+    let original = &ORIGINALS[2];
+    let bytes = harmed(original, Harm::Shortened, 1, 299);
+    let directory = tempfile::tempdir().unwrap();
+    let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
+    assert_eq!(recovery.chunks as usize, original.chunks.len() - 1, "{recovery:?}");
+    assert!(recovery.ended);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+
+    /// Chunks of three logs are cut, dropped, swapped, repeated, flipped and inflated.
+    #[test]
+    fn whatever_happens_to_a_log_no_recovery_calls_it_whole(
+        log in 0_usize..3,
+        harm in prop::sample::select(vec![
+            Harm::Gone, Harm::Twice, Harm::Swapped, Harm::Flipped, Harm::Shortened, Harm::Inserted, Harm::Inflated, Harm::Cut,
+        ]),
+        chunk in 0_usize..1_000,
+        place in 0_usize..100_000,
+    ) {
+        let original = &ORIGINALS[log];
+        assert_nothing_is_laundered(original, &harmed(original, harm, chunk, place), &format!("{log} {harm:?} {chunk} {place}"));
+    }
 }
 
 proptest! {

@@ -4,8 +4,8 @@ use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase, TdSolverStatus,
-    TdVehicleFlag,
+    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+    TdSolverStatus, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres};

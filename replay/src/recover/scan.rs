@@ -1,0 +1,369 @@
+//! Reads a damaged file from front to back: which records and chunks are good, and what lies between them.
+//!
+//! Where no record begins, it looks for the next chunk: a byte that says so, lengths that fit each other and the file, and
+//! then the chunk's own checksum.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::path::Path;
+
+use mcap::records::{Channel, Record, SchemaHeader, op};
+use protocol::log::reader::{RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk};
+
+use crate::log::LogError;
+
+/// Size of the type and length before every record.
+const HEAD_BYTES: usize = 9;
+/// A chunk's fields before its content, without the name of the compression.
+const CHUNK_FIELDS_BYTES: u64 = 40;
+/// What is held at a time while the next chunk is looked for.
+const WINDOW_BYTES: usize = 1 << 20;
+/// More than the head and the fields of a chunk: the windows overlap by it.
+const OVERLAP_BYTES: usize = 64;
+/// No log has more chunks and records outside of chunks; a file of tiny records must not fill the memory.
+const GOOD_MAX: usize = 500_000;
+const LOST_MAX: usize = 10_000;
+
+/// What tells one chunk from another, in its own head and in the summary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct ChunkName {
+    pub(super) first_ns: u64,
+    pub(super) last_ns: u64,
+    pub(super) uncompressed_bytes: u64,
+    pub(super) compressed_bytes: u64,
+}
+
+/// A good record, or a chunk whose checksum is right.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Good {
+    /// Its first byte in the file.
+    pub(super) at: u64,
+    pub(super) opcode: u8,
+    /// Name and checksum of a chunk.
+    pub(super) chunk: Option<(ChunkName, u32)>,
+}
+
+/// A stretch of the file that cannot be kept.
+#[derive(Debug, Clone)]
+pub(super) struct LostStretch {
+    pub(super) from_byte: u64,
+    pub(super) bytes: u64,
+    pub(super) span_ns: Option<(u64, u64)>,
+    pub(super) reason: String,
+}
+
+/// What a file consists of.
+#[derive(Debug, Default)]
+pub(super) struct Contents {
+    pub(super) good: Vec<Good>,
+    pub(super) lost: Vec<LostStretch>,
+    /// The end mark is there.
+    pub(super) ended: bool,
+    pub(super) told: Told,
+}
+
+/// What the summary behind the end mark tells, as far as it can be read. Its own index is not used: bytes that were lost
+/// have shifted it.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    pub(super) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
+    pub(super) channels: BTreeMap<u16, Channel>,
+    /// Where each chunk began, its length and its name.
+    pub(super) chunks: Vec<(u64, u64, ChunkName)>,
+    /// How many messages there were; `None` if it is not told.
+    pub(super) messages: Option<u64>,
+}
+
+/// A file being read record by record.
+pub(super) struct Records {
+    name: String,
+    input: BufReader<File>,
+    size: u64,
+}
+
+impl Records {
+    /// Opens a file that begins as an MCAP file does.
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let name = path.display().to_string();
+        let read = |source| LogError::Read { name: name.clone(), source };
+        let file = File::open(path).map_err(read)?;
+        let size = file.metadata().map_err(read)?.len();
+        let mut input = BufReader::with_capacity(1 << 16, file);
+        let mut found = Vec::new();
+        input.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut found).map_err(read)?;
+        if found.is_empty() {
+            return Err(LogError::Empty { name });
+        }
+        if found != mcap::MAGIC {
+            return Err(LogError::NotMcap { name, found });
+        }
+        Ok(Self { name, input, size })
+    }
+
+    /// The body of the record that begins at this byte.
+    pub(super) fn body(&mut self, at: u64) -> Result<Vec<u8>, LogError> {
+        match self.head(at)? {
+            Some((_, length)) => self.read(at + HEAD_BYTES as u64, length),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// Reads the whole file.
+    pub(super) fn contents(&mut self) -> Result<Contents, LogError> {
+        let mut contents = Contents::default();
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&mcap::MAGIC);
+        let mut at = mcap::MAGIC.len() as u64;
+        while at < self.size {
+            let end_of_head = at + HEAD_BYTES as u64;
+            let Some((opcode, length)) = self.head(at)? else {
+                contents.lose(at, self.size - at, None, "ends inside a record");
+                break;
+            };
+            let fits = opcode != 0 && length <= self.size - end_of_head;
+            if !fits || contents.good.len() >= GOOD_MAX {
+                let reason = if opcode == 0 {
+                    "no record begins here"
+                } else if fits {
+                    "more records than any log has"
+                } else {
+                    "a record that is longer than the rest of the file"
+                };
+                at = self.skip(&mut contents, at, None, reason)?;
+                continue;
+            }
+            let next = end_of_head + length;
+            if length > RECORD_LIMIT_BYTES as u64 {
+                let whole = self.begins_record(next)?;
+                let until = if whole { next } else { self.next_chunk(at + 1)?.unwrap_or(self.size) };
+                contents.lose(at, until - at, None, "a record larger than this program reads");
+                at = until;
+                continue;
+            }
+            let body = self.read(end_of_head, length)?;
+            let chunk = (opcode == op::CHUNK).then(|| ChunkHead::read(&body)).flatten();
+            if opcode == op::DATA_END {
+                contents.ended = true;
+                let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+                if contents.lost.is_empty() && told != 0 && hasher.finalize() != told {
+                    let reason =
+                        "the checksum over all data does not fit: something between the records was changed";
+                    contents.lose(at, 0, None, reason);
+                }
+                contents.told = self.told(next)?;
+                break;
+            }
+            match check(opcode, &body) {
+                Ok(keeps) => {
+                    hasher.update(&[opcode]);
+                    hasher.update(&length.to_le_bytes());
+                    hasher.update(&body);
+                    if keeps {
+                        let chunk = chunk.map(|head| (head.name, head.crc));
+                        contents.good.push(Good { at, opcode, chunk });
+                    }
+                    at = next;
+                }
+                Err(error) => {
+                    let what = if opcode == op::CHUNK { "a chunk" } else { "a record" };
+                    let span_ns = chunk.and_then(|head| head.span_ns());
+                    let reason = format!("{what} is broken: {error}");
+                    if self.begins_record(next)? {
+                        contents.lose(at, next - at, span_ns, &reason);
+                        at = next;
+                    } else {
+                        // Bytes are missing, or were added: the next record does not begin where this length says.
+                        at = self.skip(&mut contents, at, span_ns, &reason)?;
+                    }
+                }
+            }
+        }
+        Ok(contents)
+    }
+
+    /// What is told from here to the footer, or to the first record that makes no sense.
+    fn told(&mut self, from_byte: u64) -> Result<Told, LogError> {
+        let mut told = Told::default();
+        let mut at = from_byte;
+        while self.begins_record(at)? {
+            let Some((opcode, length)) =
+                self.head(at)?.filter(|(_, length)| *length <= RECORD_LIMIT_BYTES as u64)
+            else {
+                break;
+            };
+            let body = self.read(at + HEAD_BYTES as u64, length)?;
+            match parse_record(opcode, &body) {
+                Ok(Record::Schema { header, data }) => {
+                    told.schemas.insert(header.id, (header, data.into_owned()));
+                }
+                Ok(Record::Channel(channel)) => {
+                    told.channels.insert(channel.id, channel);
+                }
+                Ok(Record::ChunkIndex(index)) if told.chunks.len() < GOOD_MAX => {
+                    let name = ChunkName {
+                        first_ns: index.message_start_time,
+                        last_ns: index.message_end_time,
+                        uncompressed_bytes: index.uncompressed_size,
+                        compressed_bytes: index.compressed_size,
+                    };
+                    told.chunks.push((index.chunk_start_offset, index.chunk_length, name));
+                }
+                Ok(Record::Statistics(statistics)) => told.messages = Some(statistics.message_count),
+                Ok(Record::Footer(_)) | Err(_) => break,
+                Ok(_) => {}
+            }
+            at += HEAD_BYTES as u64 + length;
+        }
+        Ok(told)
+    }
+
+    /// Loses what comes until the next chunk or the end mark, and returns where that is.
+    fn skip(
+        &mut self,
+        contents: &mut Contents,
+        from_byte: u64,
+        span_ns: Option<(u64, u64)>,
+        reason: &str,
+    ) -> Result<u64, LogError> {
+        let until = self.next_chunk(from_byte + 1)?.unwrap_or(self.size);
+        contents.lose(from_byte, until - from_byte, span_ns, reason);
+        Ok(until)
+    }
+
+    /// Whether a record that the format defines begins here and fits into the file; also the end of the file.
+    fn begins_record(&mut self, at: u64) -> Result<bool, LogError> {
+        if at == self.size {
+            return Ok(true);
+        }
+        let head = self.head(at)?;
+        Ok(head.is_some_and(|(opcode, length)| {
+            (op::HEADER..=op::DATA_END).contains(&opcode) && length <= self.size - at - HEAD_BYTES as u64
+        }))
+    }
+
+    /// The next byte from here on at which a chunk or the end mark of the data seems to begin.
+    fn next_chunk(&mut self, from_byte: u64) -> Result<Option<u64>, LogError> {
+        let mut start = from_byte;
+        loop {
+            let window = self.read(start, WINDOW_BYTES as u64)?;
+            let found = memchr::memchr2_iter(op::CHUNK, op::DATA_END, &window)
+                .find(|place| may_begin(&window[*place..], self.size - start - *place as u64));
+            if let Some(place) = found {
+                return Ok(Some(start + place as u64));
+            }
+            if window.len() < WINDOW_BYTES {
+                return Ok(None);
+            }
+            start += (WINDOW_BYTES - OVERLAP_BYTES) as u64;
+        }
+    }
+
+    /// Type and length of the record that begins here; `None` if the file ends before.
+    fn head(&mut self, at: u64) -> Result<Option<(u8, u64)>, LogError> {
+        let head = self.read(at, HEAD_BYTES as u64)?;
+        Ok(head.first().copied().zip(number_at(&head, 1)))
+    }
+
+    /// So many bytes from here, or those that are left.
+    fn read(&mut self, from: u64, bytes: u64) -> Result<Vec<u8>, LogError> {
+        let position = self.input.stream_position().map_err(|source| self.failed(source))?;
+        let mut read = Vec::new();
+        let moved =
+            i64::try_from(from).and_then(|from| i64::try_from(position).map(|position| from - position));
+        // A relative seek keeps the buffer.
+        match moved {
+            Ok(moved) => self.input.seek_relative(moved),
+            Err(_) => self.input.seek(SeekFrom::Start(from)).map(|_| ()),
+        }
+        .and_then(|()| self.input.by_ref().take(bytes).read_to_end(&mut read))
+        .map_err(|source| self.failed(source))?;
+        Ok(read)
+    }
+
+    fn failed(&self, source: std::io::Error) -> LogError {
+        LogError::Read { name: self.name.clone(), source }
+    }
+}
+
+impl Contents {
+    /// Notes a lost stretch; one that continues the last is part of it.
+    fn lose(&mut self, from_byte: u64, bytes: u64, span_ns: Option<(u64, u64)>, reason: &str) {
+        let full = self.lost.len() >= LOST_MAX;
+        if let Some(last) = self.lost.last_mut() {
+            let continues = last.from_byte + last.bytes == from_byte && span_ns.is_none();
+            if continues || full {
+                last.bytes = from_byte + bytes - last.from_byte;
+                return;
+            }
+        }
+        self.lost.push(LostStretch { from_byte, bytes, span_ns, reason: reason.to_owned() });
+    }
+}
+
+/// The fields at the beginning of a chunk.
+#[derive(Debug, Clone, Copy)]
+struct ChunkHead {
+    name: ChunkName,
+    crc: u32,
+    /// The length of the whole body that follows from its fields.
+    body_bytes: u64,
+}
+
+impl ChunkHead {
+    /// From the beginning of a chunk's body; `None` if the fields contradict each other.
+    fn read(body: &[u8]) -> Option<Self> {
+        let compression_bytes = u64::from(u32::from_le_bytes(*body.get(28..)?.first_chunk()?));
+        let compression = body.get(32..)?.get(..usize::try_from(compression_bytes).ok()?)?;
+        let name = ChunkName {
+            first_ns: number_at(body, 0)?,
+            last_ns: number_at(body, 8)?,
+            uncompressed_bytes: number_at(body, 16)?,
+            compressed_bytes: number_at(body, 32 + usize::try_from(compression_bytes).ok()?)?,
+        };
+        let known = matches!(compression, b"" | b"lz4" | b"zstd");
+        let body_bytes = (CHUNK_FIELDS_BYTES + compression_bytes).checked_add(name.compressed_bytes)?;
+        (known && name.first_ns <= name.last_ns).then_some(Self {
+            name,
+            crc: u32::from_le_bytes(*body.get(24..)?.first_chunk()?),
+            body_bytes,
+        })
+    }
+
+    /// First and last time of its messages, ns; `None` for an empty chunk.
+    fn span_ns(&self) -> Option<(u64, u64)> {
+        (self.name.first_ns > 0).then_some((self.name.first_ns, self.name.last_ns))
+    }
+}
+
+/// Whether a chunk or the end mark may begin with these bytes, with so many bytes left in the file.
+fn may_begin(bytes: &[u8], left: u64) -> bool {
+    let (Some(opcode), Some(length)) = (bytes.first(), number_at(bytes, 1)) else { return false };
+    if length > (RECORD_LIMIT_BYTES as u64).min(left.saturating_sub(HEAD_BYTES as u64)) {
+        return false;
+    }
+    if *opcode == op::DATA_END {
+        // Only a schema, a channel, an index, an offset or the footer may follow.
+        let next = bytes.get(HEAD_BYTES + 4);
+        return length == 4 && next.is_some_and(|next| (op::FOOTER..op::DATA_END).contains(next));
+    }
+    let head = ChunkHead::read(&bytes[HEAD_BYTES..]);
+    head.is_some_and(|head| {
+        head.body_bytes == length && head.name.uncompressed_bytes <= RECORD_LIMIT_BYTES as u64
+    })
+}
+
+/// Whether a record is kept, if it can be read: indexes are made anew.
+fn check(opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
+    match opcode {
+        op::CHUNK => records_of_chunk(body, |_| Ok(())).map(|()| true),
+        op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
+            parse_record(opcode, body).map(|_| true).map_err(RecordError::from)
+        }
+        _ => Ok(false),
+    }
+}
+
+fn number_at(bytes: &[u8], place: usize) -> Option<u64> {
+    bytes.get(place..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))
+}
