@@ -3,17 +3,16 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::time::Duration;
 
-use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 use protocol::log::recorder::RecorderError;
 
 use crate::model::Model;
-use crate::model::judgement::Standard;
-use crate::model::motor::KeepAway;
+use crate::model::ending::Ending;
 use crate::model::vehicle::Verdict;
+use crate::view::banner;
 use crate::view::limit_rows::limit_rows;
 use crate::view::number::fixed;
-use crate::view::touchdown::verdict_word;
 
 /// Prints events as they come.
 #[derive(Debug, Default)]
@@ -60,20 +59,25 @@ impl Lines {
 }
 
 /// Prints the closing lines: the verdict limit by limit, and where the log is.
-pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBuf>, &RecorderError>) {
+pub fn closing(
+    model: &Model,
+    interactive: bool,
+    log_path: Result<&Option<PathBuf>, &RecorderError>,
+    now: Duration,
+) {
     if interactive && !super::terminal_writer::wait_for_end() {
         // A blocked terminal would keep the program and its link open for ever.
         return;
     }
     let mut text = String::new();
     match model.vehicle.verdict {
-        Some(verdict) => text.push_str(&verdict_table(&verdict.value, model.vehicle.limits.as_ref())),
+        Some(verdict) => text.push_str(&verdict_table(model, &verdict.value, now)),
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}
     }
     // The last warning before somebody approaches the vehicle.
-    if let Some(away) = KeepAway::of(&model.vehicle) {
-        let _ = writeln!(text, "{}", away.words());
+    if let Some(words) = banner::of(model, now) {
+        let _ = writeln!(text, "{}", words.sentence());
     }
     if model.log.dropped > 0 {
         let _ = writeln!(text, "log: {} records dropped", model.log.dropped);
@@ -90,21 +94,20 @@ pub fn closing(model: &Model, interactive: bool, log_path: Result<&Option<PathBu
     let _ = print(&text);
 }
 
-fn verdict_table(verdict: &Verdict, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> String {
+fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
     let mut text = String::from("landing verdict, against the vehicle's limits\n");
-    for row in limit_rows(&verdict.touchdown, limits) {
+    for row in limit_rows(&verdict.touchdown, model.vehicle.limits.as_ref()) {
         let word = if row.kept { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(
             text,
-            "  {word} {:<6} {value:>9} {:<6} limit {} {}",
+            "  {word} {:<8} {value:>9} {:<6} limit {} {}",
             row.name, row.unit, row.limit, row.unit
         );
     }
-    let (word, _) = verdict_word(verdict.landed);
-    // By one standard only: the vehicle says in its own words what the other one makes of it.
-    let whose = if verdict.landed { format!(" of {}", Standard::whose(limits)) } else { String::new() };
-    let _ = writeln!(text, "{word}{whose}");
+    if let Some(ending) = Ending::of(&model.vehicle, now) {
+        let _ = writeln!(text, "{}", ending.sentence(&model.vehicle));
+    }
     text
 }
 

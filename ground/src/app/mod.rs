@@ -136,7 +136,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
-    lines::closing(&model, interactive, log_path.as_ref());
+    lines::closing(&model, interactive, log_path.as_ref(), clock.now());
     log_path.context("the log")?;
     Ok(exit::decide(&model.outcome, interactive))
 }

@@ -85,7 +85,7 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
         player.seek(player.recording().length());
         Lines::new().show(&player.model);
     }
-    lines::closing(&player.model, interactive, Ok(&None));
+    lines::closing(&player.model, interactive, Ok(&None), player.position());
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
 }
 

@@ -28,7 +28,7 @@ pub enum AlarmKind {
     /// The command was sent repeatedly and not answered.
     Unanswered(CommandKind),
     Refused(CommandKind),
-    /// The vehicle has latched an abort.
+    /// The vehicle has latched an abort, or inhibited its landing motor for good.
     Aborted,
     /// The landing motor was fired and did not light.
     NoLight,
@@ -38,7 +38,7 @@ pub enum AlarmKind {
     DeadlineMissed,
     /// Under thrust, the current plan ends outside a limit.
     PlanOutside,
-    /// The vehicle's verdict is that it has not landed.
+    /// The flight ended in another way than with a landing.
     NotLanded,
     /// The vehicle has rebooted.
     Rebooted,
@@ -53,6 +53,8 @@ pub enum AlarmKind {
     VehicleLog,
     /// The last check on the pad found something outside its limit.
     CheckFailed,
+    /// The countdown has reached zero while the vehicle was not heard.
+    MayBeFlying,
 }
 
 impl AlarmKind {
@@ -81,6 +83,7 @@ impl AlarmKind {
             Self::TwoVehicles,
             Self::SameId,
             Self::Foreign,
+            Self::MayBeFlying,
         ];
         others.into_iter().chain(of_commands)
     }
@@ -92,7 +95,7 @@ impl AlarmKind {
             Self::Unanswered(CommandKind::Abort)
             | Self::Disagreement(CommandKind::Abort)
             | Self::Refused(CommandKind::Abort) => 3,
-            Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign => 2,
+            Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign | Self::MayBeFlying => 2,
             Self::LinkLost
             | Self::UplinkLost
             | Self::LinkDown

@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
+use super::ending::Ending;
+
 /// How much is called out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Amount {
     Nothing,
-    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO, link lost.
+    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, whether people may approach, NO-GO, link lost.
     Few,
     /// Also every phase and every 50 m.
     #[default]
@@ -42,6 +44,7 @@ pub struct Called {
     /// Whether GO was the last that was called out on the pad.
     pub(crate) go: Option<bool>,
     pub(crate) lost: bool,
-    pub(crate) verdict: bool,
+    pub(crate) ending: Option<Ending>,
+    pub(crate) approach: Option<&'static str>,
     pub(crate) bells_left: u8,
 }

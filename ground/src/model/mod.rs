@@ -18,13 +18,14 @@ pub mod command;
 pub mod crew;
 pub mod dead_reckoning;
 pub mod dialog;
+pub mod ending;
 pub mod events;
 pub mod flight_so_far;
 pub mod flown_path;
 pub mod foreign;
 pub mod history;
-pub mod judgement;
 pub mod key_timing;
+pub mod latch;
 pub mod link;
 pub mod link_state;
 pub mod motion;
@@ -74,6 +75,7 @@ use flight_so_far::FlightSoFar;
 use history::History;
 use key_timing::KeyTiming;
 use link::Link;
+use motor::Danger;
 use page::{Page, Pages};
 use parameters::Parameters;
 use place::{Degrees, LastPlace};
@@ -258,6 +260,8 @@ pub struct Model {
     pub(crate) check_entered: Option<(u32, u16)>,
     /// The end of the station's book.
     pub book: BookState,
+    /// What was last said of the danger, and of whether people may approach.
+    pub(crate) approach_told: (Option<Danger>, Option<&'static str>),
     /// What has been called out.
     pub called: Called,
     /// `None` for a live flight.
@@ -307,6 +311,7 @@ impl Model {
             range_test: None,
             check_entered: None,
             book: BookState::default(),
+            approach_told: (None, None),
             called: Called::default(),
             playing: None,
             rebooted_at: None,

@@ -1,6 +1,8 @@
 //! Whether people may approach the vehicle, from what it reports about its landing motor; and why its countdown was
 //! held.
 
+use std::time::Duration;
+
 use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdHold, TdInterlock, TdMotor, TdPhase};
 
 use super::two_person::role_name;
@@ -33,16 +35,20 @@ pub struct KeepAway {
 
 impl KeepAway {
     /// The present warning. `None` while a vehicle is being prepared, and while it flies as planned.
-    pub fn of(vehicle: &Vehicle) -> Option<Self> {
-        let status = &vehicle.status.as_ref()?.value;
-        let approach_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
-        let wait_s = approach_s.map(|wait_s| wait_s.max(status.pad_wait_s));
+    ///
+    /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
+    pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        let sample = vehicle.status.as_ref()?;
+        let status = &sample.value;
+        let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
+        let passed_s = u16::try_from(sample.age(now).as_secs()).unwrap_or(u16::MAX);
+        let wait_s = told_s.map(|told_s| told_s.max(status.pad_wait_s).saturating_sub(passed_s));
         let danger = match status.motor {
             _ if !concerns(status) => return None,
             TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,
             TdMotor::TD_MOTOR_LIVE => Danger::Live,
             TdMotor::TD_MOTOR_BURNING => Danger::Burning,
-            TdMotor::TD_MOTOR_HOT => Danger::Hot,
+            TdMotor::TD_MOTOR_HOT if wait_s != Some(0) || !sample.is_stale(now) => Danger::Hot,
             TdMotor::TD_MOTOR_UNKNOWN if !is_on_pad(status.phase) => Danger::NotReported,
             TdMotor::TD_MOTOR_UNKNOWN | TdMotor::TD_MOTOR_PIN_IN | TdMotor::TD_MOTOR_BURNT
                 if wait_s != Some(0) =>
@@ -54,19 +60,60 @@ impl KeepAway {
         Some(Self { danger, wait_s })
     }
 
-    /// The warning in words, with the waiting time.
-    pub fn words(&self) -> String {
-        let until = match self.wait_s {
-            Some(wait_s) if wait_s > 0 => format!(" for {wait_s} s"),
-            _ => String::new(),
-        };
+    /// For how long, and the reason: what follows `do not approach`.
+    pub fn reason(&self) -> String {
+        let left = self.wait_s.filter(|left_s| *left_s > 0);
+        let left = left.map_or_else(String::new, |left_s| format!(" for {left_s} s"));
         match self.danger {
-            Danger::Live => format!("LIVE MOTOR: do not approach{until}"),
-            Danger::LiveWaited => "LIVE MOTOR: approach only to put the pin in".to_owned(),
-            Danger::Burning => "MOTOR BURNING: do not approach".to_owned(),
-            Danger::NotReported => "MOTOR NOT REPORTED: treat as live, do not approach".to_owned(),
-            Danger::Hot => format!("MOTOR HOT: burnt out, do not touch{until}"),
-            Danger::Wait => format!("STAY OFF THE PAD{until}"),
+            Danger::Live => format!("{left}: LIVE MOTOR"),
+            Danger::LiveWaited => " but to put the pin in: LIVE MOTOR".to_owned(),
+            Danger::Burning => format!("{left}: MOTOR BURNING"),
+            Danger::NotReported => format!("{left}: MOTOR NOT REPORTED: treat it as live"),
+            Danger::Hot => format!("{left}: MOTOR HOT, burnt out"),
+            Danger::Wait => format!("{left}: the waiting time runs"),
+        }
+    }
+}
+
+/// Whether people may approach a vehicle that is down, or whose countdown was aborted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Approach {
+    DoNot(KeepAway),
+    /// They may, for this reason.
+    May(&'static str),
+}
+
+impl Approach {
+    /// `None` in flight, and while a vehicle is being prepared.
+    pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        let status = &vehicle.status.as_ref()?.value;
+        if vehicle.in_flight() || !concerns(status) {
+            return None;
+        }
+        Some(match (KeepAway::of(vehicle, now), status.motor) {
+            (Some(away), _) => Self::DoNot(away),
+            (None, TdMotor::TD_MOTOR_PIN_IN) => Self::May("the pin is in"),
+            (None, TdMotor::TD_MOTOR_BURNT) => Self::May("the motor is burnt out and cool"),
+            (None, TdMotor::TD_MOTOR_HOT) => {
+                Self::May("the motor is burnt out, and its cooling time is over")
+            }
+            (None, _) => Self::May("the waiting time is over"),
+        })
+    }
+
+    /// The words that stand largest on every page.
+    pub fn headline(&self) -> &'static str {
+        match self {
+            Self::DoNot(_) => "DO NOT APPROACH",
+            Self::May(_) => "MAY BE APPROACHED",
+        }
+    }
+
+    /// What follows the headline in a sentence: for how long, and the reason.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::DoNot(away) => away.reason(),
+            Self::May(why) => format!(": {why}"),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::Model;
 use super::dead_reckoning::predict_position;
+use super::vehicle::Sample;
 
 /// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
 const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
@@ -137,11 +138,20 @@ impl LastPlace {
 impl Model {
     /// The last that is known of the vehicle in this flight; `None` before it left the pad.
     pub fn last_place(&self, now: Duration) -> Option<LastPlace> {
-        let motion = self.vehicle.best_motion()?;
         let left_at = self.vehicle.left_pad_at?;
-        if motion.received_at < left_at {
-            return None;
-        }
+        let motion = self.vehicle.best_motion().filter(|motion| motion.received_at >= left_at);
+        let (heard, height_m, at) = match (motion, self.vehicle.verdict) {
+            (Some(Sample { value, received_at }), _) => {
+                let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: HEARD_ERROR_M };
+                (spot, value.altitude_m, received_at)
+            }
+            // A verdict tells the distance from the pad, and no direction.
+            (None, Some(Sample { value, received_at })) => {
+                let spot = Spot { error_m: value.touchdown.x_m.abs() + HEARD_ERROR_M, ..Spot::default() };
+                (spot, value.touchdown.altitude_m, received_at)
+            }
+            (None, None) => return None,
+        };
         let predicted = predict_position(&self.vehicle, now).map(|at| Spot {
             north_m: at.x_m,
             east_m: at.y_m,
@@ -149,12 +159,27 @@ impl Model {
         });
         Some(LastPlace {
             boot: self.vehicle.boot.number().unwrap_or(0),
-            heard_unix_s: self.settings.start_unix_s + motion.received_at.as_secs(),
-            heard: Spot { north_m: motion.value.x_m, east_m: motion.value.y_m, error_m: HEARD_ERROR_M },
-            height_m: motion.value.altitude_m,
+            heard_unix_s: self.settings.start_unix_s + at.as_secs(),
+            heard,
+            height_m,
             predicted,
             pad: self.settings.pad,
         })
+    }
+
+    /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
+    /// anywhere inside the fence of its mission. `None` if it has told no fence.
+    pub fn meant_to_come_down(&self) -> Option<Spot> {
+        let fence_m = f64::from(self.vehicle.limits.as_ref()?.x_m);
+        let predicted = self.vehicle.descent.as_ref().map(|descent| &descent.value);
+        let known =
+            |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);
+        let spot = Spot {
+            north_m: known(predicted.map(|descent| descent.touchdown_x_m)),
+            east_m: known(predicted.map(|descent| descent.touchdown_y_m)),
+            error_m: fence_m,
+        };
+        (fence_m.is_finite() && fence_m > 0.0).then_some(spot)
     }
 }
 

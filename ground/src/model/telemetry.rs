@@ -107,10 +107,11 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         }
         _ => {}
     }
-    if vehicle.in_flight() {
-        vehicle.left_pad_at.get_or_insert(now);
-    } else if vehicle.phase().is_some_and(|phase| is_on_pad(phase.value)) {
-        vehicle.left_pad_at = None;
+    // The flight may have passed unheard: what comes after it shows that it was.
+    match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
+        Some(true) if vehicle.verdict.is_none() => vehicle.left_pad_at = None,
+        Some(_) => _ = vehicle.left_pad_at.get_or_insert(now),
+        None => {}
     }
     spoken == MessageBoot::New
 }

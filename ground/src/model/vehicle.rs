@@ -145,7 +145,7 @@ pub struct Vehicle {
     pub burn: FlownPath,
     /// Whether it has ever been outside the plane of north and up, or leaned out of it. A planar vehicle never does.
     pub in_space: bool,
-    /// When the ground first received a phase of flight.
+    /// When the ground first received a phase of flight, or of what follows it, or the verdict.
     pub left_pad_at: Option<Duration>,
     /// The present boot of the vehicle.
     pub boot: Boot,

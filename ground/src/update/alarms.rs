@@ -10,11 +10,13 @@ use protocol::log::record::EventLevel;
 use super::Action;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::{Acknowledgement, CommandKind};
+use crate::model::dead_reckoning::may_have_left;
+use crate::model::ending::Ending;
 use crate::model::events::Speaker;
 use crate::model::link_state::{LinkState, RED_AFTER};
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::pad_check::PadCheck;
-use crate::model::{Model, Role};
+use crate::model::{Model, Role, latch};
 
 /// An abort without an answer raises an alarm after this time.
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
@@ -47,6 +49,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
                 | AlarmKind::TwoVehicles
                 | AlarmKind::SameId
                 | AlarmKind::Foreign
+                | AlarmKind::MayBeFlying
         ) {
             model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
         }
@@ -73,6 +76,11 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let why = model.link.uplink.why_unheard();
         let text = format!("UPLINK LOST: the vehicle does not hear this station; {why}");
         found.push((AlarmKind::UplinkLost, text));
+    }
+    if may_have_left(&model.vehicle, now).is_some() {
+        let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
+        let text = format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s");
+        found.push((AlarmKind::MayBeFlying, text));
     }
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
@@ -155,8 +163,8 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if model.rebooted_at.is_some_and(|at| now.saturating_sub(at) < REBOOT_SHOWN) {
         found.push((AlarmKind::Rebooted, "the vehicle has REBOOTED".to_owned()));
     }
-    if let Some(away) = KeepAway::of(vehicle).filter(|away| is_live(away.danger)) {
-        found.push((AlarmKind::LiveMotor, away.words()));
+    if let Some(away) = KeepAway::of(vehicle, now).filter(|away| is_live(away.danger)) {
+        found.push((AlarmKind::LiveMotor, format!("DO NOT APPROACH{}", away.reason())));
     }
     if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
         found.push((AlarmKind::Held, words));
@@ -164,9 +172,9 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
     found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
     found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
+    found.extend(latch::words(model).map(|words| (AlarmKind::Aborted, words)));
     if let Some(locks) = vehicle.interlocks() {
         let latched = [
-            (TdInterlock::TD_INTERLOCK_ABORT_LATCHED, AlarmKind::Aborted, "ABORT LATCHED on the vehicle"),
             (TdInterlock::TD_INTERLOCK_NO_LIGHT, AlarmKind::NoLight, "NO LIGHT: the motor did not light"),
             (TdInterlock::TD_INTERLOCK_DEGRADED, AlarmKind::Degraded, "DEGRADED: the stabiliser flies"),
         ];
@@ -176,8 +184,8 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
             }
         }
     }
-    if vehicle.verdict.is_some_and(|verdict| !verdict.value.landed) {
-        found.push((AlarmKind::NotLanded, "NOT LANDED inside the limits".to_owned()));
+    if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Landed) {
+        found.push((AlarmKind::NotLanded, ending.sentence(vehicle)));
     }
     let powered = vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_POWERED);
     if !powered || vehicle.verdict.is_some() {

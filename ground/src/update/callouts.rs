@@ -6,7 +6,9 @@ use protocol::dialect::TdPhase;
 
 use super::Action;
 use crate::model::callouts::Amount;
+use crate::model::ending::Ending;
 use crate::model::link_state::LinkState;
+use crate::model::motor::Approach;
 use crate::model::vehicle::is_on_pad;
 use crate::model::{Model, words};
 
@@ -25,12 +27,8 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     height(model, now);
     readiness(model, now);
     link(model, now);
-    if let Some(verdict) = model.vehicle.verdict
-        && !std::mem::replace(&mut model.called.verdict, true)
-    {
-        let (text, bells) = if verdict.value.landed { ("landed", EVENT) } else { ("not landed", WRONG) };
-        call(model, Amount::Few, text, bells);
-    }
+    ending(model, now);
+    approach(model, now);
 }
 
 /// Rings a bell that is still to ring; bells apart from each other can be counted.
@@ -54,6 +52,27 @@ fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
     }
 }
 
+fn ending(model: &mut Model, now: Duration) {
+    let ending = Ending::of(&model.vehicle, now);
+    if std::mem::replace(&mut model.called.ending, ending) == ending {
+        return;
+    }
+    if let Some(ending) = ending {
+        let bells = if ending == Ending::Landed { EVENT } else { WRONG };
+        call(model, Amount::Few, ending.word().to_lowercase(), bells);
+    }
+}
+
+fn approach(model: &mut Model, now: Duration) {
+    let headline = Approach::of(&model.vehicle, now).map(|approach| approach.headline());
+    if std::mem::replace(&mut model.called.approach, headline) == headline {
+        return;
+    }
+    if let Some(headline) = headline {
+        call(model, Amount::Few, headline.to_lowercase(), EVENT);
+    }
+}
+
 fn phase(model: &mut Model) {
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else { return };
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
@@ -69,7 +88,7 @@ fn phase(model: &mut Model) {
         other => call(model, Amount::Normal, words::phase(other).to_lowercase().replace('_', " "), 0),
     }
     if is_on_pad(phase) {
-        (model.called.height_m, model.called.verdict) = (None, model.vehicle.verdict.is_some());
+        model.called.height_m = None;
     }
 }
 

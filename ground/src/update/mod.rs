@@ -209,6 +209,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             tick::on_tick(model, now);
         }
     }
+    vehicle_changes::watch_approach(model, now);
     alarms::watch(model, now);
     callouts::watch(model, now);
     std::mem::take(&mut model.outbox)

@@ -2,22 +2,22 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdHold, TdMotor, TdPhase};
+use protocol::dialect::{TdHold, TdPhase};
 use protocol::log::record::EventLevel;
 
 use super::{Action, checklist, commands};
 use crate::model::command::is_aborted;
 use crate::model::dialog::{Dialog, RestOfWord};
+use crate::model::ending::Ending;
 use crate::model::events::Speaker;
 use crate::model::flight_so_far::FlightSoFar;
 use crate::model::flown_path::FlownPath;
 use crate::model::history::{History, Maxima};
-use crate::model::judgement::Standard;
-use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::motor::{Approach, Danger, KeepAway, hold_words};
 use crate::model::parameters::Parameters;
 use crate::model::uplink::Uplink;
-use crate::model::vehicle::{Vehicle, Verdict, is_flight};
-use crate::model::{Model, words};
+use crate::model::vehicle::{Vehicle, Verdict, is_flight, is_on_pad};
+use crate::model::{Model, latch, words};
 
 /// The part of the vehicle's state whose changes are reported.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -27,7 +27,6 @@ pub(super) struct Announced {
     counting: bool,
     aborted: bool,
     hold: Option<TdHold>,
-    danger: Option<Danger>,
     verdict: Option<Verdict>,
 }
 
@@ -41,7 +40,6 @@ impl Announced {
             aborted: vehicle.interlocks().is_some_and(is_aborted)
                 || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),
-            danger: KeepAway::of(vehicle).map(|away| away.danger),
             verdict: vehicle.verdict.map(|verdict| verdict.value),
         }
     }
@@ -90,8 +88,9 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
         model.info(now, "countdown runs");
     }
     if after.aborted && !before.aborted {
-        model.say(now, Speaker::Ground, EventLevel::Error, "the vehicle has latched an abort");
         model.outcome.aborted_at = Some(now);
+        let words = latch::words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
+        model.say(now, Speaker::Ground, EventLevel::Error, format!("the vehicle says {words}"));
         model.outbox.push(Action::SyncLog);
     }
     if let Some(verdict) = after.verdict
@@ -105,23 +104,25 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
         model.say(now, Speaker::Ground, EventLevel::Error, text);
         model.outbox.push(Action::SyncLog);
     }
-    if after.danger != before.danger {
-        on_danger(model, now);
-    }
 }
 
-/// Reports whether people may approach, because the log must show when they may not.
-fn on_danger(model: &mut Model, now: Duration) {
-    if let Some(away) = KeepAway::of(&model.vehicle) {
-        let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
-        return model.say(now, Speaker::Ground, level, away.words());
+/// Reports whether people may approach, because the log must show when they may not. A waiting time ends without a word of
+/// the vehicle, too.
+pub(super) fn watch_approach(model: &mut Model, now: Duration) {
+    let away = KeepAway::of(&model.vehicle, now);
+    let approach = Approach::of(&model.vehicle, now);
+    let told = (away.map(|away| away.danger), approach.map(|approach| approach.headline()));
+    if std::mem::replace(&mut model.approach_told, told) == told {
+        return;
     }
-    let safe = match model.vehicle.status.as_ref().map(|status| status.value.motor) {
-        Some(TdMotor::TD_MOTOR_PIN_IN) => "the pin is in: the vehicle may be approached",
-        Some(TdMotor::TD_MOTOR_BURNT) => "the motor is burnt out and cool: the vehicle may be approached",
-        _ => "the waiting time is over",
-    };
-    model.info(now, safe);
+    match (approach, away) {
+        (Some(Approach::May(why)), _) => model.info(now, format!("MAY BE APPROACHED: {why}")),
+        (_, Some(away)) => {
+            let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
+            model.say(now, Speaker::Ground, level, format!("DO NOT APPROACH{}", away.reason()));
+        }
+        (Some(Approach::DoNot(_)) | None, None) => {}
+    }
 }
 
 fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
@@ -132,7 +133,9 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
     model.history.note_phase(phase, now);
     model.info(now, format!("phase {from}{}", words::phase(phase)));
     model.outbox.push(Action::SyncLog);
-    if is_flight(phase) && !before.is_some_and(is_flight) {
+    // The flight itself may have passed unheard.
+    let after_it = !is_on_pad(phase) && before.is_some_and(is_on_pad);
+    if after_it || (is_flight(phase) && !before.is_some_and(is_flight)) {
         if !model.outcome.started {
             model.vehicle.flown = FlownPath::default();
             model.vehicle.burn = FlownPath::default();
@@ -146,14 +149,9 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
 }
 
 fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
-    let (level, text) = match (verdict.landed, verdict.touchdown.violations()) {
-        (true, _) => {
-            let whose = Standard::whose(model.vehicle.limits.as_ref());
-            (EventLevel::Info, format!("LANDED inside every limit of {whose}"))
-        }
-        (false, Some(names)) => (EventLevel::Error, format!("NOT LANDED: outside {names}")),
-        (false, None) => (EventLevel::Error, "NOT LANDED".to_owned()),
-    };
+    let level = if verdict.landed { EventLevel::Info } else { EventLevel::Error };
+    let ending = Ending::of(&model.vehicle, now);
+    let text = ending.map_or_else(String::new, |ending| ending.sentence(&model.vehicle));
     model.say(now, Speaker::Ground, level, text);
     model.outcome.started = true;
     model.outcome.verdict = Some((verdict.landed, now));

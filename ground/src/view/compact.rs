@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
 use super::theme::{TextRole, Theme};
-use super::{alarm_line, dialog, draw_lines, identity, next_event, pages, palette, top_lines};
+use super::{alarm_line, banner, dialog, draw_lines, identity, next_event, pages, palette, top_lines};
 use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::command::CommandKind;
@@ -21,14 +21,16 @@ const NAMED_ROWS: u16 = 10;
 
 /// Draws the lines that fit.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let mut lines = vec![
-        identity::line(model, theme, now),
-        Line::from(vec![
-            top_lines::phase(model, theme, now),
-            Span::raw(" "),
-            top_lines::armed(model, theme, now),
-        ]),
-    ];
+    let mut lines = vec![identity::line(model, theme, now)];
+    lines.extend(
+        banner::of(model, now)
+            .map(|words| Line::styled(format!(" {}", words.sentence()), theme.style(words.role))),
+    );
+    lines.push(Line::from(vec![
+        top_lines::phase(model, theme, now),
+        Span::raw(" "),
+        top_lines::armed(model, theme, now),
+    ]));
     let open = dialog::lines(model, theme, now);
     if open.is_none() || area.height >= DIALOG_ROWS {
         let mut line = vec![top_lines::countdown(model, theme, now), Span::raw(" ")];
@@ -44,7 +46,6 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), below);
         return;
     }
-    lines.extend(top_lines::keep_away(model, theme, now));
     lines.extend(top_lines::hands_off(model, theme, now));
     lines.extend(next_event::line(model, theme, now));
     lines.extend(model.playing.as_ref().map(|playing| alarm_line::replay(playing, theme)));

@@ -5,20 +5,25 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
+use super::banner;
 use super::headline::Item;
 use super::number::{STALE_MARK, age_mark, fixed};
 use super::theme::TextRole;
 use crate::model::Model;
 use crate::model::dead_reckoning::{is_unheard, predict_position};
-use crate::model::motor::{KeepAway, hold_words};
+use crate::model::ending::Ending;
+use crate::model::motor::hold_words;
 use crate::model::permits::{why_nothing_moves, why_other_mission};
 use crate::model::vehicle::{Sample, is_on_pad};
 
-/// The most letters of a word on the pad, as in `STAY OFF`.
+/// The most letters of a word on the pad, as in `NO DATA`.
 const PAD_LETTERS: u16 = 8;
 
 /// Whether the vehicle may be armed; on the way to the start, how far it is.
 pub fn pad(model: &Model, now: Duration) -> Vec<Item> {
+    if banner::of(model, now).is_some() {
+        return Vec::new();
+    }
     let (word, role) = pad_word(model, now);
     vec![Item { label: String::new(), text: [word.clone(), word], letters: [PAD_LETTERS; 2], role }]
 }
@@ -32,9 +37,6 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
-    if KeepAway::of(vehicle).is_some() {
-        return word("STAY OFF", TextRole::Alarm);
-    }
     if !is_on_pad(status.value.phase) {
         return word("FLIGHT", TextRole::Title);
     }
@@ -79,6 +81,9 @@ fn lost(model: &Model, now: Duration) -> Vec<Item> {
 
 /// Phase, height, vertical speed and time since release.
 pub fn flight(model: &Model, now: Duration) -> Vec<Item> {
+    if banner::of(model, now).is_some() {
+        return Vec::new();
+    }
     let vehicle = &model.vehicle;
     if is_unheard(vehicle, now) {
         return lost(model, now);
@@ -102,6 +107,9 @@ pub fn flight(model: &Model, now: Duration) -> Vec<Item> {
 
 /// Time to touchdown and its predicted speed; height and vertical speed.
 pub fn burn(model: &Model, now: Duration) -> Vec<Item> {
+    if banner::of(model, now).is_some() {
+        return Vec::new();
+    }
     let vehicle = &model.vehicle;
     if is_unheard(vehicle, now) {
         return lost(model, now);
@@ -115,10 +123,15 @@ pub fn burn(model: &Model, now: Duration) -> Vec<Item> {
 }
 
 /// The verdict.
-pub fn verdict(model: &Model) -> Vec<Item> {
-    let (word, role) = match model.vehicle.verdict {
-        Some(verdict) if verdict.value.landed => ("LANDED", TextRole::Good),
-        Some(_) => ("NOT LANDED", TextRole::Alarm),
+pub fn verdict(model: &Model, now: Duration) -> Vec<Item> {
+    if banner::of(model, now).is_some() {
+        return Vec::new();
+    }
+    let (word, role) = match Ending::of(&model.vehicle, now) {
+        Some(Ending::Landed) => ("LANDED", TextRole::Good),
+        Some(Ending::UnderParachute) => ("PARACHUTE", TextRole::Caution),
+        Some(Ending::Hard) => ("HARD", TextRole::Alarm),
+        Some(Ending::Lost) => ("LOST", TextRole::Alarm),
         None => ("NO VERDICT", TextRole::Caution),
     };
     vec![Item { label: String::new(), text: [word.to_owned(), word.to_owned()], letters: [10; 2], role }]

@@ -1,7 +1,5 @@
 //! Each limit of a touchdown with the value reached, as text for the screens and for the closing lines.
 
-use std::f64::consts::FRAC_PI_2;
-
 use protocol::dialect::TD_TOUCHDOWN_LIMITS_DATA;
 
 use super::number::shortest;
@@ -11,7 +9,7 @@ use crate::model::touchdown::{LIMITS, Touchdown};
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitRow {
     pub name: &'static str,
-    /// In degrees where it is an angle.
+    /// In degrees where it is an angle. Only the height and the sink rate have a sign.
     pub value: f64,
     /// The unit of value and limit.
     pub unit: &'static str,
@@ -25,12 +23,12 @@ pub struct LimitRow {
 pub fn limit_rows(touchdown: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
     let texts = limits.map(limit_texts);
     let values = [
-        (touchdown.x_m, "m"),
+        (touchdown.x_m.abs(), "m"),
         (touchdown.altitude_m, "m"),
-        (touchdown.pitch_rad.to_degrees(), "deg"),
-        (touchdown.u_m_s, "m/s"),
-        (touchdown.w_m_s, "m/s"),
-        (touchdown.q_rad_s.to_degrees(), "deg/s"),
+        (touchdown.tilt_rad().to_degrees(), "deg"),
+        (-touchdown.u_m_s, "m/s"),
+        (touchdown.w_m_s.abs(), "m/s"),
+        (touchdown.q_rad_s.abs().to_degrees(), "deg/s"),
     ];
     std::array::from_fn(|place| {
         let ((name, bit), (value, unit)) = (LIMITS[place], values[place]);
@@ -45,12 +43,10 @@ pub fn limit_rows(touchdown: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DAT
 }
 
 fn limit_texts(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [String; 6] {
-    let upright_deg = FRAC_PI_2.to_degrees();
-    let error_deg = f64::from(limits.pitch_error_rad).to_degrees();
     [
         either_side(f64::from(limits.x_m)),
         range(f64::from(limits.altitude_min_m), f64::from(limits.altitude_max_m)),
-        range(upright_deg - error_deg, upright_deg + error_deg),
+        either_side(f64::from(limits.pitch_error_rad).to_degrees()),
         either_side(f64::from(limits.u_m_s)),
         either_side(f64::from(limits.w_m_s)),
         either_side(f64::from(limits.q_rad_s).to_degrees()),
@@ -58,21 +54,21 @@ fn limit_texts(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [String; 6] {
 }
 
 /// A limit to either side, as in `±0.4`.
-pub(super) fn either_side(limit: f64) -> String {
+fn either_side(limit: f64) -> String {
     format!("±{}", shortest(limit))
 }
 
 /// A range, as in `85..95`.
-pub(super) fn range(lowest: f64, highest: f64) -> String {
+fn range(lowest: f64, highest: f64) -> String {
     format!("{}..{}", shortest(lowest), shortest(highest))
 }
 
-/// How many decimals a value gets, so that it always takes six characters with its sign.
+/// How many decimals a value gets, so that it takes five characters with its sign.
 pub(super) fn decimals(value: f64) -> usize {
     match value.abs() {
-        0.0..10.0 => 3,
-        10.0..100.0 => 2,
-        _ => 1,
+        0.0..10.0 => 2,
+        10.0..100.0 => 1,
+        _ => 0,
     }
 }
 
@@ -80,6 +76,7 @@ pub(super) fn decimals(value: f64) -> usize {
 mod tests {
     use super::*;
     use protocol::dialect::TdLimit;
+    use std::f64::consts::FRAC_PI_2;
 
     fn limit_words(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> Vec<String> {
         let touchdown = Touchdown {
@@ -107,6 +104,6 @@ mod tests {
             q_rad_s: 12.0_f32.to_radians(),
             gimbal_limit_rad: 0.1,
         };
-        assert_eq!(limit_words(Some(&limits)), ["±3", "-0.1..0.25", "82.5..97.5", "±1.5", "±0.6", "±12"]);
+        assert_eq!(limit_words(Some(&limits)), ["±3", "-0.1..0.25", "±7.5", "±1.5", "±0.6", "±12"]);
     }
 }

@@ -9,6 +9,7 @@
 pub mod actuators;
 pub mod alarm_line;
 pub mod ascii;
+pub mod banner;
 pub mod checklist;
 pub mod compact;
 pub mod controller;
@@ -38,7 +39,6 @@ pub mod ticks;
 pub mod top_lines;
 pub mod top_view;
 pub mod touchdown;
-pub mod verdict;
 pub mod wide;
 
 use std::time::Duration;

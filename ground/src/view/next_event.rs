@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdBooster, TdChute, TdPhase};
+use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
 use ratatui::text::{Line, Span};
 
 use super::number::{STALE_MARK, fixed};
 use super::theme::{TextRole, Theme};
-use crate::model::Model;
 use crate::model::motion::GRAVITY_M_S2;
 use crate::model::vehicle::Vehicle;
+use crate::model::{Model, latch};
 
 /// A vehicle that is slower than this is not falling, m/s.
 const FALLS_M_S: f64 = 0.5;
@@ -58,7 +58,8 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
 
 fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String) {
     if vehicle.interlocks().is_some() && !vehicle.may_light() {
-        return ("the ground".to_owned(), ": the motor will NOT be lit".to_owned());
+        let why = latch::cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
+        return ("the ground".to_owned(), format!(": the motor will NOT be lit{why}"));
     }
     let descent = vehicle.descent.as_ref();
     let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
@@ -69,15 +70,17 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
     (format!("IGNITION{}", within(left_s)), format!("{at}{armed}"))
 }
 
+/// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not for long.
 fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String) {
-    if vehicle.descent.as_ref().is_some_and(|d| d.value.chute == TdChute::TD_CHUTE_FIRED) {
-        return ("chute opens".to_owned(), ": fired, still falling fast".to_owned());
-    }
-    let motion = vehicle.best_motion();
-    let falls = motion.filter(|motion| motion.value.climb_m_s < -FALLS_M_S);
-    let left_s =
-        falls.map(|motion| motion.value.altitude_m / -motion.value.climb_m_s - motion.age(now).as_secs_f64());
-    (format!("the ground{}", within(left_s)), " under the parachute".to_owned())
+    let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
+    let motor = if live { ", LIVE MOTOR" } else { "" };
+    let Some(descent) = vehicle.descent.as_ref().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
+        return ("chute opens".to_owned(), format!(": fired, still falling fast{motor}"));
+    };
+    let sinks_m_s = -f64::from(descent.value.vertical_speed_m_s);
+    let falls_s = f64::from(descent.value.height_m) / sinks_m_s - descent.age(now).as_secs_f64();
+    let left_s = Some(falls_s).filter(|_| sinks_m_s > FALLS_M_S);
+    ("the ground".to_owned(), format!("{} under the parachute{motor}", within(left_s)))
 }
 
 /// As in ` in 3.4 s`; empty if the time is unknown or over.

@@ -8,9 +8,10 @@ use super::next_event;
 use super::number::{STALE_MARK, age_mark, shortest};
 use super::theme::{TextRole, Theme};
 use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
+use crate::model::dead_reckoning::may_have_left;
 use crate::model::foreign::Foreign;
 use crate::model::link_state::LinkState;
-use crate::model::motor::{Danger, KeepAway, hold_words};
+use crate::model::motor::hold_words;
 use crate::model::pad_check::{Standing, standing};
 use crate::model::permits::{why_nothing_moves, why_other_mission};
 use crate::model::{Model, Role, abort_too_late, words};
@@ -38,6 +39,9 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
             Span::styled(format!(" {mode}"), theme.style(TextRole::Plain))
         }
         None => Span::styled(" no vehicle", theme.style(TextRole::Label)),
+        Some(_) if may_have_left(&model.vehicle, now).is_some() => {
+            Span::styled(" IN THE AIR?", theme.style(TextRole::Alarm))
+        }
         Some(phase) => {
             let (mark, stale) = age_mark(&phase, now);
             let role = if stale == TextRole::Stale { stale } else { TextRole::Title };
@@ -67,6 +71,10 @@ pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.countdown_s() {
         None => Span::styled(" T --", theme.style(TextRole::Label)),
+        Some(_) if let Some(since) = may_have_left(&model.vehicle, now) => {
+            let words = format!("{STALE_MARK}T+{:.1}", since.as_secs_f64());
+            Span::styled(words, theme.style(TextRole::Stale))
+        }
         Some(time) => {
             let (mark, role) = age_mark(&time, now);
             let sign = if time.value > 0.0 { '-' } else { '+' };
@@ -150,6 +158,9 @@ fn abort_effect(model: &Model, now: Duration) -> String {
         return foreign.termination().to_owned();
     }
     let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
+    if may_have_left(&model.vehicle, now).is_some() {
+        return "MAY NOT ARRIVE; what it would do is not told".to_owned();
+    }
     if let Some(why) = abort_too_late::reason(model, now) {
         return why.to_owned();
     }
@@ -159,15 +170,6 @@ fn abort_effect(model: &Model, now: Duration) -> String {
     let lost = [down, up].iter().any(|state| matches!(state, LinkState::Lost(_)));
     let reach = if lost { "MAY NOT ARRIVE; " } else { "" };
     format!("{reach}{mark}{}", words::abort_effect(&status.value))
-}
-
-/// The warning that nobody may approach the vehicle, and for how long.
-pub fn keep_away(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
-    let away = KeepAway::of(&model.vehicle)?;
-    let stale = model.vehicle.status.as_ref().is_some_and(|status| status.is_stale(now));
-    let mark = if stale { STALE_MARK } else { " " };
-    let role = if away.danger == Danger::Hot { TextRole::Caution } else { TextRole::Alarm };
-    Some(Line::styled(format!("{mark}{}", away.words()), theme.style(role)))
 }
 
 /// The warning that gimbal and fins may move, on every page.
@@ -253,16 +255,10 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// The first of these that applies: the warning not to approach; that a check moves the surfaces; a command (other than an abort) that is not observed
+/// The first of these that applies: that a check moves the surfaces; a command (other than an abort) that is not observed
 /// yet; a hold; the next event of the flight; the latest command, unless it was answered long ago and the vehicle is NO-GO;
 /// whether the vehicle may be armed.
 pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(mut line) = keep_away(model, theme, now) {
-        // Under a parachute the next event is added, because the vehicle is still coming down.
-        let falls = model.vehicle.in_flight().then(|| next_event::line(model, theme, now)).flatten();
-        line.spans.extend(falls.into_iter().flat_map(|next| next.spans));
-        return line;
-    }
     if let Some(line) = hands_off(model, theme, now) {
         return line;
     }

@@ -9,21 +9,16 @@ use super::limit_rows::{LimitRow, decimals, limit_rows};
 use super::number::{age_mark, fixed};
 use super::theme::{TextRole, Theme};
 use crate::model::Model;
-use crate::model::judgement::{LEGS, Standard};
-use crate::model::touchdown::Touchdown;
+use crate::model::ending::Ending;
+use crate::model::touchdown::{Touchdown, are_of_legs};
 
-/// Title and rows: the verdict once there is one, before that the prediction.
+/// Title and rows: the verdict once there is one, before that the prediction. The last row says it in words.
 pub fn panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     if let Some(verdict) = model.vehicle.verdict {
         let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
-        let (word, role) = verdict_word(verdict.value.landed);
-        rows.push(Line::styled(word, theme.style(role)));
-        let title = match model.vehicle.limits.as_ref().and_then(Standard::of) {
-            Some(standard) if standard == LEGS => "Verdict by the legs",
-            Some(_) => "Verdict by Table 2",
-            None => "Verdict",
-        };
-        return (title, rows);
+        rows.extend(ending(model, now).map(|(ending, role)| Line::styled(ending.word(), theme.style(role))));
+        let by_legs = model.vehicle.limits.as_ref().is_some_and(are_of_legs);
+        return (if by_legs { "Verdict by the legs" } else { "Verdict" }, rows);
     }
     let Some(prediction) = model.vehicle.prediction else {
         return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(TextRole::Label))]);
@@ -69,8 +64,15 @@ pub fn panel_with_bars(
     (title, rows)
 }
 
-pub fn verdict_word(landed: bool) -> (&'static str, TextRole) {
-    if landed { ("LANDED inside every limit", TextRole::Good) } else { ("NOT LANDED", TextRole::Alarm) }
+/// How the flight ended.
+pub fn ending(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
+    let ending = Ending::of(&model.vehicle, now)?;
+    let role = match ending {
+        Ending::Landed => TextRole::Good,
+        Ending::UnderParachute => TextRole::Caution,
+        Ending::Hard | Ending::Lost => TextRole::Alarm,
+    };
+    Some((ending, role))
 }
 
 fn limit_lines(
@@ -85,8 +87,8 @@ fn limit_lines(
         let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         Line::from(vec![
             Span::styled(word, theme.style(word_role)),
-            Span::styled(format!(" {:<5}", row.name), theme.style(TextRole::Label)),
-            Span::styled(format!("{mark}{:>6}", fixed(row.value, decimals(row.value))), theme.style(role)),
+            Span::styled(format!(" {:<8}", row.name), theme.style(TextRole::Label)),
+            Span::styled(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), theme.style(role)),
             Span::styled(
                 format!(" {} {}", theme.either_side(&row.limit), row.unit),
                 theme.style(TextRole::Label),

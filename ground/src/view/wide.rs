@@ -8,7 +8,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::theme::{TextRole, Theme};
-use super::{alarm_line, dialog, draw_line, flight_bar, identity, pages, palette, pins, top_lines};
+use super::{alarm_line, banner, dialog, draw_line, flight_bar, identity, pages, palette, pins, top_lines};
 use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::page::Page;
@@ -45,6 +45,8 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
     }
     draw_line(frame, pinned, pins::line(shown, theme, shown_at));
+    // Also over the past: whether people may approach is a matter of the present.
+    let body = banner::of(model, now).map_or(body, |words| banner::draw(&words, theme, frame, body));
     pages::draw(shown, theme, shown_at, frame, body);
     flight_bar::draw(model, theme, (now, shown_at), frame, bar);
     alarm_line::draw(model, theme, now, frame, alarm);

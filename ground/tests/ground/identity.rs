@@ -93,9 +93,10 @@ fn a_reboot_within_seconds_of_a_boot_voids_earlier_commands() {
     assert_eq!(rig.events().matches("has rebooted").count(), 1, "said once");
 }
 
-fn ended(motor: TdMotor, wait_s: u16, interlocks: TdInterlock) -> Rig {
+/// A vehicle that is down, with this motor.
+fn down(motor: TdMotor, wait_s: u16, interlocks: TdInterlock) -> Rig {
     let mut rig = Rig::crewed();
-    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
     rig.interlocks |= interlocks;
     (rig.motor, rig.approach_wait_s) = (motor, wait_s);
@@ -103,8 +104,33 @@ fn ended(motor: TdMotor, wait_s: u16, interlocks: TdInterlock) -> Rig {
     rig
 }
 
-/// After a failed ignition, an inhibit or an abort: the warning is on every page and size, as an alarm and in the
-/// log.
+/// The rows of the reason and of the large words, which are the first ones of every page from 80x24 on.
+fn large(rig: &Rig) -> String {
+    rig.screen(80, 24).lines().skip(4).take(5).collect::<Vec<_>>().join("\n")
+}
+
+/// The reason stands on every page, and the same large words under it; small screens have them as their second line.
+fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
+    rig.key(Key::Char('0'));
+    let expected = large(rig);
+    // A letter is 4 columns wide.
+    let columns = 4 * words.chars().count() + 1;
+    let widest = expected.lines().skip(1).map(|line| line.trim_matches('"').trim_end().chars().count()).max();
+    assert!(widest.is_some_and(|widest| (columns - 4..=columns).contains(&widest)), "{words}: {expected}");
+    for digit in "123456789?pftvx".chars() {
+        rig.key(Key::Char(digit));
+        assert_eq!(large(rig), expected, "{digit}");
+        assert!(large(rig).contains(reason), "{digit}: {reason}\n{}", rig.screen(80, 24));
+        let small = rig.screen(60, 12);
+        let second = small.lines().nth(1).unwrap_or_default();
+        assert!(second.contains(&format!(" {words}")), "{digit}: {small}");
+    }
+    let tiny = rig.screen(20, 5);
+    assert!(tiny.lines().nth(1).is_some_and(|line| line.contains(words)), "{tiny}");
+    rig.key(Key::Char('0'));
+}
+
+/// After a failed ignition, an inhibit or an abort: on every page and size, as an alarm and in the log.
 #[test]
 fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
     for locks in [
@@ -112,32 +138,31 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
         TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
         TdInterlock::TD_INTERLOCK_ABORT_LATCHED,
     ] {
-        let mut rig = ended(TdMotor::TD_MOTOR_LIVE, 57, locks);
-        let words = "LIVE MOTOR: do not approach";
-        for phase in [TdPhase::TD_PHASE_CHUTE, TdPhase::TD_PHASE_TOUCHDOWN, TdPhase::TD_PHASE_SAFED] {
+        let mut rig = down(TdMotor::TD_MOTOR_LIVE, 57, locks);
+        let words = "DO NOT APPROACH for 57 s: LIVE MOTOR";
+        for phase in [TdPhase::TD_PHASE_TOUCHDOWN, TdPhase::TD_PHASE_SAFED] {
             rig.phase = phase;
             rig.run(0.2);
-            for digit in "123456789?".chars() {
-                rig.key(Key::Char(digit));
-                let screen = rig.screen(80, 24);
-                assert!(screen.contains("LIVE MOTOR: do not approach for 57 s"), "{digit}: {screen}");
-                assert!(rig.screen(40, 12).contains(words), "{digit}");
-            }
+            stands_on_every_page(&mut rig, "DO NOT APPROACH", "do not approach for 57 s: LIVE MOTOR");
         }
-        assert!(rig.screen(20, 5).contains("LIVE MOTOR"), "{}", rig.screen(20, 5));
         let logged = rig.actions.iter().filter(
             |action| matches!(action, Action::Record(Record::Event(event)) if event.message.contains(words)),
         );
         assert_eq!(logged.count(), 1);
-        assert!(rig.events().contains("LIVE MOTOR: do not approach for 57 s"));
+        assert!(rig.events().contains(words), "{}", rig.events());
+        assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text.ends_with("LIVE MOTOR")));
         rig.approach_wait_s = 0;
         rig.run(0.1);
-        assert!(rig.screen(80, 24).contains("LIVE MOTOR: approach only to put the pin in"));
+        stands_on_every_page(
+            &mut rig,
+            "DO NOT APPROACH",
+            "do not approach but to put the pin in: LIVE MOTOR",
+        );
         rig.motor = TdMotor::TD_MOTOR_PIN_IN;
         rig.run(0.1);
-        assert!(rig.events().contains("the pin is in: the vehicle may be approached"));
-        let screen = rig.screen(80, 24);
-        assert!(!screen.contains("do not approach for") && !screen.contains("ALARM LIVE"), "{screen}");
+        stands_on_every_page(&mut rig, "MAY BE APPROACHED", "may be approached: the pin is in");
+        assert!(rig.events().contains("MAY BE APPROACHED: the pin is in"));
+        assert!(!rig.screen(80, 24).contains("ALARM LIVE"), "{}", rig.screen(80, 24));
     }
 }
 
@@ -145,30 +170,60 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
 fn each_state_of_the_motor_has_its_warning() {
     let none = TdInterlock::empty();
     let cases = [
-        (TdMotor::TD_MOTOR_UNKNOWN, 0, "MOTOR NOT REPORTED: treat as live"),
-        (TdMotor::TD_MOTOR_LIVE, u16::MAX, "LIVE MOTOR: do not approach"),
-        (TdMotor::TD_MOTOR_BURNING, u16::MAX, "MOTOR BURNING: do not approach"),
-        (TdMotor::TD_MOTOR_HOT, 48, "MOTOR HOT: burnt out, do not touch for 48 s"),
+        (TdMotor::TD_MOTOR_UNKNOWN, 0, "do not approach: MOTOR NOT REPORTED: treat it as live"),
+        (TdMotor::TD_MOTOR_LIVE, u16::MAX, "do not approach: LIVE MOTOR"),
+        (TdMotor::TD_MOTOR_BURNING, u16::MAX, "do not approach: MOTOR BURNING"),
+        (TdMotor::TD_MOTOR_HOT, 48, "do not approach for 48 s: MOTOR HOT, burnt out"),
+        (TdMotor::TD_MOTOR_PIN_IN, 31, "do not approach for 31 s: the waiting time runs"),
     ];
     for (motor, wait_s, words) in cases {
-        let screen = ended(motor, wait_s, none).screen(80, 24);
-        assert!(screen.contains(words), "{screen}");
+        stands_on_every_page(&mut down(motor, wait_s, none), "DO NOT APPROACH", words);
     }
-    for safe in [TdMotor::TD_MOTOR_BURNT, TdMotor::TD_MOTOR_PIN_IN] {
-        let screen = ended(safe, 0, none).screen(80, 24);
-        assert!(!screen.contains("MOTOR") && !screen.contains("approach"), "{screen}");
+    for (safe, why) in [
+        (TdMotor::TD_MOTOR_BURNT, "the motor is burnt out and cool"),
+        (TdMotor::TD_MOTOR_PIN_IN, "the pin is in"),
+    ] {
+        let mut rig = down(safe, 0, none);
+        stands_on_every_page(&mut rig, "MAY BE APPROACHED", why);
+        assert!(!rig.screen(80, 24).contains("MOTOR"), "{}", rig.screen(80, 24));
     }
 }
 
-/// Before a flight people work beside the vehicle.
+/// The vehicle is switched off, or falls silent, while its motor cools: the time goes on.
 #[test]
-fn no_warning_while_the_vehicle_is_being_prepared() {
+fn a_waiting_time_goes_on_without_the_link() {
+    let mut rig = down(TdMotor::TD_MOTOR_HOT, 20, TdInterlock::empty());
+    rig.speaks = false;
+    rig.run(12.0);
+    assert!(large(&rig).contains("~do not approach for 8 s: MOTOR HOT, burnt out"), "{}", large(&rig));
+    rig.run(9.0);
+    assert!(large(&rig).contains("may be approached: the motor is burnt out"), "{}", large(&rig));
+    assert!(rig.events().contains("MAY BE APPROACHED"), "{}", rig.events());
+    let mut rig = down(TdMotor::TD_MOTOR_LIVE, 20, TdInterlock::empty());
+    rig.speaks = false;
+    rig.run(25.0);
+    assert!(large(&rig).contains("do not approach but to put the pin in: LIVE MOTOR"), "{}", large(&rig));
+    let mut rig = down(TdMotor::TD_MOTOR_LIVE, u16::MAX, TdInterlock::empty());
+    rig.speaks = false;
+    rig.run(200.0);
+    assert!(large(&rig).contains("do not approach: LIVE MOTOR"), "unknown stays unknown: {}", large(&rig));
+}
+
+/// In flight nobody approaches, and the pages show the flight.
+#[test]
+fn nothing_is_said_of_approaching_in_flight_or_while_the_vehicle_is_being_prepared() {
     let mut rig = Rig::crewed();
-    assert!(!rig.screen(80, 24).contains("MOTOR"));
+    assert!(!rig.screen(80, 24).contains("MOTOR") && !rig.screen(80, 24).contains("approach"));
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    rig.run(0.2);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("phase ") && !screen.contains(" next do not"), "{screen}");
+    let mut rig = Rig::crewed();
     rig.pad_wait_s = 31;
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(0.1);
-    assert!(rig.screen(80, 24).contains("STAY OFF THE PAD for 31 s"));
+    stands_on_every_page(&mut rig, "DO NOT APPROACH", "do not approach for 31 s: the waiting time runs");
 }
 
 #[test]

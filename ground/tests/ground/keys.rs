@@ -560,12 +560,12 @@ fn the_wait_after_an_abort_on_the_pad_is_shown_at_every_size() {
     rig.answer(ABORT, ACCEPTED);
     rig.pad_wait_s = 57;
     rig.run(0.1);
-    assert!(rig.screen(80, 24).contains("LIVE MOTOR: do not approach for 57 s"));
-    assert!(rig.screen(20, 5).contains("LIVE MOTOR"), "{}", rig.screen(20, 5));
+    assert!(rig.screen(80, 24).contains("do not approach for 57 s: LIVE MOTOR"), "{}", rig.screen(80, 24));
+    assert!(rig.screen(20, 5).contains("DO NOT APPROACH"), "{}", rig.screen(20, 5));
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(0.1);
-    assert!(rig.screen(80, 24).contains("STAY OFF THE PAD for 57 s"));
-    assert!(rig.screen(20, 5).contains("STAY OFF THE PAD"));
+    assert!(rig.screen(80, 24).contains("do not approach for 57 s: the waiting time runs"));
+    assert!(rig.screen(20, 5).contains("DO NOT APPROACH"));
 }
 
 /// The first repeat of a held key looks like a second press; only the later repeats show that it is held.

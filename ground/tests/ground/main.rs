@@ -9,6 +9,7 @@ mod checklist;
 mod crew;
 mod daemon;
 mod disarm;
+mod endings;
 mod finding;
 mod flights;
 mod hurried_keys;

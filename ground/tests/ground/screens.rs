@@ -73,12 +73,12 @@ fn limits_are_shown_once_the_vehicle_has_reported_them() {
     rig.plan(TdLimit::TD_LIMIT_AXIAL_SPEED);
     let screen = rig.screen(80, 24);
     assert!(
-        screen.contains("NO u     -0.050 -- m/s") && screen.contains(" -         0         +"),
+        screen.contains("NO sink      0.05 -- m/s") && screen.contains(" -         0         +"),
         "{screen}"
     );
     rig.limits();
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("NO u     -0.050 ±0.4 m/s") && screen.contains("+20 deg"), "{screen}");
+    assert!(screen.contains("NO sink      0.05 ±0.4 m/s") && screen.contains("+20 deg"), "{screen}");
 }
 
 /// The capacity of a serial line is shown beside its rate; that of a network is unknown.

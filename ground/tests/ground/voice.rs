@@ -67,6 +67,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
         "ignition",
         "powered",
         "touchdown",
+        "do not approach",
         "landed",
     ];
     assert_eq!(said(&mut rig), expected);
@@ -76,7 +77,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
 fn more_or_less_is_called_out_as_the_crew_wants() {
     let mut few = rig(Amount::Few, true);
     fly(&mut few);
-    assert_eq!(said(&mut few), ["liftoff", "apogee", "ignition", "touchdown", "landed"]);
+    assert_eq!(said(&mut few), ["liftoff", "apogee", "ignition", "touchdown", "do not approach", "landed"]);
     let mut all = rig(Amount::All, true);
     fly(&mut all);
     let all = said(&mut all);

@@ -12,7 +12,7 @@ mod extrapolation;
 
 use std::time::Duration;
 
-use protocol::dialect::{TdChute, TdPhase};
+use protocol::dialect::{TdChute, TdHold, TdPhase};
 
 use super::vehicle::{Vehicle, is_burning};
 pub use extrapolation::Basis;
@@ -49,6 +49,8 @@ pub struct PredictedPosition {
     /// Time since the last position.
     pub age: Duration,
     pub basis: Basis,
+    /// It must have come down by now.
+    pub is_down: bool,
 }
 
 /// The predicted position of a vehicle in flight whose last position is stale. `None` while the vehicle is heard or
@@ -68,10 +70,8 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     let age = motion.age(now);
     let seconds = age.as_secs_f64();
     let expected = on_plan.unwrap_or_else(|| LastMotion::of(vehicle, phase, &motion.value).after(seconds));
-    let growing_s = match expected.landed_after_s {
-        Some(landed_s) => seconds.min((1.0 + LATE_SHARE) * landed_s + LATE_S),
-        None => seconds,
-    };
+    let down_after_s = expected.landed_after_s.map(|landed_s| (1.0 + LATE_SHARE) * landed_s + LATE_S);
+    let growing_s = down_after_s.map_or(seconds, |down_s| seconds.min(down_s));
     let wrong_m_s2 = acceleration_error_m_s2(vehicle, phase, expected.basis);
     let swerved_m = if vehicle.in_space { swerve_m(expected.burning_s) } else { 0.0 };
     let grown_m = SPEED_ERROR_M_S * growing_s + 0.5 * wrong_m_s2 * growing_s * growing_s + swerved_m;
@@ -82,7 +82,19 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
         error_m: POSITION_ERROR_M + grown_m + expected.or_else_m,
         age,
         basis: expected.basis,
+        is_down: down_after_s.is_some_and(|down_s| seconds > down_s),
     })
+}
+
+/// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and has reached zero since.
+/// A hold or an abort in the silence is not known here.
+pub fn may_have_left(vehicle: &Vehicle, now: Duration) -> Option<Duration> {
+    let status = vehicle.status.as_ref().filter(|status| status.is_stale(now))?;
+    let counted =
+        status.value.phase == TdPhase::TD_PHASE_PAD_ARMED && status.value.hold == TdHold::TD_HOLD_NONE;
+    let left_s = vehicle.countdown_s().filter(|left| counted && left.value > 0.0)?.value;
+    // Something heard after it may already tell of the flight.
+    status.age(now).checked_sub(Duration::from_secs_f64(left_s)).filter(|_| vehicle.left_pad_at.is_none())
 }
 
 /// Whether the vehicle is in flight and its position is stale.

@@ -5,6 +5,7 @@ use std::time::Duration;
 use ratatui::text::{Line, Span};
 
 use crate::model::Model;
+use crate::model::dead_reckoning::may_have_left;
 use crate::model::place::{LastPlace, Spot};
 use crate::view::number::fixed;
 use crate::view::theme::{TextRole, Theme};
@@ -12,14 +13,21 @@ use crate::view::theme::{TextRole, Theme};
 /// The places and the ways to them.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let place = model.last_place(now).or(model.place);
+    let label = |words: &'static str| Line::styled(words, theme.style(TextRole::Label));
+    if let Some(since) = may_have_left(&model.vehicle, now) {
+        return may_have_left_lines(model, since, theme);
+    }
     let Some(place) = place else {
+        if model.vehicle.left_pad_at.is_some() {
+            return vec![Line::styled(
+                " The vehicle has left the pad, and has not told its place.",
+                theme.style(TextRole::Caution),
+            )];
+        }
         return vec![
-            Line::styled(" The vehicle has not left the pad.", theme.style(TextRole::Label)),
-            Line::styled(
-                " In flight its last place is kept beside the log, for maps",
-                theme.style(TextRole::Label),
-            ),
-            Line::styled(" (GeoJSON, and KML with --pad).", theme.style(TextRole::Label)),
+            label(" The vehicle has not left the pad."),
+            label(" In flight its last place is kept beside the log, for maps"),
+            label(" (GeoJSON, and KML with --pad)."),
         ];
     };
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
@@ -42,6 +50,26 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         let words = " The way from this station needs its place: --here LATITUDE,LONGITUDE";
         lines.push(Line::styled(words, theme.style(TextRole::Label)));
     }
+    lines
+}
+
+/// It was last heard on the pad, in a countdown that must have ended.
+fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line<'static>> {
+    let words = format!(" MAY BE IN THE AIR since T+{:.1} s", since.as_secs_f64());
+    let mut lines = vec![Line::styled(words, theme.style(TextRole::Alarm))];
+    let Some(meant) = model.meant_to_come_down() else {
+        let words = " It has not told the fence of its mission: look around the pad.";
+        lines.push(Line::styled(words, theme.style(TextRole::Caution)));
+        return lines;
+    };
+    let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
+    lines.push(row("meant to land at", format!("north {north} m, east {east} m of the pad"), theme));
+    lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
+    if let Some(at) = model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)) {
+        lines.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
+    }
+    let words = " Under a parachute, or without its landing motor, it may come down farther away.";
+    lines.push(Line::styled(words, theme.style(TextRole::Caution)));
     lines
 }
 

@@ -31,8 +31,11 @@ const FIN_ROWS: u16 = 5;
 
 /// Draws the headline, the panels, the events and the side view.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let first =
-        if model.vehicle.verdict.is_some() { foremost::verdict(model) } else { foremost::burn(model, now) };
+    let first = if model.vehicle.verdict.is_some() {
+        foremost::verdict(model, now)
+    } else {
+        foremost::burn(model, now)
+    };
     let roomy = is_roomy(area);
     let area = headline::draw(&first, theme, frame, area);
     let (left, right) = if roomy {

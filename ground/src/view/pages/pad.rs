@@ -55,10 +55,13 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
         let [left, right] =
             upper.layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
+        let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };
         let [go, ladder] =
-            right.layout(&Layout::vertical([Constraint::Length(GO_ROWS), Constraint::Fill(1)]));
-        let inside = titled("Now", theme, frame, go);
-        headline::draw(&foremost, theme, frame, inside);
+            right.layout(&Layout::vertical([Constraint::Length(go_rows), Constraint::Fill(1)]));
+        if go_rows > 0 {
+            let inside = titled("Now", theme, frame, go);
+            headline::draw(&foremost, theme, frame, inside);
+        }
         (left, ladder, events)
     };
     if model.checklist.is_some() && model.pages.checklist && !is_roomy(area) {
@@ -122,7 +125,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
-    let status = model.vehicle.status.as_ref().filter(|_| !off_pad);
+    if off_pad {
+        return Vec::new();
+    }
+    let status = model.vehicle.status.as_ref();
     let stale = status.is_some_and(|status| status.is_stale(now));
     TdCheck::all()
         .iter_names()

@@ -11,7 +11,7 @@ use crate::model::link_state::RED_AFTER;
 use crate::model::{Model, words};
 use crate::view::number::fixed;
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{draw_lines, event_list, foremost, headline, touchdown, verdict};
+use crate::view::{draw_lines, event_list, foremost, headline, touchdown};
 
 /// Columns of the predicted touchdown beside the greatest values.
 const PLAN_COLUMNS: usize = 37;
@@ -27,7 +27,7 @@ const TABLE_COLUMNS: u16 = 80;
 /// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let roomy = is_roomy(area);
-    let area = headline::draw(&foremost::verdict(model), theme, frame, area);
+    let area = headline::draw(&foremost::verdict(model, now), theme, frame, area);
     let columns = if roomy { TABLE_COLUMNS } else { area.width };
     let mut lines = lines(model, theme, now, usize::from(columns));
     if !roomy {
@@ -48,18 +48,18 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 /// The verdict, then limits and greatest values, then the timeline.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let (head, limits, limit_columns) = if let Some(judged) = &model.vehicle.verdict {
-        (
-            verdict::words(model, &judged.value, theme, columns),
-            verdict::table(model, &judged.value, theme, columns),
-            verdict::table_columns(model, &judged.value),
-        )
-    } else {
-        let (title, mut limits) = touchdown::panel(model, theme, now);
-        limits.insert(0, Line::styled(title, theme.style(TextRole::Title)));
-        let none = Line::styled(" no verdict received yet", theme.style(TextRole::Caution));
-        (none, limits, PLAN_COLUMNS)
+    let (title, mut limits) = touchdown::panel_with_bars(model, theme, now, PLAN_COLUMNS);
+    if model.vehicle.verdict.is_some() {
+        // In the first line it has more room.
+        limits.pop();
+    }
+    let (words, role) = match touchdown::ending(model, now) {
+        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
+        None => ("no verdict received yet".to_owned(), TextRole::Caution),
     };
+    let head = Line::styled(format!(" {words}"), theme.style(role));
+    limits.insert(0, Line::styled(title, theme.style(TextRole::Title)));
+    let limit_columns = PLAN_COLUMNS;
     let mut lines = vec![head];
     let maxima = maxima(model, theme, now);
     if columns > limit_columns + MAXIMA_COLUMNS {

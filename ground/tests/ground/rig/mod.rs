@@ -14,8 +14,8 @@ use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
-    TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock, TdMotor, TdPhase,
-    TdVehicleFlag,
+    TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock, TdLatch, TdMotor,
+    TdPhase, TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -48,6 +48,7 @@ pub(crate) struct Rig {
     pub(crate) motor: TdMotor,
     pub(crate) approach_wait_s: u16,
     pub(crate) hold: TdHold,
+    pub(crate) latch: TdLatch,
     /// Whether the vehicle sends anything at all.
     pub(crate) speaks: bool,
     /// Whether it reports that it hears this station.
@@ -76,6 +77,7 @@ impl Rig {
             motor: TdMotor::TD_MOTOR_LIVE,
             approach_wait_s: 0,
             hold: TdHold::TD_HOLD_NONE,
+            latch: TdLatch::TD_LATCH_NONE,
             speaks: true,
             hears: true,
             armed_here: true,
@@ -212,6 +214,7 @@ impl Rig {
             motor: self.motor,
             abort_impact_m_s: 0,
             hold: self.hold,
+            latch: self.latch,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
             ..TD_FLIGHT_STATUS_DATA::default()
         };
@@ -259,7 +262,11 @@ impl Rig {
     }
 
     pub(crate) fn text(&mut self, text: &str) {
-        for chunk in chunks(protocol::dialect::MavSeverity::MAV_SEVERITY_WARNING, text, 7) {
+        self.text_of(protocol::dialect::MavSeverity::MAV_SEVERITY_WARNING, text);
+    }
+
+    pub(crate) fn text_of(&mut self, severity: protocol::dialect::MavSeverity, text: &str) {
+        for chunk in chunks(severity, text, 7) {
             self.hear(&MavMessage::STATUSTEXT(chunk));
         }
     }

@@ -225,6 +225,11 @@ impl Rig {
         self.contact([-1.428, 1.554, if landed { -0.058 } else { -1.2 }, 0.029, -0.0078], landed, violated);
     }
 
+    /// A landing at this distance from the pad, m.
+    pub(crate) fn verdict_at(&mut self, x_m: f32) {
+        self.contact([x_m, 1.554, -0.058, 0.029, -0.0078], true, TdLimit::empty());
+    }
+
     /// A verdict with the values at contact: distance, pitch, speeds, rate.
     pub(crate) fn contact(&mut self, figures: [f32; 5], landed: bool, limits_violated: TdLimit) {
         // The motor has burnt out and is hot.

@@ -1,0 +1,255 @@
+//! How a flight ended, why its motor was inhibited, and a flight that nobody heard.
+
+use ground::key::Key;
+use ground::model::ending::Ending;
+use protocol::dialect::{MavSeverity, TdChute, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase};
+
+use crate::rig::Rig;
+use crate::screens::{counting, descending, powered};
+
+/// A verdict on a vehicle that fell from the descent: vertical and horizontal speed at contact, m/s.
+fn judged(speeds_m_s: [f32; 2], landed: bool, violated: TdLimit, chute: TdChute) -> Rig {
+    let mut rig = descending();
+    rig.limits_of_legs();
+    rig.descent_with(0.0, 0.0, chute);
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    let [down_m_s, across_m_s] = speeds_m_s;
+    rig.contact([12.0, 1.5, -down_m_s, across_m_s, 0.0], landed, violated);
+    rig.run(0.5);
+    rig
+}
+
+fn ending(rig: &Rig) -> Option<Ending> {
+    Ending::of(&rig.model.vehicle, rig.now)
+}
+
+/// Each of the four ends has its own word on the review, on the landing page, in the events, in the alarm and on small
+/// screens.
+#[test]
+fn four_ends_have_four_words_everywhere() {
+    use TdChute::{TD_CHUTE_OPEN as OPEN, TD_CHUTE_STOWED as STOWED};
+    let sink = TdLimit::TD_LIMIT_AXIAL_SPEED;
+    let cases = vec![
+        (judged([0.4, 0.1], true, TdLimit::empty(), STOWED), "LANDED inside every limit of the legs"),
+        (judged([6.1, 9.0], false, sink, OPEN), "DOWN UNDER THE PARACHUTE, sinking at 6.1 m/s"),
+        (
+            judged([2.4, 0.3], false, sink | TdLimit::TD_LIMIT_PITCH, STOWED),
+            "HARD LANDING: outside tilt, sink",
+        ),
+        (judged([39.0, 2.0], false, sink, STOWED), "LOST: hit the ground at 39 m/s"),
+    ];
+    for (mut rig, sentence) in cases {
+        let word = ending(&rig).expect("it is down").word();
+        assert!(sentence.starts_with(word) && rig.events().contains(sentence), "{}", rig.events());
+        for digit in "123456789".chars() {
+            rig.key(Key::Char(digit));
+            let screen = rig.screen(80, 24);
+            let reason = screen.lines().nth(4).unwrap_or_default();
+            assert!(reason.contains(&format!("{word}; do not approach")), "{digit}: {screen}");
+            assert!(!screen.contains("NOT LANDED") && !screen.contains("Table 2"), "{screen}");
+        }
+        rig.key(Key::Char('4'));
+        assert!(rig.screen(80, 24).contains(&format!(" {sentence}")), "{}", rig.screen(80, 24));
+        let alarms: Vec<_> = rig.model.alarms.list().iter().map(|alarm| alarm.text.as_str()).collect();
+        assert_eq!(alarms.contains(&sentence), word != "LANDED", "{alarms:?}");
+    }
+}
+
+/// A canopy that was thrown out too late does not make an impact a descent under a parachute.
+#[test]
+fn an_impact_with_a_parachute_that_did_not_fill_is_lost() {
+    let violated = TdLimit::TD_LIMIT_AXIAL_SPEED;
+    let rig = judged([22.0, 1.0], false, violated, TdChute::TD_CHUTE_OPEN);
+    assert_eq!(ending(&rig), Some(Ending::Lost));
+    let rig = judged([0.9, 0.2], false, TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
+    assert!(rig.events().contains("HARD LANDING: it did not stay upright"), "{}", rig.events());
+}
+
+/// A vehicle that tells no verdict, as one without a simulated world does.
+#[test]
+fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
+    let mut rig = descending();
+    rig.descent_with(3.0, -6.0, TdChute::TD_CHUTE_OPEN);
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.run(0.5);
+    assert_eq!(ending(&rig), Some(Ending::UnderParachute));
+    let mut rig = powered();
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.run(0.5);
+    assert_eq!(ending(&rig), None);
+    assert!(rig.screen(80, 24).contains("no verdict received yet"), "{}", rig.screen(80, 24));
+}
+
+/// A vehicle that falls silent is in flight until it must be down; then it is lost until it is heard again.
+#[test]
+fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
+    let mut rig = descending();
+    rig.run(0.5);
+    rig.state(4.0, 120.0, -0.6, -21.5, 88.0);
+    rig.speaks = false;
+    rig.run(3.0);
+    assert_eq!(ending(&rig), None);
+    rig.run(60.0);
+    assert_eq!(ending(&rig), Some(Ending::Lost));
+    assert!(
+        rig.screen(80, 24).contains("LOST: it fell silent in flight and must be down"),
+        "{}",
+        rig.screen(80, 24)
+    );
+    assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text.starts_with("LOST: it fell silent")));
+    rig.speaks = true;
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.motor = TdMotor::TD_MOTOR_HOT;
+    rig.approach_wait_s = 20;
+    rig.run(1.0);
+    assert_eq!(ending(&rig), None, "it is heard again");
+}
+
+/// Until the canopy carries, no time is told: the speed is that of a fall.
+#[test]
+fn no_time_is_told_before_the_canopy_carries() {
+    let mut rig = descending();
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    // The phase is told before the parachute is.
+    for chute in [TdChute::TD_CHUTE_STOWED, TdChute::TD_CHUTE_FIRED] {
+        rig.descent_with(90.0, -40.0, chute);
+        rig.state(4.0, 90.0, -0.6, -40.0, 88.0);
+        rig.run(0.1);
+        let screen = rig.screen(80, 24);
+        assert!(screen.contains(" next chute opens: fired, still falling fast, LIVE MOTOR"), "{screen}");
+        assert!(!screen.contains("the ground in"), "{screen}");
+    }
+    rig.descent_with(72.0, -6.0, TdChute::TD_CHUTE_OPEN);
+    assert!(rig.screen(80, 24).contains(" next the ground in 12.0 s under the parachute, LIVE MOTOR"));
+    rig.run(0.5);
+    assert!(rig.screen(80, 24).contains(" next the ground in 11.5 s"), "{}", rig.screen(80, 24));
+}
+
+/// The reason of a latch stands beside the word, on every page.
+#[test]
+fn a_latch_has_its_reason_beside_it() {
+    use TdLatch as L;
+    for (latch, words) in [
+        (L::TD_LATCH_COMMANDED, "ABORT LATCHED: commanded by the crew"),
+        (L::TD_LATCH_UNCOMMANDED_LIFTOFF, "ABORT LATCHED: uncommanded lift-off"),
+        (L::TD_LATCH_UNCOMMANDED_RELEASE, "ABORT LATCHED: uncommanded release"),
+        (L::TD_LATCH_NO_SEPARATION, "ABORT LATCHED: the booster stayed on"),
+        (L::TD_LATCH_GATE, "ABORT LATCHED: the ignition gate did not open in time"),
+    ] {
+        let mut rig = Rig::crewed();
+        rig.phase = TdPhase::TD_PHASE_COAST;
+        rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+        (rig.latch, rig.motor) = (latch, TdMotor::TD_MOTOR_PIN_IN);
+        rig.run(1.0);
+        let alarms = rig.model.alarms.list();
+        assert!(alarms.iter().any(|alarm| alarm.text == words), "{alarms:?}");
+        assert!(rig.events().contains(&format!("the vehicle says {words}")), "{}", rig.events());
+    }
+    // Inhibited for good without an abort.
+    let mut rig = Rig::crewed();
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    rig.latch = TdLatch::TD_LATCH_GATE;
+    rig.run(1.0);
+    let words = "MOTOR INHIBITED: the ignition gate did not open in time";
+    assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text == words));
+}
+
+/// An older vehicle tells no cause: its grave text about that time is the reason, or there is none.
+#[test]
+fn an_older_vehicles_text_is_the_reason_of_its_latch() {
+    let latched = |before: &str, at_the_latch: Option<&str>| {
+        let mut rig = Rig::crewed();
+        rig.text_of(MavSeverity::MAV_SEVERITY_CRITICAL, before);
+        rig.run(30.0);
+        rig.phase = TdPhase::TD_PHASE_COAST;
+        rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+        rig.run(0.3);
+        rig.text("only a warning");
+        if let Some(text) = at_the_latch {
+            rig.text_of(MavSeverity::MAV_SEVERITY_CRITICAL, text);
+        }
+        rig.run(0.5);
+        rig.text_of(MavSeverity::MAV_SEVERITY_CRITICAL, "LIVE MOTOR: do not approach for 60 s");
+        rig.run(0.1);
+        let alarms = rig.model.alarms.list();
+        alarms.iter().find(|alarm| alarm.text.starts_with("ABORT")).map(|alarm| alarm.text.clone())
+    };
+    assert_eq!(
+        latched("an old trouble", Some("LIFT-OFF that nobody asked for")).as_deref(),
+        Some("ABORT LATCHED: LIFT-OFF that nobody asked for")
+    );
+}
+
+/// The link is lost at T-1.8 s, and the vehicle launches unheard.
+fn unheard() -> Rig {
+    let mut rig = counting();
+    rig.limits_of_legs();
+    rig.countdown_ms = 1_800;
+    rig.run(0.1);
+    rig.speaks = false;
+    rig
+}
+
+#[test]
+fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
+    let mut rig = unheard();
+    rig.run(1.6);
+    assert!(!rig.screen(80, 24).contains("IN THE AIR?"), "not yet: {}", rig.screen(80, 24));
+    rig.run(12.2);
+    for digit in "123456789?pftvx".chars() {
+        rig.key(Key::Char(digit));
+        let screen = rig.screen(80, 24);
+        let reason = " since T+12.0 s, not heard since T-1.8 s; meant to land within 120 m of the pad";
+        assert!(screen.lines().nth(4).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
+        assert!(screen.contains(" IN THE AIR?") && screen.contains("~T+12.0"), "{digit}: {screen}");
+        assert!(!screen.contains("~PAD_ARMED"), "{screen}");
+        assert!(rig.screen(60, 12).contains(" MAY BE IN THE AIR since T+12.0 s"), "{}", rig.screen(60, 12));
+    }
+    assert!(rig.screen(20, 5).contains("MAY BE IN THE AIR"), "{}", rig.screen(20, 5));
+    rig.key(Key::Char('f'));
+    let find = rig.screen(80, 24);
+    assert!(find.contains("120 m, the fence of its mission") && !find.contains("not left the pad"), "{find}");
+    assert!(rig.events().contains("MAY BE IN THE AIR: not heard since T-1.8 s"), "{}", rig.events());
+}
+
+/// The link is back after the landing: the page of the lost vehicle knows what the verdict knows.
+#[test]
+fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
+    let mut rig = unheard();
+    rig.run(40.0);
+    rig.verdict_at(40.7);
+    rig.key(Key::Char('f'));
+    let find = rig.screen(80, 24);
+    assert!(!find.contains("not left the pad"), "{find}");
+    assert!(find.contains("±42 m"), "{find}");
+    rig.speaks = true;
+    rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    rig.run(1.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("LANDED; do not approach for 55 s"), "{screen}");
+    rig.state(40.7, 0.0, 0.0, 0.0, 89.0);
+    let find = rig.screen(80, 24);
+    assert!(find.contains("41 m, bearing 000 deg") && !find.contains("IN THE AIR"), "{find}");
+    assert!(rig.model.outcome.started, "a flight was flown");
+}
+
+/// The vehicle held its countdown in the silence: when it is heard again, nothing was in the air.
+#[test]
+fn a_hold_in_the_silence_takes_the_warning_back() {
+    let mut rig = unheard();
+    rig.run(10.0);
+    assert!(rig.screen(80, 24).contains("IN THE AIR?"));
+    rig.speaks = true;
+    (rig.hold, rig.countdown_ms) = (TdHold::TD_HOLD_UPLINK_SILENT, i32::MAX);
+    rig.run(0.2);
+    let screen = rig.screen(80, 24);
+    assert!(!screen.contains("IN THE AIR") && screen.contains("HOLD: "), "{screen}");
+    rig.key(Key::Char('f'));
+    assert!(rig.screen(80, 24).contains("has not left the pad"));
+    // Without a countdown silence on the pad is only silence.
+    rig.speaks = false;
+    rig.run(60.0);
+    assert!(!rig.screen(80, 24).contains("IN THE AIR"), "{}", rig.screen(80, 24));
+}
