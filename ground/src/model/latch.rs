@@ -6,6 +6,7 @@ use protocol::dialect::{TdInterlock, TdLatch};
 use protocol::log::record::EventLevel;
 
 use super::Model;
+use super::command::CommandKind;
 use super::events::Speaker;
 use super::vehicle::Vehicle;
 
@@ -39,7 +40,8 @@ pub fn words(model: &Model) -> Option<String> {
         (false, Some(_)) if !no_light => "MOTOR INHIBITED",
         (false, _) => return None,
     };
-    let cause = cause.map(str::to_owned).or_else(|| text_of_the_latch(model));
+    let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here");
+    let cause = cause.or(ours).map(str::to_owned).or_else(|| text_of_the_latch(model));
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
 }
 

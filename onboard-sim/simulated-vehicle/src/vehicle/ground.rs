@@ -101,7 +101,7 @@ fn outcome_in_words(outcome: &Outcome, rest: Option<RestOutcome>) -> String {
         Some(RestOutcome::BodyStrike) => "hit the ground with its body",
         None => "is not at rest",
     };
-    let held = |kept: bool| if kept { "kept" } else { "broken" };
     let why = outcome.failure.map_or_else(String::new, |failure| format!(" ({})", failure.name()));
-    format!("it {stands}; limits of the legs {}{why}, Table 2 {}", held(outcome.legs), held(outcome.strict))
+    let legs = if outcome.legs { "kept" } else { "broken" };
+    format!("it {stands}; limits of the legs {legs}{why}")
 }
