@@ -13,6 +13,8 @@ pub enum AlarmKind {
     LinkLost,
     /// The vehicle does not hear this station.
     UplinkLost,
+    /// Frames are refused for their signature, and the vehicle is not heard.
+    Signatures,
     /// The transport does not work.
     LinkDown,
     /// An attached screen is told nothing any more. The station itself does not know this alarm.
@@ -84,6 +86,7 @@ impl AlarmKind {
             Self::SameId,
             Self::Foreign,
             Self::MayBeFlying,
+            Self::Signatures,
         ];
         others.into_iter().chain(of_commands)
     }
@@ -98,6 +101,7 @@ impl AlarmKind {
             Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign | Self::MayBeFlying => 2,
             Self::LinkLost
             | Self::UplinkLost
+            | Self::Signatures
             | Self::LinkDown
             | Self::LiveMotor
             | Self::Held
@@ -114,6 +118,7 @@ impl AlarmKind {
             self,
             Self::LinkLost
                 | Self::UplinkLost
+                | Self::Signatures
                 | Self::LinkDown
                 | Self::StationSilent
                 | Self::TwoVehicles

@@ -48,6 +48,10 @@ pub struct Link {
     pub reported_at: Duration,
     /// How many frames passed or failed the signature check; `None` without a key.
     pub signing: Option<SigningCounters>,
+    /// When a frame was last refused for its signature.
+    pub(crate) refused_at: Option<Duration>,
+    /// The crew was told that nothing is heard.
+    pub(crate) unheard_reported: bool,
     /// The last report of a radio about itself, and its time. It says nothing about the vehicle.
     pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
     /// The number of the link that brought the last frame, if there are several.

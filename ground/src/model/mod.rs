@@ -45,6 +45,7 @@ pub mod touchdown;
 pub mod trace;
 pub mod trend;
 pub mod two_person;
+pub mod unheard;
 pub mod uplink;
 pub mod vehicle;
 pub mod words;

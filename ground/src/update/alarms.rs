@@ -16,7 +16,7 @@ use crate::model::events::Speaker;
 use crate::model::link_state::{LinkState, RED_AFTER};
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::pad_check::PadCheck;
-use crate::model::{Model, Role, latch};
+use crate::model::{Model, Role, latch, unheard};
 
 /// An abort without an answer raises an alarm after this time.
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
@@ -82,6 +82,7 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let text = format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s");
         found.push((AlarmKind::MayBeFlying, text));
     }
+    found.extend(unheard::refused(model, now).map(|words| (AlarmKind::Signatures, words)));
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }

@@ -243,6 +243,9 @@ fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<Signing
             ),
         );
     }
+    if rejected(signing) > rejected(model.link.signing) {
+        model.link.refused_at = Some(now);
+    }
     (model.link.reports, model.link.reported_at, model.link.signing) = (links, now, signing);
 }
 

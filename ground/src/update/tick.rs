@@ -13,7 +13,7 @@ use crate::model::dialog::Dialog;
 use crate::model::events::Speaker;
 use crate::model::link_state::LinkState;
 use crate::model::vehicle::{Deflection, is_on_pad};
-use crate::model::{Model, Role, trace};
+use crate::model::{Model, Role, trace, unheard};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 /// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
@@ -49,6 +49,12 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         frames::add_vehicle_text(model, &text, now);
     }
     note_loss(model, now);
+    if !model.link.unheard_reported
+        && let Some(hints) = unheard::hints(model, now)
+    {
+        model.link.unheard_reported = true;
+        model.warn(now, hints.join(" "));
+    }
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
     trace::note(model, now);

@@ -1,4 +1,4 @@
-//! The layout for terminals smaller than 80x24: plain lines, the most important first.
+//! The layout for terminals smaller than 80x22: plain lines, the most important first.
 
 use std::time::Duration;
 

@@ -2,7 +2,7 @@
 //!
 //! Every page has the same frame: [`identity`] is the first line, [`top_lines`] follow (phase, armed, countdown,
 //! link, what an abort would do), and [`alarm_line`] and the page names are at the bottom. [`pages`] has one module
-//! per page; the other modules are panels and helpers of the pages. From 80x24 on, [`wide`] lays the panels out side
+//! per page; the other modules are panels and helpers of the pages. From 80x22 on, [`wide`] lays the panels out side
 //! by side; on smaller terminals [`compact`] shows plain lines, the most important first. For terminals without
 //! Unicode, [`ascii`] converts the result.
 
@@ -50,9 +50,9 @@ use ratatui::text::Line;
 use crate::model::Model;
 use theme::Theme;
 
-/// The smallest screen with panels.
+/// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;
-const WIDE_ROWS: u16 = 24;
+const WIDE_ROWS: u16 = 22;
 
 pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     let area = frame.area();

@@ -167,7 +167,8 @@ impl Theme {
         let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default();
         let locale = locale.to_ascii_lowercase();
         let unicode = locale.contains("utf-8") || locale.contains("utf8");
-        let old = ["vt1", "vt2", "vt3"].iter().any(|name| term.starts_with(name));
+        // The console of Linux has at most 512 characters: none of its fonts has braille or parts of blocks.
+        let old = ["vt1", "vt2", "vt3", "linux"].iter().any(|name| term.starts_with(name));
         Self { palette, ascii: !unicode || old }
     }
 
@@ -260,6 +261,8 @@ mod tests {
         assert_eq!(of(&[("NO_COLOR", ""), ("TERM", "xterm-256color")]).palette, Palette::Dark);
         let white = [("TERM", "rxvt-256color"), ("COLORFGBG", "0;15")];
         assert_eq!(of(&white).palette, Palette::Light);
+        let console = Theme { palette: Palette::Sixteen, ascii: true };
+        assert_eq!(of(&[("TERM", "linux"), ("LANG", "C.UTF-8")]), console);
         assert_eq!(
             of(&[("TERM", "vt100"), ("LANG", "C.UTF-8")]),
             Theme { palette: Palette::None, ascii: true }

@@ -14,7 +14,7 @@ use crate::model::link_state::LinkState;
 use crate::model::motor::hold_words;
 use crate::model::pad_check::{Standing, standing};
 use crate::model::permits::{why_nothing_moves, why_other_mission};
-use crate::model::{Model, Role, abort_too_late, words};
+use crate::model::{Model, Role, abort_too_late, unheard, words};
 
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
 /// answered one instead of a NO-GO. Its alarm stays.
@@ -277,7 +277,9 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = latest.filter(|track| go || !answered_long_ago(track, now)) {
         return command_facts(track, theme, now);
     }
-    ready.map_or_else(Line::default, |(words, role)| Line::styled(format!(" {words}"), theme.style(role)))
+    let unheard = unheard::hints(model, now).and_then(|hints| hints.into_iter().next());
+    let words = ready.or_else(|| unheard.map(|words| (words, TextRole::Caution)));
+    words.map_or_else(Line::default, |(words, role)| Line::styled(format!(" {words}"), theme.style(role)))
 }
 
 fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {

@@ -1,4 +1,4 @@
-//! The layout from 80x24 on: identity, top lines, pinned numbers, the page, the bar of the flight, the alarm line, the
+//! The layout from 80x22 on: identity, top lines, pinned numbers, the page, the bar of the flight, the alarm line, the
 //! page names.
 
 use std::time::Duration;

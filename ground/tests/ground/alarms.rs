@@ -8,6 +8,7 @@ use ground::model::command::CommandKind;
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
+use protocol::signing::SigningCounters;
 
 use crate::keys::ladder;
 use crate::rig::{Rig, settings};
@@ -265,4 +266,45 @@ fn an_alarm_that_is_raised_again_has_a_new_age() {
     rig.run(5.0);
     let screen = rig.screen(80, 24);
     assert!(screen.contains(" ALARM LINK LOST: the vehicle is not heard 1 s "), "{screen}");
+}
+
+/// A station on a wrong port says what it listens on and what to check, on the page and once as an event.
+#[test]
+fn a_vehicle_that_was_never_heard_has_hints_on_the_main_page() {
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    rig.run(4.0);
+    assert!(!rig.screen(80, 24).contains("Nothing heard"));
+    rig.run(3.0);
+    for size in [(80, 24), (80, 22), (120, 40), (40, 12)] {
+        let screen = rig.screen(size.0, size.1);
+        assert!(screen.contains("Nothing heard from system 1"), "{screen}");
+    }
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("It listens on 127.0.0.1:14550"), "{screen}");
+    assert_eq!(rig.events().matches("Nothing heard").count(), 1);
+    rig.speaks = true;
+    rig.run(2.0);
+    assert!(!rig.screen(80, 24).contains("Nothing heard"));
+}
+
+/// A wrong key: an alarm with the number of frames, and the hint on the page.
+#[test]
+fn frames_that_are_refused_for_their_signature_raise_an_alarm_while_nothing_else_is_heard() {
+    let counters = |wrong| Some(SigningCounters { wrong, ..SigningCounters::default() });
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    for wrong in 1..=8 {
+        rig.msg(Msg::Links { links: Vec::new(), signing: counters(wrong * 20) });
+        rig.run(1.0);
+    }
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("ALARM 160 frames REFUSED, wrong signature"), "{screen}");
+    assert!(screen.contains("160 frames REFUSED, wrong signature: is --key the"), "{screen}");
+    assert!(rig.actions.contains(&Action::Bell));
+    // Strangers beside a vehicle that is heard ring no bell.
+    let mut rig = Rig::crewed();
+    rig.msg(Msg::Links { links: Vec::new(), signing: counters(500) });
+    rig.run(1.0);
+    assert!(!rig.model.alarms.list().iter().any(|alarm| alarm.kind == AlarmKind::Signatures));
 }

@@ -21,6 +21,8 @@ use crate::rig::svg::{colours, picture, rgb};
 use crate::screens::{armed, counting, on_the_pad};
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (140, 45), (200, 60)];
+/// The same terminal with a line, or two, of a multiplexer.
+const LESS_ROWS: [(u16, u16); 2] = [(80, 23), (80, 22)];
 
 /// The least contrast of text and of pictures, by the formula of WCAG 2.2; its strictest level asks for 7.
 fn contrast_min(palette: Palette) -> f64 {
@@ -28,10 +30,22 @@ fn contrast_min(palette: Palette) -> f64 {
 }
 
 fn no_go() -> Rig {
-    let mut rig = on_the_pad();
+    let mut rig = with_events();
     rig.checks_failed =
         (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
     rig.interlocks = protocol::dialect::TdInterlock::empty();
+    rig.run(1.0);
+    rig
+}
+
+/// On the pad after the vehicle has said what it says at its start.
+fn with_events() -> Rig {
+    let mut rig = on_the_pad();
+    for text in
+        ["self-test passed", "the log runs", "plan: a landing is rehearsed", "igniter closed", "uplink heard"]
+    {
+        rig.text(text);
+    }
     rig.run(1.0);
     rig
 }
@@ -110,7 +124,7 @@ fn states() -> Vec<(&'static str, Rig)> {
     lost.speaks = false;
     lost.run(6.0);
     vec![
-        ("pad", on_the_pad()),
+        ("pad", with_events()),
         ("nogo", no_go()),
         ("checklist", with_checklist()),
         ("armed", armed()),
@@ -250,11 +264,26 @@ fn large_screens_are_used() {
 #[test]
 fn what_must_be_seen_first_is_the_largest() {
     for (name, rig) in states() {
-        for (size, least) in SIZES.into_iter().zip([30, 60, 70]) {
+        for (size, least) in SIZES.into_iter().chain(LESS_ROWS).zip([30, 60, 70, 30, 30]) {
             let buffer = drawn(&rig, size, Palette::Dark);
             let blocks = "█▀▄▌▐▘▝▖▗▚▞▙▛▜▟";
             let large = buffer.content.iter().filter(|cell| blocks.contains(cell.symbol())).count();
             assert!(large >= least || name == "pad", "{name} {size:?}: {large} cells");
+        }
+    }
+}
+
+/// Path and plot are drawn with the rows of a multiplexer missing, too.
+#[test]
+fn a_line_of_a_multiplexer_costs_no_picture() {
+    for size in LESS_ROWS {
+        for key in ['p', 't', '3'] {
+            let mut rig = flying(TdPhase::TD_PHASE_POWERED);
+            rig.key(Key::Char(key));
+            let buffer = drawn(&rig, size, Palette::Dark);
+            let dots = |symbol: &str| symbol.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
+            let drawn = buffer.content.iter().filter(|cell| dots(cell.symbol())).count();
+            assert!(drawn >= 15, "{key} {size:?}: {drawn} cells\n{}", rows(&buffer).join("\n"));
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::model::act::Act;
 use crate::model::command::CommandKind;
 use crate::model::permits::why_not_here;
 use crate::model::vehicle::{Vehicle, is_on_pad};
-use crate::model::words;
+use crate::model::{unheard, words};
 use crate::view::number::{STALE_MARK, fixed};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::{
@@ -23,8 +23,10 @@ use crate::view::{
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
-/// Rows of the checks, with their title.
+/// The most rows of checks or steps, with their title.
 const CHECK_ROWS: u16 = 16;
+/// Rows of the vehicle's state on a larger screen, with a title.
+const NOW_ROWS: u16 = 13;
 /// Rows of GO or NO-GO at 80 columns, with a title.
 const GO_ROWS: u16 = 5;
 /// Columns of the ladder on a larger screen.
@@ -33,10 +35,16 @@ const LADDER_COLUMNS: u16 = 40;
 /// Draws GO or NO-GO, the checks and the ladder, the events below.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let foremost = foremost::pad(model, now);
+    let (checks, ladder) = (checks(model, theme, now), ladder(model, theme, now));
+    let lists_steps = model.checklist.is_some() && model.pages.checklist && !is_roomy(area);
+    let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };
+    let besides = if is_roomy(area) { 1 } else { 1 + go_rows };
+    let rows = (checks.len() as u16 + 1).max(ladder.len() as u16 + besides);
+    let upper_rows = if lists_steps { CHECK_ROWS } else { rows.min(CHECK_ROWS) };
     let (checks_area, ladder_area, events) = if is_roomy(area) {
         let area = headline::draw(&foremost, theme, frame, area);
-        let [upper, below] =
-            area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS + 1), Constraint::Fill(1)]));
+        let [upper, below] = area
+            .layout(&Layout::vertical([Constraint::Length(upper_rows.max(NOW_ROWS)), Constraint::Fill(1)]));
         let [left, middle, right] = upper.layout(&Layout::horizontal([
             Constraint::Length(CHECK_COLUMNS + 4),
             Constraint::Length(LADDER_COLUMNS),
@@ -52,26 +60,24 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         (left, middle, events)
     } else {
         let [upper, events] =
-            area.layout(&Layout::vertical([Constraint::Length(CHECK_ROWS), Constraint::Fill(1)]));
+            area.layout(&Layout::vertical([Constraint::Length(upper_rows), Constraint::Fill(1)]));
         let [left, right] =
             upper.layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
-        let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };
-        let [go, ladder] =
-            right.layout(&Layout::vertical([Constraint::Length(go_rows), Constraint::Fill(1)]));
+        let [go, below] = right.layout(&Layout::vertical([Constraint::Length(go_rows), Constraint::Fill(1)]));
         if go_rows > 0 {
             let inside = titled("Now", theme, frame, go);
             headline::draw(&foremost, theme, frame, inside);
         }
-        (left, ladder, events)
+        (left, below, events)
     };
-    if model.checklist.is_some() && model.pages.checklist && !is_roomy(area) {
+    if lists_steps {
         draw_checklist(model, theme, now, frame, checks_area);
     } else {
         let inside = titled(&summary(model, now).0, theme, frame, checks_area);
-        draw_lines(frame, inside, &checks(model, theme, now));
+        draw_lines(frame, inside, &checks);
     }
     let inside = titled("Arming ladder", theme, frame, ladder_area);
-    draw_lines(frame, inside, &ladder(model, theme, now));
+    draw_lines(frame, inside, &ladder);
     let inside = titled("Events", theme, frame, events);
     let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
@@ -121,40 +127,40 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines
 }
 
-/// One line per check: GO or NO, its name, the value found, and why it fails.
+/// Each failing check with the value found and why it fails; how many pass; the measured values of those.
 fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
-    if off_pad {
-        return Vec::new();
-    }
-    let status = model.vehicle.status.as_ref();
-    let stale = status.is_some_and(|status| status.is_stale(now));
-    TdCheck::all()
+    let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
+        let hints = unheard::hints(model, now).unwrap_or_default();
+        return hints.into_iter().map(|words| Line::from(format!(" {words}"))).collect();
+    };
+    let mark = if status.is_stale(now) { STALE_MARK } else { " " };
+    let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
+        let name = words::lower_case(&NameOf(name), "TD_CHECK_");
+        // The station has a log, too.
+        let name = if name.starts_with("log") { format!("vehicle {name}") } else { name };
+        let found = found(&model.vehicle, bit);
+        Line::from(vec![
+            Span::styled(word, theme.style(TextRole::Alarm)),
+            Span::styled(format!("{mark}{name:<19.19}"), theme.style(TextRole::Plain)),
+            Span::styled(format!("{found:>10} "), theme.style(TextRole::Plain)),
+            Span::styled(reason, theme.style(TextRole::Caution)),
+        ])
+    };
+    let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
+    let all = TdCheck::all();
+    let mut lines: Vec<Line> = all
         .iter_names()
-        .map(|(name, bit)| {
-            let (word, role) = match status {
-                None => (" ?  ", TextRole::Label),
-                Some(status) if status.value.checks_failed.contains(bit) => (" NO ", TextRole::Alarm),
-                Some(_) => (" GO ", TextRole::Good),
-            };
-            let mark = if stale { STALE_MARK } else { " " };
-            let name = words::lower_case(&NameOf(name), "TD_CHECK_");
-            let failing = status.is_some_and(|status| status.value.checks_failed.contains(bit));
-            let reason = if failing { failure(bit) } else { "" };
-            let passing = status.is_some() && !failing;
-            let found = match found(&model.vehicle, bit) {
-                none if none.is_empty() && passing => passing_word(bit).to_owned(),
-                found => found,
-            };
-            Line::from(vec![
-                Span::styled(word, theme.style(role)),
-                Span::styled(format!("{mark}{name:<19.19}"), theme.style(TextRole::Plain)),
-                Span::styled(format!("{found:>10} "), theme.style(TextRole::Plain)),
-                Span::styled(reason, theme.style(TextRole::Caution)),
-            ])
-        })
-        .collect()
+        .filter(|(_, bit)| fails(*bit))
+        .map(|check| row(" NO ", check, failure(check.1)))
+        .collect();
+    let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
+    let count = format!(" GO {mark}{pass} of {of} checks");
+    lines.push(Line::styled(count, theme.style(TextRole::Good)));
+    let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
+    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
+    lines
 }
 
 /// Whether the checks pass, in words.
@@ -162,6 +168,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     match model.vehicle.status.as_ref() {
         _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
+        None if unheard::hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
         Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {
             top_lines::readiness(model, now).unwrap_or_default()
@@ -220,20 +227,6 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_BATTERY => number(vehicle.battery.map(|battery| battery.value.volts), 2, "V"),
         TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib.map(|space| space.value), 0, "MiB"),
         _ => String::new(),
-    }
-}
-
-/// The word for a passing check without a value in telemetry.
-fn passing_word(check: TdCheck) -> &'static str {
-    match check {
-        TdCheck::TD_CHECK_SELF_TEST => "passed",
-        TdCheck::TD_CHECK_ESTIMATOR => "settled",
-        TdCheck::TD_CHECK_IGNITER => "closed",
-        TdCheck::TD_CHECK_LOG => "running",
-        TdCheck::TD_CHECK_LOG_SPACE => "enough",
-        TdCheck::TD_CHECK_UPLINK => "heard",
-        TdCheck::TD_CHECK_BATTERY => "not told",
-        _ => "",
     }
 }
 
