@@ -121,17 +121,22 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 ],
             )
         }
-        Dialog::Again { of, .. } => (
-            "DID YOU TYPE THIS?",
-            vec![
-                plain(format!("The keys for the {} came faster than a hand types:", of.name())),
-                plain("a paste, or a connection that delivers them in bunches.".to_owned()),
-                strong(format!("{} within {left:.0} s: yes, do it.", AGAIN_KEY.name())),
-                plain("Any other key cancels. Nothing has been sent.".to_owned()),
-            ],
-        ),
+        Dialog::Again { of, .. } => again(of.name(), left, theme),
     };
     Some(dialog)
+}
+
+/// The question whether a person typed the keys.
+fn again(name: &str, left_s: f64, theme: Theme) -> (&'static str, Vec<Line<'static>>) {
+    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
+    let key = AGAIN_KEY.name();
+    let lines = vec![
+        plain(format!("The keys for the {name} came faster than a hand types:")),
+        plain("a paste, or a connection that delivers them in bunches.".to_owned()),
+        Line::styled(format!("{key} within {left_s:.0} s: yes, do it."), theme.style(TextRole::Caution)),
+        plain("Any other key cancels. Nothing has been sent.".to_owned()),
+    ];
+    ("DID YOU TYPE THIS?", lines)
 }
 
 /// The step that is signed or voided, and who signs it.
