@@ -19,3 +19,4 @@ mod signed;
 mod terminal;
 mod two_processes;
 mod two_stations;
+mod who_commands;

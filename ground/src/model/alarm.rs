@@ -302,6 +302,27 @@ mod tests {
         assert_eq!(alarms.unacknowledged(), 1);
     }
 
+    /// The link that is lost later hides neither an abort that does not work nor a station that is gone.
+    #[test]
+    fn the_most_urgent_alarm_is_foremost_and_of_equal_ones_the_newest() {
+        let unsent = (AlarmKind::Unanswered(CommandKind::Abort), "ABORT NOT SENT".to_owned());
+        let gone = (AlarmKind::StationSilent, "STATION GONE".to_owned());
+        let low = (AlarmKind::Battery, "BATTERY LOW".to_owned());
+        let foremost = |alarms: &Alarms| alarms.foremost().map(|alarm| alarm.kind);
+        let mut alarms = Alarms::default();
+        let mut conditions = vec![unsent, gone];
+        alarms.watch(S(1), conditions.clone());
+        conditions.extend(lost());
+        alarms.watch(S(3), conditions.clone());
+        conditions.push(low);
+        alarms.watch(S(4), conditions.clone());
+        assert_eq!(foremost(&alarms), Some(AlarmKind::Unanswered(CommandKind::Abort)));
+        alarms.acknowledge(AlarmKind::Unanswered(CommandKind::Abort));
+        assert_eq!(foremost(&alarms), Some(AlarmKind::StationSilent), "the other one is seen");
+        alarms.watch(S(5), conditions[2..].to_vec());
+        assert_eq!(foremost(&alarms), Some(AlarmKind::LinkLost), "what holds goes before what has ended");
+    }
+
     /// A screen that attaches late lists past alarms and rings only for those that still hold.
     #[test]
     fn an_alarm_that_ended_before_the_screen_attached_does_not_ring() {

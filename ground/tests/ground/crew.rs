@@ -1,5 +1,6 @@
 //! The crew: operators in the log, two screens that command at once, and a countdown without a commanding screen.
 
+use ground::key::Key;
 use ground::model::Settings;
 use ground::model::command::CommandKind;
 use ground::model::seat::Seat;
@@ -125,6 +126,35 @@ fn a_countdown_without_a_commanding_screen_is_held() {
     rig.run(5.0);
     assert_eq!(holds(&mut rig), 0);
     assert!(rig.events().contains("the hold is no longer sent: the countdown has ended"));
+}
+
+/// At T-2 s nothing holds any more, and the station does not claim to.
+#[test]
+fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
+    let mut rig = counting();
+    assert!(rig.screen(80, 24).contains("; hold until T-2"), "{}", rig.screen(80, 24));
+    rig.countdown_ms = 1_900;
+    rig.msg(Msg::Crew(Vec::new()));
+    rig.run(5.0);
+    assert_eq!(holds(&mut rig), 0);
+    let said = "no commanding screen for 2 s in the countdown: TOO LATE for a hold, only an abort ends it";
+    assert_eq!(rig.events().matches(said).count(), 1, "{}", rig.events());
+    // A hold that was being sent ends there, too.
+    let mut rig = counting();
+    rig.countdown_ms = 2_500;
+    rig.msg(Msg::Crew(Vec::new()));
+    rig.run(3.0);
+    assert!(holds(&mut rig) > 5);
+    rig.countdown_ms = 2_000;
+    rig.run(2.0);
+    assert_eq!(holds(&mut rig), 0);
+    assert!(rig.events().contains("TOO LATE for a hold"), "{}", rig.events());
+    // Somebody at a screen is told what still works.
+    rig.msg(Msg::Crew(vec![anna()]));
+    rig.keys(&[Key::Char('H'), Key::Enter]);
+    assert_eq!(holds(&mut rig), 0);
+    assert!(rig.events().contains("too late for a hold: Ctrl-X, then Enter, aborts"));
+    assert!(rig.screen(80, 24).contains("; TOO LATE to hold"), "{}", rig.screen(80, 24));
 }
 
 #[test]

@@ -215,6 +215,7 @@ impl Rig {
             abort_impact_m_s: 0,
             hold: self.hold,
             latch: self.latch,
+            last_hold_ms: 2_000,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
             ..TD_FLIGHT_STATUS_DATA::default()
         };
