@@ -11,7 +11,9 @@ use std::time::Duration;
 
 use e2e::{ABORT, ARM, Bound, Program, Running, START, Signal, Terminal, keygen, program, vehicle};
 use protocol::command::CommandRequest;
-use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavType, TIMESYNC_DATA};
+use protocol::dialect::{
+    HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavType, TIMESYNC_DATA,
+};
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
 
@@ -100,7 +102,7 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
     screen.type_until(b"0AARM\r", "cannot arm: TWO VEHICLES under id 1");
     screen.type_bytes(b"\x18\r");
     screen.wait_for("ABORT goes to every vehicle that is heard under id 1");
-    screen.wait_for("ABORT LATCHED");
+    screen.wait_for("observed yes");
     for mut vehicle in vehicles {
         vehicle.wait_for_line("ABORT");
         vehicle.signal(Signal::SIGTERM);
@@ -121,6 +123,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
             custom_mode: 1,
             mavtype: MavType::MAV_TYPE_ROCKET,
             autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            base_mode: MavModeFlag::empty(),
             mavlink_version: 3,
             ..HEARTBEAT_DATA::default()
         },
@@ -149,6 +152,7 @@ fn a_copter_is_not_armed_and_an_abort_of_it_asks_first() {
             custom_mode: 1,
             mavtype: MavType::MAV_TYPE_QUADROTOR,
             autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base_mode: MavModeFlag::empty(),
             mavlink_version: 3,
             ..HEARTBEAT_DATA::default()
         },

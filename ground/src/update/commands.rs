@@ -207,6 +207,10 @@ fn stop_if_latched(model: &mut Model, now: Duration) {
 }
 
 fn stop_aborting(model: &mut Model, now: Duration) {
+    // Of two vehicles under one id nobody knows which one has answered.
+    if model.vehicle.beside(now).is_some() {
+        return;
+    }
     if let Some(ticket) = model.commands.of(CommandKind::Abort).map(|track| track.ticket) {
         model.commands.sender.withdraw_one(ticket, now);
     }

@@ -77,6 +77,11 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
     let sent = rig.take_commands();
     assert!(!sent.iter().any(moves), "{sent:?}");
     assert!(sent.iter().any(is_abort));
+    // One has answered and shows the latch: the other one may not have heard it.
+    rig.answer(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 0);
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    beside(&mut rig, 9, 5);
+    assert!(rig.take_commands().iter().filter(|sent| is_abort(sent)).count() > 20);
     assert!(rig.events().contains("cannot arm: TWO VEHICLES under id 1: switch one off"), "{}", rig.events());
     assert!(rig.events().contains("the ABORT goes to every vehicle that is heard under id 1"));
 }

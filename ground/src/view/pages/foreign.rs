@@ -4,11 +4,20 @@ use std::time::Duration;
 
 use ratatui::text::{Line, Span};
 
+use crate::model::Model;
 use crate::model::foreign::Foreign;
+use crate::view::event_list;
 use crate::view::number::age_mark;
 use crate::view::theme::{TextRole, Theme};
 
-pub fn lines(foreign: &Foreign, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+/// The telemetry, and below it the newest events: why something was refused is one of them.
+pub fn lines(
+    model: &Model,
+    foreign: &Foreign,
+    theme: Theme,
+    now: Duration,
+    (columns, rows): (usize, usize),
+) -> Vec<Line<'static>> {
     let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
     let mut lines = vec![
         Line::styled(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), theme.style(TextRole::Alarm)),
@@ -24,5 +33,7 @@ pub fn lines(foreign: &Foreign, theme: Theme, now: Duration) -> Vec<Line<'static
             Span::styled(format!("{mark}{}", text.value), theme.style(role)),
         ])
     }));
+    let room = rows.saturating_sub(lines.len());
+    lines.extend(event_list::events(model, theme, columns, room));
     lines
 }

@@ -54,7 +54,7 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
         Page::Pad => match model.vehicle.as_foreign() {
-            Some(vehicle) => foreign::lines(vehicle, theme, now),
+            Some(vehicle) => foreign::lines(model, vehicle, theme, now, (columns, rows)),
             None => pad::lines(model, theme, now),
         },
         Page::Ascent => ascent::lines(model, theme, now),
