@@ -15,16 +15,17 @@ pub enum Resend {
     Never,
     /// Sent this many further times.
     Times(u8),
-    /// Sent until it is withdrawn, whatever the answer is: twenty times in the first second, then five times a
-    /// second. For aborting: if half of the frames are lost, all twenty are lost once in a million times.
+    /// Sent until it is withdrawn, whatever the answer is: twenty times a second until it is accepted, then five times a
+    /// second. For aborting: if half of the frames are lost, all twenty of a second are lost once in a million times, and
+    /// after an outage one of them arrives within 50 ms.
     UntilWithdrawn,
 }
 
-/// An abort is sent often for this time.
-const BURST_DURATION: Duration = Duration::from_secs(1);
-/// Interval between the abort's first sendings.
-const BURST_INTERVAL: Duration = Duration::from_millis(50);
-/// Interval between the abort's later sendings.
+/// Interval between the sendings of an abort that is not accepted yet.
+const URGENT_INTERVAL: Duration = Duration::from_millis(50);
+/// After a silence this long an outage may be over when something is heard.
+const SILENCE: Duration = Duration::from_millis(100);
+/// Interval between the sendings of an accepted abort.
 const STEADY_INTERVAL: Duration = Duration::from_millis(200);
 
 /// What happened to a command. Acknowledged is not observed: only the vehicle's state shows that a command was done.
@@ -80,8 +81,8 @@ struct Pending {
     message: COMMAND_LONG_DATA,
     resend: Resend,
     attempts: u32,
-    submitted_at: Duration,
     due_at: Duration,
+    sent_at: Duration,
     in_progress: bool,
     /// The last answer to a command that is sent until it is withdrawn.
     answered: Option<u8>,
@@ -91,14 +92,16 @@ impl Pending {
     /// Returns when it is due again after it was sent now.
     fn due_after(&self, now: Duration) -> Duration {
         match self.resend {
-            Resend::UntilWithdrawn if now < self.submitted_at + BURST_DURATION => {
-                // Counted from the time at which it was due, so that a poll that comes late now and then does not
-                // lower the rate.
-                (self.due_at + BURST_INTERVAL).max(now + BURST_INTERVAL / 2)
-            }
-            Resend::UntilWithdrawn => now + STEADY_INTERVAL,
+            Resend::UntilWithdrawn if self.is_accepted() => now + STEADY_INTERVAL,
+            // Counted from the time at which it was due, so that a poll that comes late now and then does not lower the
+            // rate.
+            Resend::UntilWithdrawn => (self.due_at + URGENT_INTERVAL).max(now + URGENT_INTERVAL / 2),
             Resend::Never | Resend::Times(_) => now + ANSWER_TIMEOUT,
         }
+    }
+
+    fn is_accepted(&self) -> bool {
+        self.answered == Some(MavResult::MAV_RESULT_ACCEPTED as u8)
     }
 
     /// Returns the answer that may still come when this command is no longer waited for. Only for a command that is
@@ -125,6 +128,7 @@ pub struct CommandSender {
     late: Vec<Late>,
     events: Vec<CommandEvent>,
     submitted: u64,
+    heard_at: Option<Duration>,
 }
 
 impl CommandSender {
@@ -162,8 +166,8 @@ impl CommandSender {
             message,
             resend,
             attempts: 0,
-            submitted_at: now,
             due_at: now,
+            sent_at: now,
             in_progress: false,
             answered: None,
         });
@@ -173,6 +177,21 @@ impl CommandSender {
     /// Stops sending this command.
     pub fn withdraw_one(&mut self, ticket: Ticket, now: Duration) {
         self.withdraw(now, |pending| pending.ticket == ticket);
+    }
+
+    /// Notes that something was heard from the target. After a silence an abort that is not accepted yet is due at once: an
+    /// outage may be over, and the next one may begin soon. Returns whether something is due.
+    pub fn on_heard(&mut self, now: Duration) -> bool {
+        let heard_at = self.heard_at.replace(now);
+        if heard_at.is_none_or(|at| now.saturating_sub(at) >= SILENCE) {
+            for pending in &mut self.pending {
+                let urgent = pending.resend == Resend::UntilWithdrawn && !pending.is_accepted();
+                if urgent && pending.attempts > 0 {
+                    pending.due_at = pending.due_at.min(now.max(pending.sent_at + URGENT_INTERVAL / 2));
+                }
+            }
+        }
+        self.due_at().is_some_and(|at| at <= now)
     }
 
     /// Returns when [`CommandSender::poll`] has something to do next; `None` while no command is pending.
@@ -213,7 +232,7 @@ impl CommandSender {
             }
             pending.message.confirmation = u8::try_from(pending.attempts).unwrap_or(u8::MAX);
             pending.attempts += 1;
-            pending.due_at = pending.due_after(now);
+            (pending.due_at, pending.sent_at) = (pending.due_after(now), now);
             events.push(CommandEvent::Sent { command, attempt: pending.attempts });
             messages.push(MavMessage::COMMAND_LONG(pending.message.clone()));
             false
@@ -337,11 +356,81 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_is_sent_twenty_times_in_its_first_second_and_then_five_times_a_second() {
+    fn an_abort_is_sent_twenty_times_a_second_until_it_is_accepted_and_then_five_times() {
+        let within = |sent: &[u64], from, to| sent.iter().filter(|at| (from..to).contains(*at)).count();
         let (sent, events) = aborts_ms(&[], u64::MAX);
-        let within = |from, to| sent.iter().filter(|at| (from..to).contains(*at)).count();
-        assert_eq!((within(0, 1_000), within(1_000, 2_000), within(2_000, 3_000)), (20, 5, 5), "{sent:?}");
+        let a_second = |from| within(&sent, from, from + 1_000);
+        assert_eq!((a_second(0), a_second(1_000), a_second(2_000)), (20, 20, 20), "{sent:?}");
         assert!(events.is_empty());
+        let (sent, _) = aborts_ms(
+            &[(990, MavResult::MAV_RESULT_TEMPORARILY_REJECTED), (1_990, MavResult::MAV_RESULT_ACCEPTED)],
+            u64::MAX,
+        );
+        let a_second = |from| within(&sent, from, from + 1_000);
+        assert_eq!((a_second(0), a_second(1_000)), (20, 20), "refused for now is not accepted: {sent:?}");
+        assert!(a_second(2_000) <= 6, "{sent:?}");
+    }
+
+    #[test]
+    fn what_is_heard_after_a_silence_lets_an_abort_leave_at_once() {
+        let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+        let mut sender = CommandSender::new();
+        sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
+        let mut sent = Vec::new();
+        // The vehicle is heard every 10 ms, except between 500 and 1,230 ms.
+        for now in (0..2_000).step_by(10) {
+            let heard = !(500..1_230).contains(&now);
+            if now % 50 == 0 || (heard && sender.on_heard(ms(now))) {
+                sent.extend(sender.poll(ms(now)).iter().map(|_| now));
+            }
+        }
+        assert!(sent.contains(&1_230), "{sent:?}");
+        assert!(sent.windows(2).all(|pair| pair[1] - pair[0] >= 25), "{sent:?}");
+        assert!(
+            sent.len() <= 42,
+            "what is heard all the time does not make it more frequent: {}",
+            sent.len()
+        );
+    }
+
+    /// Dead air in bursts, both ways, for 30 % of the time.
+    #[test]
+    fn an_abort_arrives_within_a_moment_of_the_end_of_every_outage() {
+        let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+        let mut seed = 7_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let mut latest = 0;
+        for _ in 0..2_000 {
+            // Alternating spans, ms: dead 0.1 to 3 s, alive 7/3 of that on average; it begins somewhere in a dead one.
+            let mut spans = vec![(false, 1 + (3_000.0 * random()) as u64)];
+            for _ in 0..6 {
+                spans.push((true, 60 + (7_000.0 * random()) as u64));
+                spans.push((false, 100 + (2_900.0 * random()) as u64));
+            }
+            let ended_at = spans[0].1;
+            let alive = |now: u64| {
+                let mut at = 0;
+                spans.iter().find_map(|(alive, length)| {
+                    at += length;
+                    (now < at).then_some(*alive)
+                })
+            };
+            let mut sender = CommandSender::new();
+            sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
+            let arrived = (0..10_000).find(|now| {
+                let up = alive(*now) == Some(true);
+                // The vehicle is heard thirty times a second, and the station looks when it hears it or something is due.
+                let due = sender.due_at().is_some_and(|at| at <= ms(*now));
+                (due || (up && now % 33 == 0 && sender.on_heard(ms(*now))))
+                    && !sender.poll(ms(*now)).is_empty()
+                    && up
+            });
+            latest = latest.max(arrived.expect("it arrives") - ended_at);
+        }
+        assert!(latest <= 50, "{latest} ms after the end of an outage");
     }
 
     #[test]
@@ -349,7 +438,7 @@ mod tests {
         let accepted = MavResult::MAV_RESULT_ACCEPTED;
         let (sent, events) =
             aborts_ms(&[(100, accepted), (150, accepted), (160, MavResult::MAV_RESULT_FAILED)], 500);
-        assert_eq!(sent.len(), 10, "{sent:?}");
+        assert_eq!(sent, [0, 50, 100, 150, 350], "less often once it is accepted");
         let command = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16;
         assert_eq!(events, [CommandEvent::Answered { command, result: 0 }]);
     }
