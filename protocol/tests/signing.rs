@@ -1,10 +1,12 @@
 //! Signatures compared with another implementation's, and attempts to forge them.
 
+use std::time::Duration;
+
 use proptest::prelude::*;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA};
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::signing::{Key, Memory, MemoryError, Rejection, Signing, stamp_of};
+use protocol::signing::{Anchor, Key, Lockouts, Memory, MemoryError, Rejection, Signing, stamp_of};
 
 const NOW: u64 = 37_000_000_000_000;
 const SECOND: u64 = 100_000;
@@ -152,6 +154,67 @@ fn a_timestamp_far_ahead_is_refused_if_our_own_clock_is_known_to_be_set() {
     assert_eq!(vehicle.check(&side(7).sign(&beat(), 1, NOW), NOW), Ok(()));
 }
 
+/// The clock of the vehicle's computer is set three days forward while it runs, and back again. The vehicle asks it once.
+#[test]
+fn the_stamps_of_a_run_follow_no_clock_that_is_set_while_it_runs() {
+    // 2026-11-23.
+    let day = Duration::from_secs(1_795_392_000);
+    let shown = |second: u64| {
+        let step = if (100..200).contains(&second) { 3 * 86_400 } else { 0 };
+        day + Duration::from_secs(second + step)
+    };
+    let (mut vehicle, mut following, mut station) = (side(7), side(7), side(7));
+    let anchor = Anchor::at(shown(0));
+    let mut refused = 0;
+    for second in 0..400 {
+        let true_stamp = stamp_of(day + Duration::from_secs(second));
+        let stamp = anchor.stamp(Duration::from_secs(second));
+        assert_eq!(stamp, true_stamp);
+        station.check(&vehicle.sign(&beat(), 0, stamp), true_stamp).unwrap();
+        let followed = following.sign(&beat(), 1, stamp_of(shown(second)));
+        refused += u32::from(station.check(&followed, true_stamp) == Err(Rejection::TooNew));
+    }
+    assert_eq!(refused, 300, "a vehicle that follows its clock stays locked out when it is right again");
+}
+
+#[test]
+fn a_vehicle_that_is_locked_out_by_its_stamps_is_named_with_what_to_do() {
+    const DAY: u64 = 24 * 3600 * SECOND;
+    let (mut vehicle, mut station, mut lockouts) = (side(7), side(7), Lockouts::default());
+    let mut hear = |vehicle: &mut Signing, station: &mut Signing, now_ms: u64, clock: u64| {
+        let clock = clock + now_ms * SECOND / 1_000;
+        let frame = vehicle.sign(&beat(), 0, clock);
+        let here = NOW + now_ms * SECOND / 1_000;
+        match station.check(&frame, here) {
+            Ok(()) => {
+                lockouts.accepted(&frame);
+                None
+            }
+            Err(why) => lockouts.refused(&frame, why, Duration::from_millis(now_ms), here),
+        }
+    };
+    let ahead = NOW + 3 * DAY;
+    let said: Vec<(u64, String)> = (0..600)
+        .filter_map(|tenth| hear(&mut vehicle, &mut station, 100 * tenth, ahead).map(|words| (tenth, words)))
+        .collect();
+    assert_eq!(said.iter().map(|(tenth, _)| *tenth).collect::<Vec<_>>(), [20, 320], "not with every frame");
+    let words = &said[0].1;
+    for part in ["LOCKED OUT", "255/190", "3.0 days ahead", "KEY.vehicle.stamps"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    // Its clock is right now and its stamps are removed.
+    let mut again = side(7);
+    assert_eq!(hear(&mut again, &mut station, 61_000, NOW), None);
+    assert_eq!(hear(&mut vehicle, &mut station, 61_100, ahead), None, "it was heard just now");
+    // Whoever has no key is not told of, and strange stamps among true frames are no lock-out.
+    let mut stranger = side(8);
+    for tenth in 700..800 {
+        assert_eq!(hear(&mut stranger, &mut station, 100 * tenth, NOW), None);
+        hear(&mut again, &mut station, 100 * tenth, NOW);
+        assert_eq!(hear(&mut vehicle, &mut station, 100 * tenth + 50, ahead), None);
+    }
+}
+
 #[test]
 fn a_board_without_a_set_clock_adopts_the_first_timestamp_not_older_than_its_stored_ones() {
     let mut ground = side(7);
@@ -191,7 +254,6 @@ fn keys_are_64_hexadecimal_digits_and_never_printed() {
 
 #[test]
 fn val_mavlink_guide_timestamps_count_10_us_since_2015() {
-    use std::time::Duration;
     // There are 45 years from 1970, eleven of them leap years.
     let epoch = Duration::from_hours(24 * (45 * 365 + 11));
     assert_eq!(stamp_of(epoch), 0);

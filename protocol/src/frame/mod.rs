@@ -80,6 +80,12 @@ impl Frame {
         self.is_signed().then(|| &self.bytes[self.bytes.len() - SIGNATURE_LEN..])
     }
 
+    /// Returns the timestamp of its signature; `None` if the frame is unsigned.
+    pub(crate) fn stamp(&self) -> Option<u64> {
+        let stamp = &self.signature()?[1..7];
+        Some(stamp.iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte)))
+    }
+
     /// Returns the number of the key that its signature names; 0 for the shared key, and without a signature. It says
     /// nothing until [`crate::signing::Signing`] has checked the frame against that key.
     pub fn key_number(&self) -> u8 {

@@ -6,6 +6,7 @@
 //!
 //! Keys are copied as files, never sent by radio: SETUP_SIGNING is ignored.
 
+mod lockout;
 mod memory;
 mod timestamp;
 
@@ -20,8 +21,9 @@ use crate::frame::{Frame, SIGNATURE_LEN};
 use memory::{LEAD, MAX_STREAMS};
 use timestamp::{MAX_STAMP, STAMPS_PER_S};
 
+pub use lockout::Lockouts;
 pub use memory::{Memory, MemoryError};
-pub use timestamp::stamp_of;
+pub use timestamp::{Anchor, stamp_of};
 
 /// A new stream may begin at most this far behind our own time: one minute.
 const NEW_STREAM_LAG: u64 = 60 * STAMPS_PER_S;
@@ -260,7 +262,7 @@ impl Signing {
         if !self.key_of(operator).is_some_and(right) {
             return Err(Rejection::Wrong);
         }
-        let stamp = signature[1..7].iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte));
+        let stamp = frame.stamp().ok_or(Rejection::Unsigned)?;
         let stream = (frame.source(), signature[0]);
         self.memory.clock = self.memory.clock.max(clock);
         // A clock that is known to be set shows the right time. Otherwise the latest timestamp that was heard is
