@@ -4,7 +4,7 @@
 use std::net::SocketAddr;
 
 use e2e::{
-    BareGround, Bound, Program, Running, SerialLine, Signal, auto_ground, expect_landing, program,
+    BareGround, Bound, Program, Running, SerialLine, Signal, auto_ground, expect_landing, keygen, program,
     unshared_address, vehicle,
 };
 use protocol::dialect::TdPhase;
@@ -36,6 +36,22 @@ fn at_115200_baud_they_land() {
     let folder = tempfile::tempdir().unwrap();
     let vehicle = Running::start(&mut vehicle(folder.path(), &[&line.near_link()]));
     expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&line.far_link()])));
+}
+
+/// Ten times slower than what telemetry takes over a radio. Nothing piles up, so the commands are answered and observed.
+#[test]
+fn at_4800_baud_they_land_signed() {
+    let line = SerialLine::new(4_800);
+    let folder = tempfile::tempdir().unwrap();
+    keygen(folder.path(), "flight.key");
+    let mut vehicle = vehicle(folder.path(), &[&line.near_link()]);
+    let vehicle = Running::start(vehicle.args(["--key", "flight.key"]));
+    let mut ground = auto_ground(folder.path(), &[&line.far_link()]);
+    let (_, ground) = expect_landing(vehicle, Running::start(ground.args(["--key", "flight.key"])));
+    for seen in ["ARM observed", "START observed"] {
+        assert!(ground.output.contains(seen), "{seen} in:\n{}", ground.output);
+    }
+    assert!(!ground.output.contains("LINK LOST"), "{}", ground.output);
 }
 
 #[test]

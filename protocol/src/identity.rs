@@ -21,6 +21,10 @@ pub const GROUND: Address = Address { system_id: 255, component_id: 190 };
 /// without error correction.
 pub const RADIO_BUDGET_BYTES_S: u32 = 2_000;
 
+/// Bytes per second that telemetry may use over UDP and TCP: ten radios, and 1.5 % of the slowest Wi-Fi (802.11b,
+/// 11 Mbit/s). The default rates use an eighth of it; the rest is for what clients ask for.
+pub const NETWORK_BUDGET_BYTES_S: u32 = 20_000;
+
 /// Boot numbers are 1 to here: a command names the boot that it is meant for in a parameter, and a float holds every whole
 /// number up to 2^24 exactly.
 pub const LARGEST_BOOT_NUMBER: u32 = 0x00FF_FFFF;

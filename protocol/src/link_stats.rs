@@ -220,8 +220,163 @@ impl LinkStats {
     }
 }
 
+/// How old the newest content of a vehicle is, whatever time it has spent in queues.
+///
+/// The vehicle's messages carry its own clock. When one arrives, the clocks differ by at most `arrival - clock`, because
+/// nothing arrives before it was sent. The answer to a TIMESYNC was given after the question left, so they differ by at
+/// least `question - clock`. The latter decides, if there is one: then the age is rather told too great, by the time that the
+/// question took.
+#[derive(Debug, Clone, Default)]
+pub struct ContentAge {
+    /// The newest time on the vehicle's clock, us, and the first one that was heard.
+    newest_us: Option<(i64, i64)>,
+    /// The least upper bound of each of the last minutes, us, with the minute.
+    at_most_us: VecDeque<(u64, i64)>,
+    /// The greatest lower bound of each of the last minutes.
+    at_least_us: VecDeque<(u64, i64)>,
+}
+
+/// So many minutes are remembered. In ten minutes two quartz clocks drift apart by some 60 ms.
+const CLOCK_MINUTES: usize = 10;
+/// A vehicle's clock that goes back by more than this has begun anew, us. Messages may overtake each other.
+const ANEW_US: i64 = 1_000_000;
+
+fn us(time: Duration) -> i64 {
+    i64::try_from(time.as_micros()).unwrap_or(i64::MAX)
+}
+
+fn keep(bounds: &mut VecDeque<(u64, i64)>, bound_us: i64, better: fn(i64, i64) -> i64, now: Duration) {
+    let minute = now.as_secs() / 60;
+    match bounds.back_mut() {
+        Some((of, known)) if *of == minute => *known = better(*known, bound_us),
+        _ => bounds.push_back((minute, bound_us)),
+    }
+    while bounds.len() > CLOCK_MINUTES {
+        bounds.pop_front();
+    }
+}
+
+impl ContentAge {
+    /// Takes the time on the vehicle's clock that a message carries.
+    pub fn hear(&mut self, clock: Duration, now: Duration) {
+        let (clock_us, offset_us) = (us(clock), us(now) - us(clock));
+        if self.newest_us.is_some_and(|(newest_us, _)| clock_us + ANEW_US < newest_us) {
+            *self = Self::default();
+        }
+        let (newest_us, first_us) = self.newest_us.unwrap_or((clock_us, clock_us));
+        self.newest_us = Some((newest_us.max(clock_us), first_us));
+        // It arrived before it could have been sent: the vehicle's clock runs faster than was thought.
+        if self.at_least_us().is_some_and(|least_us| offset_us < least_us) {
+            self.at_least_us.clear();
+        }
+        keep(&mut self.at_most_us, offset_us, i64::min, now);
+    }
+
+    /// Takes the answer to a TIMESYNC: the time on the vehicle's clock, and when the question left.
+    pub fn answered(&mut self, clock: Duration, asked_at: Duration, now: Duration) {
+        let least_us = us(asked_at) - us(clock);
+        // The vehicle's clock has lost time.
+        if self.at_most_us().is_some_and(|most_us| most_us < least_us) {
+            self.at_most_us.clear();
+        }
+        keep(&mut self.at_least_us, least_us, i64::max, now);
+    }
+
+    fn at_most_us(&self) -> Option<i64> {
+        self.at_most_us.iter().map(|(_, bound_us)| *bound_us).min()
+    }
+
+    fn at_least_us(&self) -> Option<i64> {
+        self.at_least_us.iter().map(|(_, bound_us)| *bound_us).max()
+    }
+
+    /// Returns the age of the newest content; `None` while no clock of the vehicle is seen to run.
+    pub fn age(&self, now: Duration) -> Option<Duration> {
+        let (newest_us, _) = self.newest_us.filter(|(newest_us, first_us)| newest_us > first_us)?;
+        let offset_us = self.at_least_us().or(self.at_most_us())?;
+        Some(Duration::from_micros(u64::try_from(us(now) - newest_us - offset_us).unwrap_or(0)))
+    }
+}
+
 /// The part of the window in which the link could carry something, s.
 fn span_s(since: Duration, now: Duration) -> f64 {
     let window_start = Duration::from_secs(oldest_second(now)).max(since);
     now.saturating_sub(window_start).as_secs_f64().max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(milliseconds: u64) -> Duration {
+        Duration::from_millis(milliseconds)
+    }
+
+    /// Messages every 100 ms that take `delay` of their time of sending to arrive; a question every 5 s, which takes 30 ms,
+    /// and its answer as long as everything else. Returns the worst error of the age, ms, from a time on.
+    fn worst_error_ms(delay: impl Fn(u64) -> u64, asks: bool, from_ms: u64) -> i64 {
+        // The vehicle has run for 1,000 s when the station starts.
+        let clock = |now: u64| ms(1_000_000 + now);
+        let mut content = ContentAge::default();
+        let mut arrivals: Vec<(u64, u64, Option<u64>)> = Vec::new();
+        for sent in (0..60_000).step_by(100) {
+            arrivals.push((sent + delay(sent), sent, None));
+            if asks && sent % 5_000 == 0 {
+                arrivals.push((sent + 30 + delay(sent + 30), sent + 30, Some(sent)));
+            }
+        }
+        arrivals.sort_unstable();
+        let (mut worst, mut newest) = (0, 0);
+        for (at, sent, asked) in arrivals.into_iter().filter(|(at, ..)| *at < 60_000) {
+            match asked {
+                Some(asked) => content.answered(clock(sent), ms(asked), ms(at)),
+                None => {
+                    newest = sent;
+                    content.hear(clock(sent), ms(at));
+                }
+            }
+            if at >= from_ms {
+                let told = content.age(ms(at)).unwrap().as_millis() as i64;
+                worst = worst.max((told - (at - newest) as i64).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn the_age_is_that_of_the_content_also_when_a_queue_grows() {
+        // 1,191 bytes a second into a line of 960.
+        let grows = |sent: u64| 40 + sent * 231 / 960;
+        assert!(worst_error_ms(grows, false, 1_000) <= 50);
+        assert!(worst_error_ms(grows, true, 1_000) <= 50);
+        assert!(worst_error_ms(|_| 40, true, 1_000) <= 50);
+    }
+
+    #[test]
+    fn a_station_that_joins_an_overloaded_line_learns_the_age_from_the_first_answer() {
+        let stands = |_| 7_000;
+        assert!(worst_error_ms(stands, true, 8_000) <= 50);
+        assert!(worst_error_ms(stands, false, 8_000) >= 6_000, "without an answer nothing tells");
+    }
+
+    #[test]
+    fn a_clock_that_begins_anew_stands_still_or_loses_time_is_not_old_for_long() {
+        let mut content = ContentAge::default();
+        content.hear(ms(0), ms(5_000));
+        content.hear(ms(0), ms(9_000));
+        assert_eq!(content.age(ms(9_000)), None, "it does not run");
+        content.hear(ms(50_000), ms(10_000));
+        content.hear(ms(50_100), ms(10_100));
+        assert_eq!(content.age(ms(10_350)), Some(ms(250)));
+        // A reboot.
+        content.hear(ms(10), ms(20_000));
+        content.hear(ms(110), ms(20_100));
+        assert_eq!(content.age(ms(20_100)), Some(ms(0)));
+        // A simulation that stood still for 4 s.
+        content.hear(ms(210), ms(24_200));
+        assert_eq!(content.age(ms(24_200)), Some(ms(4_000)));
+        content.answered(ms(300), ms(24_290), ms(24_300));
+        content.hear(ms(310), ms(24_310));
+        assert_eq!(content.age(ms(24_310)), Some(ms(10)));
+    }
 }

@@ -10,7 +10,7 @@ use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::signing::{Signing, stamp_of};
+use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::clock::{Clock, LogTime};
@@ -31,6 +31,7 @@ pub struct Wire {
     open: Vec<OpenLink>,
     vehicle: Address,
     hub: Hub,
+    lockouts: Lockouts,
     key_file: Option<KeyFile>,
     saved_at: u64,
     /// Whether a failure to save timestamps was reported.
@@ -39,6 +40,8 @@ pub struct Wire {
     clock: Clock,
     recorder: Option<Recorder>,
     log_time: LogTime,
+    /// Bytes that left and are not reported yet.
+    sent_bytes: usize,
 }
 
 struct OpenLink {
@@ -108,9 +111,11 @@ impl Wire {
             });
         }
         let (key_file, signing) = key.unzip();
+        let carried: Vec<_> = open.iter().map(|link| link.transport.address().capacity_bytes_s()).collect();
         Ok(Self {
             vehicle,
-            hub: Hub::new(open.len(), signing),
+            hub: Hub::new(open.len(), signing).over(&carried),
+            lockouts: Lockouts::default(),
             open,
             key_file,
             saved_at: 0,
@@ -119,6 +124,7 @@ impl Wire {
             clock,
             recorder,
             log_time,
+            sent_bytes: 0,
         })
     }
 
@@ -127,8 +133,18 @@ impl Wire {
         self.open.iter().map(|link| link.transport.address())
     }
 
-    /// The next data of any link, with the number of the link.
+    /// The next data of any link, with the number of the link. What waits for a slow line is sent meanwhile.
     pub async fn receive(&mut self) -> (usize, Received) {
+        loop {
+            let (clock, due_at) = (self.clock, self.hub.due_at());
+            tokio::select! {
+                received = self.next() => return received,
+                () = clock.sleep_until(due_at) => self.send_what_waits(),
+            }
+        }
+    }
+
+    async fn next(&mut self) -> (usize, Received) {
         std::future::poll_fn(|context| {
             for (number, link) in self.open.iter_mut().enumerate().filter(|(_, link)| !link.ended) {
                 match link.transport.poll_receive(context) {
@@ -178,9 +194,11 @@ impl Wire {
         };
         let msgs = &mut taken.msgs;
         let name = self.open[number].name.clone();
-        for news in self.hub.take(number, received, self.clock.now(), self.unix_stamp()) {
+        let (now, stamp) = (self.clock.now(), self.unix_stamp());
+        for news in self.hub.take(number, received, now, stamp) {
             match news {
                 News::Frame(frame) => {
+                    self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
                     if self.open.len() > 1 {
@@ -197,8 +215,10 @@ impl Wire {
                     self.open[number].sender.believe(origin);
                 }
                 News::Strangers(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
-                // Counted and shown in the report of the link.
-                News::Rejected(..) => {}
+                // Counted and shown in the report of the link; a sender that is locked out is told of.
+                News::Rejected(frame, why) => {
+                    msgs.extend(self.lockouts.refused(&frame, why, now, stamp).map(Msg::LinkSays));
+                }
                 News::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
                 News::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
@@ -231,26 +251,43 @@ impl Wire {
         }
     }
 
-    /// Sends a message over every link and returns the message that counts the bytes. On a link that listens, what is meant
-    /// for the vehicle goes only to where its shown `boot` was heard; a heartbeat, an abort, a hold and a disarm go to
-    /// everybody there. 0: the vehicle has told no boot.
+    /// Sends a message over every link and returns the message that counts the bytes. For a slow line it may wait. On a link
+    /// that listens, what is meant for the vehicle goes only to where its shown `boot` was heard; a heartbeat, an abort, a
+    /// hold and a disarm go to everybody there. 0: the vehicle has told no boot.
     pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
         let (now, stamp) = (self.clock.now(), self.unix_stamp());
-        let mut sent = 0;
         for number in 0..self.open.len() {
             let to = if concerns_all(message) { Ok(None) } else { self.open[number].place_of(boot, now) };
             // Only other vehicles are heard over this link.
             let Ok(to) = to else { continue };
-            let bytes = self.hub.bytes_for(number, &frame, stamp);
-            let count = bytes.len();
-            self.record(Direction::Tx, &self.open[number].name, &frame);
-            if self.open[number].sender.send_to(bytes, to) {
-                self.hub.on_sent(number, count, now);
+            if let Some(bytes) = self.hub.send(number, &frame, stamp) {
+                self.hand_over(number, &frame, bytes, to);
             }
-            sent += count;
         }
-        Msg::Sent { bytes: sent, drops: self.open.iter().map(|link| link.sender.dropped()).sum() }
+        self.send_what_waits();
+        let dropped = self.hub.links().iter().zip(&self.open);
+        let drops = dropped.map(|(link, open)| link.dropped() + open.sender.dropped()).sum();
+        Msg::Sent { bytes: std::mem::take(&mut self.sent_bytes), drops }
+    }
+
+    /// Gives each slow line what it can carry by now.
+    fn send_what_waits(&mut self) {
+        let (now, stamp) = (self.clock.now(), self.unix_stamp());
+        for number in 0..self.open.len() {
+            while let Some((frame, bytes)) = self.hub.leaving(number, now, stamp) {
+                self.hand_over(number, &frame, bytes, None);
+            }
+        }
+    }
+
+    fn hand_over(&mut self, number: usize, frame: &Frame, bytes: Vec<u8>, to: Option<Origin>) {
+        let count = bytes.len();
+        self.record(Direction::Tx, &self.open[number].name, frame);
+        if self.open[number].sender.send_to(bytes, to) {
+            self.hub.on_sent(number, count, self.clock.now());
+        }
+        self.sent_bytes += count;
     }
 
     /// Reports the state of each link. Also saves signing timestamps now and then.
@@ -283,7 +320,7 @@ impl Wire {
     }
 
     fn unix_stamp(&self) -> u64 {
-        stamp_of(Duration::from_nanos(self.clock.start_unix_ns()) + self.clock.now())
+        Anchor::at(Duration::from_nanos(self.clock.start_unix_ns())).stamp(self.clock.now())
     }
 
     fn record(&self, direction: Direction, link: &str, frame: &Frame) {

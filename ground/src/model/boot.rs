@@ -194,7 +194,7 @@ impl Boot {
     }
 }
 
-fn time_boot_ms(message: &MavMessage) -> Option<u32> {
+pub(crate) fn time_boot_ms(message: &MavMessage) -> Option<u32> {
     match message {
         MavMessage::ATTITUDE_QUATERNION(data) => Some(data.time_boot_ms),
         MavMessage::LOCAL_POSITION_NED(data) => Some(data.time_boot_ms),

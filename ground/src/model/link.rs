@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use protocol::dialect::RADIO_STATUS_DATA;
+use protocol::dialect::{MavMessage, RADIO_STATUS_DATA};
 use protocol::frame::FramerCounters;
 use protocol::identity::Address;
-use protocol::link_stats::{LinkFigures, LinkStats, SourceFigures};
+use protocol::link_stats::{ContentAge, LinkFigures, LinkStats, SourceFigures};
 use protocol::signing::SigningCounters;
 
+use super::boot::time_boot_ms;
 use super::link_state::LinkState;
 use super::uplink::Uplink;
 
@@ -75,6 +76,8 @@ pub struct Link {
     pub first_heartbeat_at: Option<Duration>,
     /// The last frame of the vehicle, of any kind.
     pub heard_at: Option<Duration>,
+    /// How old what the vehicle says is when it arrives.
+    pub(crate) content: ContentAge,
     /// Whether the vehicle hears this station.
     pub uplink: Uplink,
     /// The round-trip time, measured with TIMESYNC.
@@ -123,6 +126,27 @@ impl Link {
     /// The state of the downlink: whether the vehicle is heard. It counts as a vehicle from its first heartbeat.
     pub fn state(&self, now: Duration) -> LinkState {
         LinkState::of(self.first_heartbeat_at.and(self.heard_at), now)
+    }
+
+    /// Takes the time on the vehicle's clock that a message carries.
+    pub(crate) fn date(&mut self, message: &MavMessage, now: Duration) {
+        let clock_ms = match message {
+            MavMessage::TD_FLIGHT_STATUS(data) => Some(data.time_boot_ms),
+            MavMessage::TD_UPLINK(data) => Some(data.time_boot_ms),
+            MavMessage::ATTITUDE(data) => Some(data.time_boot_ms),
+            MavMessage::GLOBAL_POSITION_INT(data) => Some(data.time_boot_ms),
+            _ => time_boot_ms(message),
+        };
+        if let Some(clock_ms) = clock_ms {
+            self.content.hear(Duration::from_millis(clock_ms.into()), now);
+        }
+    }
+
+    /// The downlink as the header shows it: by the age of what the vehicle has said last, which may have waited in a queue.
+    pub fn down(&self, now: Duration) -> LinkState {
+        let content = self.content.age(now).map(|age| now.saturating_sub(age));
+        let last = self.first_heartbeat_at.and(self.heard_at);
+        LinkState::of(last.map(|at| content.unwrap_or(at).min(at)), now)
     }
 
     /// The share of recent frames that was lost; `None` while nothing arrives that would show it.

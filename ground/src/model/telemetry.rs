@@ -57,8 +57,9 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
                 vehicle.burn.extend(&motion, now);
             }
         }
-        MavMessage::VFR_HUD(data) => {
-            let motion = Motion::vertical(f64::from(data.alt), f64::from(data.climb));
+        // Not VFR_HUD: its height is above mean sea level.
+        MavMessage::GLOBAL_POSITION_INT(data) => {
+            let motion = Motion::vertical(f64::from(data.relative_alt) / 1e3, -f64::from(data.vz) / 1e2);
             vehicle.hud = Some(Sample::new(motion, now));
         }
         MavMessage::TD_FINS(data) => {

@@ -109,7 +109,7 @@ pub struct Vehicle {
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
-    /// `VFR_HUD`: altitude and climb, for a vehicle that sends no local position.
+    /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
     pub fins: Option<Sample<[Deflection; 4]>>,
     pub gimbal: Option<Sample<Gimbal>>,

@@ -60,6 +60,9 @@ fn note_stranger(model: &mut Model, source: Address, now: Duration) {
 
 fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.heard_at = Some(now);
+    if model.commands.sender.on_heard(now) {
+        commands::poll(model, now);
+    }
     if let Some(answer) = CommandAnswer::from_frame(frame) {
         if model.settings.us.accepts(answer.target) {
             commands::on_answer(model, answer, now);
@@ -70,6 +73,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         model.link.undecodable += 1;
         return;
     };
+    model.link.date(&message, now);
     if let Some(answer) = answer_to_ping(&message, frame.source()) {
         model.outbox.push(Action::send(answer));
         return;
@@ -188,6 +192,10 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
             test.answered(data.ts1);
         }
         if round_trip < Duration::from_secs(10) {
+            if let Ok(clock_ns) = u64::try_from(data.tc1) {
+                let asked_at = now.saturating_sub(round_trip);
+                model.link.content.answered(Duration::from_nanos(clock_ns), asked_at, now);
+            }
             model.link.round_trip = Some(round_trip);
             model.link.uplink.answered(now.saturating_sub(round_trip));
         }

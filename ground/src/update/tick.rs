@@ -22,6 +22,7 @@ const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
 /// For a vehicle whose answers are the only proof that it hears this station.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
+const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
 /// Without a screen: how long the program waits for further messages after a flight.
 const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
@@ -35,7 +36,10 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
     heartbeat(model, now);
     let known = model.link.first_heartbeat_at.is_some();
-    let timesync_every = if model.link.uplink.is_told() { TIMESYNC_EVERY } else { PROVING_TIMESYNC_EVERY };
+    // What seems to be old is measured again soon: the vehicle's clock may have lost time.
+    let seems_old = !matches!(model.link.down(now), LinkState::Alive(age) if age < SEEMS_OLD);
+    let often = seems_old || !model.link.uplink.is_told();
+    let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
     if known && is_due(&mut model.due.timesync, timesync_every, now) {
         let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
         model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {

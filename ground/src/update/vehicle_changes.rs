@@ -56,6 +56,7 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.parameters = Parameters::default();
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
+    model.link.content = protocol::link_stats::ContentAge::default();
     model.alarms.vehicle_rebooted(now);
     model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
     // An open dialog was opened for the former boot.

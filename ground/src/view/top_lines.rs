@@ -94,7 +94,7 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let words = format!("STATION SILENT {}s", silence.as_secs());
         return Line::styled(words, theme.style(TextRole::Alarm));
     }
-    let down = model.link.state(now);
+    let down = model.link.down(now);
     if down == LinkState::NeverHeard {
         return Line::styled("down: not heard", theme.style(TextRole::Caution));
     }

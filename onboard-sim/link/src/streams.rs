@@ -11,9 +11,10 @@ use protocol::dialect::{
     MESSAGE_INTERVAL_DATA, MavMessage, MavResult, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
     SYSTEM_TIME_DATA, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
     TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TD_UPLINK_DATA, VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
+use protocol::hub::line::SHARE;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
 
 /// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so
@@ -24,17 +25,27 @@ pub(crate) const WINDOW_S: f64 = 1.02;
 const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are zero and therefore truncated.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
-/// Highest default rates for signed frames, Hz; the first one that fits the radio is used, because a signature is as
-/// long as a short message. Vital messages are not slowed down.
-const SIGNED_RATES_MAX_HZ: [f64; 8] = [6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
+/// Highest default rates, Hz; the first one that fits the link is used. Signed frames need it on a radio, because a signature
+/// is as long as a short message, and what a client asks for. Vital messages are not slowed down.
+const RATES_MAX_HZ: [f64; 12] = [f64::INFINITY, 9.0, 8.0, 7.0, 6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
+/// A line slower than a radio: a frame that takes longer than this is not sent, s.
+const LINE_HOLDS_S: f64 = 0.3;
+/// On such a line: the share of vital messages, and of all periodic ones. The rest is for answers, texts and requests.
+const VITAL_SHARE: f64 = 0.3;
+const PERIODIC_SHARE: f64 = 0.85;
+/// What is stretched to fit such a line still comes this often, Hz, if it came as often before.
+const STRETCHED_HZ: f64 = 0.1;
 /// Longest interval that can be requested, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
+/// The longest text (STATUSTEXT), signed, bytes.
+const TEXT_FRAME_LEN: usize = 54 + FRAME_OVERHEAD + SIGNATURE_LEN;
 /// The longest answer to an abort (COMMAND_ACK), bytes of payload.
 const ACK_PAYLOAD_LEN: usize = 10;
-/// The uplink report (TD_UPLINK): bytes of payload and rate, Hz.
-const UPLINK_PAYLOAD_LEN: usize = 16;
+/// The rate of the uplink report (TD_UPLINK), Hz.
 const UPLINK_HZ: f64 = 2.0;
+/// The same over a line slower than a radio.
+pub(crate) const SLOW_UPLINK_HZ: f64 = 1.0;
 /// While a client reads a file over the link, a message is sent at most this often, s: vital ones, and others. The
 /// vehicle is disarmed on the ground then.
 const SPARED_VITAL_S: f64 = 1.0;
@@ -49,9 +60,15 @@ pub(crate) fn kept_free_bytes(signature_len: usize) -> usize {
     payload + 3 * (FRAME_OVERHEAD + signature_len)
 }
 
-/// A link's share for answers, and the same for texts, bytes per second. The rest is always for telemetry.
+/// A link's share for answers, and the same for texts, bytes per second. The rest is always for telemetry. A line of any
+/// speed carries one text a second.
 pub(crate) fn share_bytes_s(capacity_bytes_s: u32) -> usize {
-    capacity_bytes_s as usize / 5
+    (capacity_bytes_s as usize / 5).max(TEXT_FRAME_LEN)
+}
+
+/// Whether a budget is that of a line slower than a radio: four fifths of what its baud rate carries.
+pub(crate) fn is_slow(capacity_bytes_s: u32) -> bool {
+    capacity_bytes_s < RADIO_BUDGET_BYTES_S
 }
 
 /// A periodic message, with its longest payload and its default rate.
@@ -63,12 +80,21 @@ pub struct Standard {
     payload_len: usize,
     /// Default rate, Hz; 0 is off.
     pub rate_hz: f64,
+    /// The same over a link that carries more than a radio, Hz.
+    pub network_hz: f64,
     /// Only a vehicle with operators sends it.
     of_crew: bool,
 }
 
 const fn standard<M: MessageData>(parameter: &'static str, rate_hz: f64) -> Standard {
-    Standard { message_id: M::ID, parameter, payload_len: M::ENCODED_LEN, rate_hz, of_crew: false }
+    Standard {
+        message_id: M::ID,
+        parameter,
+        payload_len: M::ENCODED_LEN,
+        rate_hz,
+        network_hz: rate_hz,
+        of_crew: false,
+    }
 }
 
 impl Standard {
@@ -79,6 +105,11 @@ impl Standard {
 
     const fn of_crew(self) -> Self {
         Self { of_crew: true, ..self }
+    }
+
+    /// More often over a link that carries more than a radio, for other clients.
+    const fn on_network(self, network_hz: f64) -> Self {
+        Self { network_hz, ..self }
     }
 }
 
@@ -102,15 +133,15 @@ pub const STANDARD: [Standard; 25] = [
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // For other clients, off until requested: the messages above already have this data.
+    // For other clients. A radio has no room for all of them: the messages above already have this data.
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
-    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
-    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0),
-    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0),
-    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0),
+    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0).on_network(1.0),
+    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0).on_network(4.0),
+    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0).on_network(4.0),
+    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0).on_network(1.0),
     // Without its extensions, which are not known here.
-    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
-    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30).on_network(1.0),
+    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0).on_network(1.0),
     standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
     STORAGE,
 ];
@@ -141,17 +172,17 @@ pub const FROM_APOGEE: [Standard; 29] = [
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // Off until requested.
+    // The same, and what is off until requested.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
-    standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0),
+    standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0).on_network(1.0),
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
-    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0),
-    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0),
-    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0),
-    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0),
+    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0).on_network(1.0),
+    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0).on_network(4.0),
+    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0).on_network(4.0),
+    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0).on_network(1.0),
     // Without its extensions, which are not known here.
-    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30),
-    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0),
+    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30).on_network(1.0),
+    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0).on_network(1.0),
     standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
     STORAGE,
 ];
@@ -164,6 +195,8 @@ struct Stream {
     default_interval_s: Option<f64>,
     /// `None`: switched off.
     interval_s: Option<f64>,
+    /// Somebody has asked for this interval.
+    asked: bool,
     due_s: f64,
     sent_s: f64,
 }
@@ -189,6 +222,7 @@ pub(crate) struct Due {
 pub struct Streams {
     messages: &'static [Standard],
     signature_len: usize,
+    crew: bool,
     capacity_bytes_s: u32,
     each: Vec<Stream>,
 }
@@ -196,54 +230,100 @@ pub struct Streams {
 impl Streams {
     /// Every message at its default rate, within a radio's budget.
     pub fn of(messages: &'static [Standard]) -> Self {
-        Self::at_most(messages, 0, f64::INFINITY, false)
+        Self::over_a_radio(messages, 0, false)
     }
 
     /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget holds.
     pub fn signed(messages: &'static [Standard]) -> Self {
-        Self::slowed(messages, false)
+        Self::over_a_radio(messages, SIGNATURE_LEN, false)
     }
 
     /// The same for a vehicle with operators.
     pub fn with_crew(messages: &'static [Standard]) -> Self {
-        Self::slowed(messages, true)
+        Self::over_a_radio(messages, SIGNATURE_LEN, true)
     }
 
-    fn slowed(messages: &'static [Standard], crew: bool) -> Self {
-        let at_most = |rate_max_hz| Self::at_most(messages, SIGNATURE_LEN, rate_max_hz, crew);
-        let [fastest, slower @ ..] = SIGNED_RATES_MAX_HZ;
-        slower.into_iter().fold(
-            at_most(fastest),
-            |streams, rate_max_hz| {
-                if streams.fit() { streams } else { at_most(rate_max_hz) }
-            },
-        )
+    fn over_a_radio(messages: &'static [Standard], signature_len: usize, crew: bool) -> Self {
+        let mut place = 0_usize;
+        let streams = messages.iter().map(|standard| {
+            // Spread in time, so that the slow messages are not all due at the same instant.
+            let due_s = 0.02 * place as f64;
+            place += usize::from(crew || !standard.of_crew);
+            Stream {
+                message_id: standard.message_id,
+                frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
+                default_interval_s: None,
+                interval_s: None,
+                asked: false,
+                due_s,
+                sent_s: f64::NEG_INFINITY,
+            }
+        });
+        let each = streams.collect();
+        let mut streams = Self { messages, signature_len, crew, capacity_bytes_s: 0, each };
+        streams.set_capacity(RADIO_BUDGET_BYTES_S);
+        streams
     }
 
     pub fn messages(&self) -> &'static [Standard] {
         self.messages
     }
 
-    fn at_most(messages: &'static [Standard], signature_len: usize, rate_max_hz: f64, crew: bool) -> Self {
-        let mut place = 0_usize;
-        let streams = messages.iter().map(|standard| {
-            let carried = crew || !standard.of_crew;
-            let rate_max_hz = if is_vital(standard.message_id) { f64::INFINITY } else { rate_max_hz };
-            let interval_s =
-                (carried && standard.rate_hz > 0.0).then(|| 1.0 / standard.rate_hz.min(rate_max_hz));
-            // Spread in time, so that the slow messages are not all due at the same instant.
-            let due_s = 0.02 * place as f64;
-            place += usize::from(carried);
-            Stream {
-                message_id: standard.message_id,
-                frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
-                default_interval_s: interval_s,
-                interval_s,
-                due_s,
-                sent_s: f64::NEG_INFINITY,
+    /// The default rates for this budget, Hz: as high as they fit.
+    fn default_rates_hz(&self) -> Vec<f64> {
+        let fits = |rates: &Vec<f64>| self.load_bytes_s(rates) <= self.for_telemetry_bytes_s();
+        let capped = RATES_MAX_HZ.into_iter().map(|most_hz| self.rates_hz(most_hz));
+        capped.into_iter().find(fits).unwrap_or_else(|| self.stretched_rates_hz())
+    }
+
+    /// The rates of the messages for this kind of link, none of them but vital ones above this, Hz.
+    fn rates_hz(&self, most_hz: f64) -> Vec<f64> {
+        let network = self.capacity_bytes_s > RADIO_BUDGET_BYTES_S;
+        let rate = |standard: &Standard| match standard {
+            Standard { of_crew: true, .. } if !self.crew => 0.0,
+            Standard { message_id, rate_hz, .. } if is_vital(*message_id) => *rate_hz,
+            Standard { rate_hz, network_hz, .. } => {
+                (if network { network_hz.max(*rate_hz) } else { *rate_hz }).min(most_hz)
             }
-        });
-        Self { messages, signature_len, capacity_bytes_s: RADIO_BUDGET_BYTES_S, each: streams.collect() }
+        };
+        self.messages.iter().map(rate).collect()
+    }
+
+    /// The rates for a line slower than a radio: less often in the same proportion, vital messages less so.
+    fn stretched_rates_hz(&self) -> Vec<f64> {
+        let capacity_bytes_s = f64::from(self.capacity_bytes_s);
+        let longest = LINE_HOLDS_S * capacity_bytes_s / SHARE;
+        let mut rates = self.rates_hz(f64::INFINITY);
+        let mut for_vital = VITAL_SHARE * capacity_bytes_s;
+        for (rate_hz, stream) in rates.iter_mut().zip(&self.each) {
+            if is_vital(stream.message_id) {
+                *rate_hz = rate_hz.min((for_vital / stream.frame_len as f64).max(1.0));
+                for_vital -= *rate_hz * stream.frame_len as f64;
+            } else if stream.frame_len as f64 > longest {
+                *rate_hz = 0.0;
+            }
+        }
+        let room = PERIODIC_SHARE * self.for_telemetry_bytes_s();
+        for _ in 0..100 {
+            if self.load_bytes_s(&rates) <= room {
+                break;
+            }
+            for (rate_hz, stream) in rates.iter_mut().zip(&self.each) {
+                if !is_vital(stream.message_id) && *rate_hz > STRETCHED_HZ {
+                    *rate_hz = (*rate_hz / 1.05).max(STRETCHED_HZ);
+                }
+            }
+        }
+        rates
+    }
+
+    /// What these rates take, bytes per second, beside the intervals that somebody has asked for.
+    fn load_bytes_s(&self, rates_hz: &[f64]) -> f64 {
+        let load = |(stream, rate_hz): (&Stream, &f64)| match stream {
+            Stream { asked: true, interval_s, .. } => stream.bytes_s(*interval_s),
+            Stream { frame_len, .. } => *frame_len as f64 * rate_hz,
+        };
+        self.each.iter().zip(rates_hz).map(load).sum()
     }
 
     /// The link's budget, bytes per second.
@@ -251,9 +331,24 @@ impl Streams {
         self.capacity_bytes_s
     }
 
-    /// Gives the link another budget; the intervals stay.
+    /// Gives the link another budget. The intervals that nobody has asked for are those of this budget from now on.
     pub fn set_capacity(&mut self, capacity_bytes_s: u32) {
+        if capacity_bytes_s == self.capacity_bytes_s {
+            return;
+        }
         self.capacity_bytes_s = capacity_bytes_s;
+        self.give_way();
+    }
+
+    /// Slows down what nobody has asked for as far as the rest needs the room, and no further.
+    fn give_way(&mut self) {
+        let rates_hz = self.default_rates_hz();
+        for (stream, rate_hz) in self.each.iter_mut().zip(rates_hz) {
+            stream.default_interval_s = (rate_hz > 0.0).then(|| 1.0 / rate_hz);
+            if !stream.asked {
+                stream.interval_s = stream.default_interval_s;
+            }
+        }
     }
 
     /// Whether all of it fits the link's budget.
@@ -262,11 +357,14 @@ impl Streams {
     }
 
     /// The part of the link's budget for telemetry, bytes per second: without the reserve for vital messages and the
-    /// uplink reports.
+    /// uplink reports. A slow line has its reserve in what its budget leaves of its baud rate.
     fn for_telemetry_bytes_s(&self) -> f64 {
-        let uplink_len = UPLINK_PAYLOAD_LEN + FRAME_OVERHEAD + self.signature_len;
-        let in_window = f64::from(self.capacity_bytes_s) - kept_free_bytes(self.signature_len) as f64;
-        in_window / WINDOW_S - UPLINK_HZ * uplink_len as f64
+        let uplink_len = (TD_UPLINK_DATA::ENCODED_LEN + FRAME_OVERHEAD + self.signature_len) as f64;
+        let capacity_bytes_s = f64::from(self.capacity_bytes_s);
+        if is_slow(self.capacity_bytes_s) {
+            return capacity_bytes_s / WINDOW_S - SLOW_UPLINK_HZ * uplink_len;
+        }
+        (capacity_bytes_s - kept_free_bytes(self.signature_len) as f64) / WINDOW_S - UPLINK_HZ * uplink_len
     }
 
     /// The messages whose time has come, most important first; fewer if the link is spared for files.
@@ -301,10 +399,13 @@ impl Streams {
         self.at_least_every(message_id, HURRIED_S);
     }
 
-    /// Sends a message at most this long after the last one.
+    /// Sends a message at most this long after the last one; on a slow line as often as it takes half of it.
     pub(crate) fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
+        let half_bytes_s = 0.5 * f64::from(self.capacity_bytes_s);
+        let slow = is_slow(self.capacity_bytes_s);
         for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
-            stream.due_s = stream.due_s.min(stream.sent_s + interval_s);
+            let least_s = if slow { stream.frame_len as f64 / half_bytes_s } else { 0.0 };
+            stream.due_s = stream.due_s.min(stream.sent_s + interval_s.max(least_s));
         }
     }
 
@@ -353,9 +454,13 @@ impl Streams {
             let reason = format!("message {message_id}: vital messages are not slowed down");
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
-        let total = self.bytes_s() - before.bytes_s(before.interval_s) + before.bytes_s(wanted);
-        let free = self.for_telemetry_bytes_s();
+        let all_before = self.each.clone();
+        self.each[place].interval_s = wanted;
+        self.each[place].asked = interval_us != 0.0;
+        self.give_way();
+        let (total, free) = (self.bytes_s(), self.for_telemetry_bytes_s());
         if before.bytes_s(wanted) > before.bytes_s(before.interval_s) && total > free {
+            self.each = all_before;
             let reason = format!(
                 "message {message_id}: {total:.0} B/s in all; the link's budget is {}, {free:.0} of it for telemetry",
                 self.capacity_bytes_s
@@ -363,9 +468,8 @@ impl Streams {
             return (MavResult::MAV_RESULT_DENIED, Some(reason));
         }
         let stream = &mut self.each[place];
-        stream.interval_s = wanted;
         // A new rate counts from now, also after a long interval.
-        if let Some(interval_s) = wanted {
+        if let Some(interval_s) = stream.interval_s {
             stream.due_s = stream.due_s.min(now_s + interval_s);
         }
         (MavResult::MAV_RESULT_ACCEPTED, None)

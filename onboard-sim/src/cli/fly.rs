@@ -9,7 +9,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
 use protocol::crew_file::CrewFile;
-use protocol::identity::{LARGEST_BOOT_NUMBER, RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
@@ -47,12 +47,13 @@ pub(crate) struct FlyArguments {
     /// them. Needs --key, which all share.
     #[arg(long, value_name = "FILE", requires = "key")]
     crew: Option<PathBuf>,
-    /// Budget of a network link, bytes per second, 2000 to 1000000. More is sent only if a station asks for it.
-    #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
+    /// Budget of a network link, bytes per second, 2000 to 1000000: 2000 if a radio carries it on. Above 2000, attitude,
+    /// position, battery and mode go out in the messages of other ground stations, too.
+    #[arg(long, value_name = "BYTES_S", default_value_t = NETWORK_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     network_budget: u32,
-    /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it carries, at most what its baud
-    /// rate does. More than 2000 is sent only if a station asks for it, or fetches the log.
+    /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it carries, and at most four fifths
+    /// of what its baud rate does.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     serial_budget: u32,

@@ -4,6 +4,7 @@
 //! A frame that arrives over more than one link is passed on once. With a key, a frame without a valid signature is
 //! not passed on. Every link has its own framing and its own statistics.
 
+pub mod line;
 mod received;
 
 use alloc::collections::BTreeMap;
@@ -13,11 +14,16 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use crate::duplicate::Duplicates;
-use crate::frame::{Frame, Framer, FramerCounters};
+use crate::frame::{Frame, Framer, FramerCounters, SIGNATURE_LEN};
 use crate::link_stats::LinkStats;
 use crate::signing::{Rejection, Signing, SigningCounters};
 
+use line::Line;
 pub use received::{Origin, Received, StreamId};
+
+const RADIO_STATUS_ID: u32 = 109;
+/// Of RADIO_STATUS: where the free share of the radio's buffer is.
+const TXBUF_AT: usize = 6;
 
 /// This many streams of one link may be open at the same time.
 const MAX_STREAMS: usize = 8;
@@ -51,9 +57,16 @@ pub struct HubLink {
     stats: LinkStats,
     trouble: Option<String>,
     copies: u64,
+    /// What waits for a link of a known speed.
+    line: Option<Line>,
 }
 
 impl HubLink {
+    /// Returns how many frames were dropped because the line is too slow for them.
+    pub fn dropped(&self) -> u64 {
+        self.line.as_ref().map_or(0, Line::dropped)
+    }
+
     pub fn stats(&self) -> &LinkStats {
         &self.stats
     }
@@ -146,6 +159,16 @@ impl Hub {
         }
     }
 
+    /// Sets what each link carries, bytes per second, where that is known. Frames wait for such a link in the hub.
+    #[must_use]
+    pub fn over(mut self, carried_bytes_s: &[Option<u32>]) -> Self {
+        let added = if self.signing.is_some() { SIGNATURE_LEN } else { 0 };
+        for (link, carried) in self.links.iter_mut().zip(carried_bytes_s) {
+            link.line = carried.map(|bytes_s| Line::new(bytes_s, added));
+        }
+        self
+    }
+
     /// The links, ordered by their numbers.
     pub fn links(&self) -> &[HubLink] {
         &self.links
@@ -182,6 +205,11 @@ impl Hub {
         {
             return News::Rejected(frame, rejection);
         }
+        if frame.message_id() == RADIO_STATUS_ID
+            && let Some(line) = &mut self.links[link].line
+        {
+            line.on_radio(frame.padded_payload()[TXBUF_AT], now);
+        }
         // A rejected frame is no sign of life either, so it does not count in the statistics.
         self.links[link].stats.on_frame(&frame, now);
         // The signature is checked first: a forged frame must not turn the true one into a copy.
@@ -199,6 +227,31 @@ impl Hub {
             Some(signing) => signing.sign(frame, signing.link_id(link), clock).as_bytes().to_vec(),
             None => frame.as_bytes().to_vec(),
         }
+    }
+
+    /// Takes a frame for a link. Without a known speed it leaves at once, and otherwise when the line is free for it:
+    /// [`Hub::leaving`].
+    pub fn send(&mut self, link: usize, frame: &Frame, clock: u64) -> Option<Vec<u8>> {
+        match &mut self.links.get_mut(link)?.line {
+            Some(line) => {
+                line.push(frame.clone());
+                None
+            }
+            None => Some(self.bytes_for(link, frame, clock)),
+        }
+    }
+
+    /// Returns the frame that leaves over a link of a known speed now, and its bytes. Call it until it returns `None`, after
+    /// [`Hub::send`] and at [`Hub::due_at`].
+    pub fn leaving(&mut self, link: usize, now: Duration, clock: u64) -> Option<(Frame, Vec<u8>)> {
+        let frame = self.links.get_mut(link)?.line.as_mut()?.pop(now)?;
+        let bytes = self.bytes_for(link, &frame, clock);
+        Some((frame, bytes))
+    }
+
+    /// Returns when a waiting frame may leave; `None` if none waits.
+    pub fn due_at(&self) -> Option<Duration> {
+        self.links.iter().filter_map(|link| link.line.as_ref()?.due_at()).min()
     }
 
     /// Counts bytes that a link has sent.

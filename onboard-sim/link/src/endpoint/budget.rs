@@ -2,18 +2,53 @@
 
 use alloc::collections::VecDeque;
 
+use protocol::hub::line::slowed;
+
+use crate::streams::is_slow;
+
 /// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
 /// Otherwise a burst could spend the whole budget, and even vital messages would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
 
-/// The share of telemetry, bytes.
+/// The share of telemetry, bytes. Over a slow line frames go one by one, so that there are no bursts.
 pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    capacity_bytes_s as usize * 22 / 100
+    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize * 22 / 100 }
 }
 
 /// The share of answers and texts, bytes.
 pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    capacity_bytes_s as usize / 6
+    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize / 6 }
+}
+
+/// A radio that has not reported for this long has no say any more, s.
+const RADIO_REPORT_HOLDS_S: f64 = 10.0;
+
+/// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Radio {
+    share: f64,
+    reported_s: Option<f64>,
+}
+
+impl Default for Radio {
+    fn default() -> Self {
+        Self { share: 1.0, reported_s: None }
+    }
+}
+
+impl Radio {
+    pub(super) fn share(self) -> f64 {
+        self.share
+    }
+
+    /// Takes a report: how much of its buffer is free, percent.
+    pub(super) fn hear(&mut self, free_percent: u8, now_s: f64) {
+        *self = Self { share: slowed(self.share, free_percent), reported_s: Some(now_s) };
+    }
+
+    pub(super) fn is_outdated(self, now_s: f64) -> bool {
+        self.reported_s.is_some_and(|at_s| now_s - at_s > RADIO_REPORT_HOLDS_S)
+    }
 }
 
 /// The bytes sent in a sliding window of time.

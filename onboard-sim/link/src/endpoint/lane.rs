@@ -11,14 +11,15 @@ use alloc::vec::Vec;
 use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
+use protocol::hub::line::SHARE;
 use protocol::identity::Address;
 
-use super::budget::{BRIEFLY_S, Window, answers_briefly_bytes, telemetry_briefly_bytes};
+use super::budget::{BRIEFLY_S, Radio, Window, answers_briefly_bytes, telemetry_briefly_bytes};
 use super::files::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::snapshot::Snapshot;
 use crate::stations::MAX_STATIONS;
-use crate::streams::{Due, Streams, WINDOW_S, kept_free_bytes, share_bytes_s};
+use crate::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, kept_free_bytes, share_bytes_s};
 use crate::vehicle::Vehicle;
 use crate::{parameters, telemetry};
 
@@ -28,6 +29,10 @@ const MAX_WAITING: usize = 32;
 const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
 /// Shortest interval between answers to a repeated abort, s.
 const ABORT_ANSWERED_S: f64 = 0.09;
+/// The same on a line slower than a radio, s.
+const SLOW_ABORT_ANSWERED_S: f64 = 0.3;
+/// A piece of a file that would hold a line for longer than this is not sent, s.
+const LINE_HOLDS_S: f64 = 0.3;
 
 /// An answer in the queue.
 #[derive(Debug, Clone)]
@@ -70,6 +75,14 @@ pub(super) struct Lane {
     next_parameter: Option<u16>,
     /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
     piece_due_s: f64,
+    /// The budget that the lane was given, bytes per second; a radio may leave less of it.
+    granted_bytes_s: u32,
+    radio: Radio,
+    /// When a line slower than a radio has sent what it was given. What is not vital waits for that, so that nothing queues
+    /// behind it.
+    line_free_at_s: f64,
+    /// When the next uplink reports go over such a line.
+    uplinks_at_s: f64,
 }
 
 impl Lane {
@@ -97,15 +110,34 @@ impl Lane {
             requested: VecDeque::new(),
             next_parameter: None,
             piece_due_s: 0.0,
+            granted_bytes_s: 0,
+            radio: Radio::default(),
+            line_free_at_s: 0.0,
+            uplinks_at_s: 0.0,
         };
         let capacity_bytes_s = lane.streams.capacity_bytes_s();
         lane.set_capacity(capacity_bytes_s);
         lane
     }
 
-    pub(super) fn set_capacity(&mut self, capacity_bytes_s: u32) {
+    pub(super) fn set_capacity(&mut self, granted_bytes_s: u32) {
+        self.granted_bytes_s = granted_bytes_s;
+        self.share_with_the_radio();
+    }
+
+    /// Takes a radio's report about its buffer.
+    pub(super) fn on_radio(&mut self, free_percent: u8, now_s: f64) {
+        self.radio.hear(free_percent, now_s);
+        self.share_with_the_radio();
+    }
+
+    /// Uses what the radio leaves of the budget.
+    fn share_with_the_radio(&mut self) {
+        let capacity_bytes_s = (self.radio.share() * f64::from(self.granted_bytes_s)) as u32;
         self.streams.set_capacity(capacity_bytes_s);
-        self.sent.set_limit(capacity_bytes_s as usize);
+        // The reserve of a slow line is in what its budget leaves of its baud rate.
+        let reserve = if is_slow(capacity_bytes_s) { kept_free_bytes(self.signature_len) } else { 0 };
+        self.sent.set_limit(capacity_bytes_s as usize + reserve);
         self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
         self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
         self.answered.set_limit(share_bytes_s(capacity_bytes_s));
@@ -168,6 +200,11 @@ impl Lane {
         files: &mut FileService,
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
+        if self.radio.is_outdated(now_s) {
+            self.radio = Radio::default();
+            self.share_with_the_radio();
+        }
+        let slow = is_slow(self.streams.capacity_bytes_s());
         self.sent.move_to(now_s);
         self.telemetry_briefly.move_to(now_s);
         self.answers_briefly.move_to(now_s);
@@ -181,7 +218,8 @@ impl Lane {
             }
             self.send(due, context, vehicle, snapshot, &mut frames);
         }
-        if now_s - self.abort_answered_s >= ABORT_ANSWERED_S
+        let answered_every_s = if slow { SLOW_ABORT_ANSWERED_S } else { ABORT_ANSWERED_S };
+        if now_s - self.abort_answered_s >= answered_every_s
             && let Some(answer) = self.aborts.front().copied()
             && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
         {
@@ -189,12 +227,20 @@ impl Lane {
             self.abort_answered_s = now_s;
             self.aborts.pop_front();
         }
-        while let Some(message) = self.uplinks.front().cloned() {
+        while (!slow || now_s >= self.uplinks_at_s)
+            && self.is_line_free(now_s)
+            && let Some(message) = self.uplinks.front().cloned()
+        {
             let Some(frame) = self.encode(&message.into(), self.room()) else { break };
             self.put(frame, now_s, &mut frames);
             self.uplinks.pop_front();
+            if self.uplinks.is_empty() {
+                self.uplinks_at_s = now_s + 0.9 / SLOW_UPLINK_HZ;
+            }
         }
-        while let Some(answer) = self.answers.front().cloned() {
+        while self.is_line_free(now_s)
+            && let Some(answer) = self.answers.front().cloned()
+        {
             let room = self.room_for_answers().min(self.answered.room());
             let Some(frame) = self.encode(&answer, room) else { break };
             self.answered.take(self.len_of(&frame), now_s);
@@ -202,7 +248,9 @@ impl Lane {
             self.put(frame, now_s, &mut frames);
             self.answers.pop_front();
         }
-        while let Some(chunk) = self.texts.front().cloned() {
+        while self.is_line_free(now_s)
+            && let Some(chunk) = self.texts.front().cloned()
+        {
             let room = self.room_for_answers().min(self.said.room());
             let Some(frame) = self.encode(&chunk, room) else { break };
             self.said.take(self.len_of(&frame), now_s);
@@ -213,7 +261,7 @@ impl Lane {
         for due in due.iter().filter(|due| !due.vital) {
             // The check uses the longest form of the message, so that no frame is built for nothing. Less important
             // messages do not overtake it.
-            if due.frame_len > self.room_for_telemetry() {
+            if due.frame_len > self.room_for_telemetry() || !self.is_line_free(now_s) {
                 break;
             }
             self.send(due, context, vehicle, snapshot, &mut frames);
@@ -223,8 +271,10 @@ impl Lane {
         {
             self.requested.push_back(answer);
         }
-        let longest = self.streams.longest_frame_len();
-        while let Some(message) = self.next_requested(vehicle) {
+        let longest = if slow { 0 } else { self.streams.longest_frame_len() };
+        while self.is_line_free(now_s)
+            && let Some(message) = self.next_requested(vehicle)
+        {
             // Some room is also kept free for telemetry that falls due in the meantime.
             let room = self.room_for_telemetry().saturating_sub(longest);
             let Some(frame) = self.encode(&message.into(), room) else { break };
@@ -242,9 +292,13 @@ impl Lane {
     fn send_pieces(&mut self, now_s: f64, files: &mut FileService, frames: &mut Vec<Frame>) {
         let longest = PIECE_FRAME_LEN + self.signature_len;
         let spacing_s = longest as f64 / f64::from(self.streams.capacity_bytes_s());
+        if self.line_takes_s(longest) > LINE_HOLDS_S {
+            return;
+        }
         // A poll that comes late is caught up with, a pause is not.
         self.piece_due_s = self.piece_due_s.max(now_s - spacing_s);
         while now_s >= self.piece_due_s
+            && self.is_line_free(now_s)
             && self.room() >= longest
             && let Some(message) = files.next_piece(&self.links, now_s)
         {
@@ -316,8 +370,20 @@ impl Lane {
         frame.as_bytes().len() + self.signature_len
     }
 
+    /// How long these bytes hold the line, s. Only a line slower than a radio is held.
+    fn line_takes_s(&self, bytes: usize) -> f64 {
+        let capacity_bytes_s = self.streams.capacity_bytes_s();
+        if is_slow(capacity_bytes_s) { bytes as f64 * SHARE / f64::from(capacity_bytes_s) } else { 0.0 }
+    }
+
+    fn is_line_free(&self, now_s: f64) -> bool {
+        now_s >= self.line_free_at_s - 1e-9
+    }
+
     fn put(&mut self, frame: Frame, now_s: f64, frames: &mut Vec<Frame>) {
-        self.sent.take(self.len_of(&frame), now_s);
+        let bytes = self.len_of(&frame);
+        self.sent.take(bytes, now_s);
+        self.line_free_at_s = self.line_free_at_s.max(now_s) + self.line_takes_s(bytes);
         frames.push(frame);
     }
 }

@@ -212,6 +212,10 @@ impl VehicleEndpoint {
             }
             return;
         }
+        if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
+            self.lane(link).on_radio(radio.txbuf, vehicle.time_s());
+            return;
+        }
         self.stations.accepted(frame, vehicle.time_s());
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
             let streams = &mut self.lane(link).streams;
@@ -425,8 +429,9 @@ impl VehicleEndpoint {
         }
         let mut streams = lane.streams.clone();
         streams.set_capacity(capacity_bytes_s);
+        let before = streams.intervals();
         let done = change(&mut streams);
-        if streams.intervals() != lane.streams.intervals() {
+        if streams.intervals() != before {
             let mut own = lane.of_its_own(link);
             own.streams = streams;
             own.set_capacity(capacity_bytes_s);

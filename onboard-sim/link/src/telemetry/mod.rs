@@ -179,7 +179,8 @@ fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
     MavMessage::VFR_HUD(VFR_HUD_DATA {
         airspeed: motion.airspeed_m_s as f32,
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
-        alt: -motion.position_m[2] as f32,
+        // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the pad.
+        alt: (snapshot.pad_altitude_m - motion.position_m[2]) as f32,
         climb: -down_m_s as f32,
         heading: libm::round(global::heading_deg(&motion.ned_from_body)) as i16 % 360,
         throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },

@@ -12,7 +12,7 @@ use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
-use protocol::signing::{Rejection, stamp_of};
+use protocol::signing::{Anchor, Rejection};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::FlyError;
@@ -34,6 +34,7 @@ pub(super) struct Links {
     hub: Hub,
     key_file: Option<KeyFile>,
     remembered_at: u64,
+    stamps: Stamps,
     recorder: Option<Recorder>,
     pub(super) tx_bytes: u64,
 }
@@ -108,13 +109,23 @@ impl Links {
             let name = transport.address().to_string();
             open.push(OpenLink { sender: transport.sender(), transport, name });
         }
-        let hub = Hub::new(open.len(), signing);
+        let carried: Vec<_> = open.iter().map(|link| link.transport.address().capacity_bytes_s()).collect();
+        let hub = Hub::new(open.len(), signing).over(&carried);
         let intake = Intake { recorder: recorder.clone(), second: 0, recorded: 0, left_out: 0 };
-        Ok(Self { open, intake, hub, key_file, remembered_at: 0, recorder, tx_bytes: 0 })
+        Ok(Self {
+            open,
+            intake,
+            hub,
+            key_file,
+            remembered_at: 0,
+            stamps: Stamps::begin(),
+            recorder,
+            tx_bytes: 0,
+        })
     }
 
     pub(super) fn receive(&mut self, time_s: f64) -> Vec<Heard> {
-        let (now, clock) = (Duration::from_secs_f64(time_s), clock());
+        let (now, clock) = (Duration::from_secs_f64(time_s), self.stamps.now());
         let recorder = self.recorder.as_ref();
         let mut heard = Vec::new();
         let mut believed = false;
@@ -149,26 +160,41 @@ impl Links {
         heard
     }
 
+    /// Sends a frame. For a slow line it may wait until [`Links::send_what_waits`].
     pub(super) fn send(&mut self, Outgoing { frame, links }: &Outgoing, time_s: f64) {
-        let (now, clock) = (Duration::from_secs_f64(time_s), clock());
-        for (number, OpenLink { sender, name, .. }) in self.open.iter().enumerate() {
-            if !links.contains(&number) {
-                continue;
+        let (stamp, count) = (self.stamps.now(), self.open.len());
+        for number in links.iter().copied().filter(|number| *number < count) {
+            if let Some(bytes) = self.hub.send(number, frame, stamp) {
+                self.hand_over(number, frame, bytes, time_s);
             }
-            let bytes = self.hub.bytes_for(number, frame, clock);
-            let count = bytes.len();
-            // A frame without room was not sent, so the log must not contain it.
-            if sender.send(bytes) {
-                self.tx_bytes += count as u64;
-                self.hub.on_sent(number, count, now);
-                record_raw(self.recorder.as_ref(), Direction::Tx, name, frame, time_s);
+        }
+    }
+
+    /// Gives each slow line what it can carry by now.
+    pub(super) fn send_what_waits(&mut self, time_s: f64) {
+        let (now, stamp) = (Duration::from_secs_f64(time_s), self.stamps.now());
+        for number in 0..self.open.len() {
+            while let Some((frame, bytes)) = self.hub.leaving(number, now, stamp) {
+                self.hand_over(number, &frame, bytes, time_s);
             }
+        }
+    }
+
+    fn hand_over(&mut self, number: usize, frame: &Frame, bytes: Vec<u8>, time_s: f64) {
+        let OpenLink { sender, name, .. } = &self.open[number];
+        let count = bytes.len();
+        // A frame without room was not sent, so the log must not contain it.
+        if sender.send(bytes) {
+            self.tx_bytes += count as u64;
+            self.hub.on_sent(number, count, Duration::from_secs_f64(time_s));
+            record_raw(self.recorder.as_ref(), Direction::Tx, name, frame, time_s);
         }
     }
 
     /// Number of frames dropped because their link had no room.
     pub(super) fn dropped(&self) -> u64 {
-        self.open.iter().map(|link| link.sender.dropped()).sum()
+        let of_lines: u64 = self.hub.links().iter().map(|link| link.dropped()).sum();
+        of_lines + self.open.iter().map(|link| link.sender.dropped()).sum::<u64>()
     }
 
     /// Writes the final statistics into the log: traffic of each link, and frames refused for their signature.
@@ -210,11 +236,24 @@ impl Links {
     }
 }
 
-/// The current time in the units of signatures.
+/// The time for signatures: the time of day at the start, and from then on the time since. A clock that is set while the
+/// vehicle runs does not move it.
+struct Stamps {
+    started: std::time::Instant,
+    anchor: Anchor,
+}
+
 #[expect(
     clippy::disallowed_methods,
     reason = "signatures need the time of day; nothing in flight depends on it"
 )]
-fn clock() -> u64 {
-    stamp_of(std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default())
+impl Stamps {
+    fn begin() -> Self {
+        let of_day = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        Self { started: std::time::Instant::now(), anchor: Anchor::at(of_day) }
+    }
+
+    fn now(&self) -> u64 {
+        self.anchor.stamp(self.started.elapsed())
+    }
 }

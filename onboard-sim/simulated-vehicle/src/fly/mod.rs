@@ -377,6 +377,7 @@ pub async fn fly_observed(
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {
             links.send(&outgoing, time_s);
         }
+        links.send_what_waits(time_s);
         if links.dropped() > dropped {
             dropped = links.dropped();
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));

@@ -140,6 +140,11 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     snapshot.motion.ned_from_body = [libm::cos(half_rad), 0.0, 0.0, libm::sin(half_rad)];
     let turned = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
     assert!(matches!(&turned, Some(MavMessage::VFR_HUD(hud)) if hud.heading == 120), "{turned:?}");
+    (snapshot.pad_altitude_m, snapshot.motion.position_m[2]) = (510.0, -40.0);
+    let high = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
+    let above_sea =
+        matches!(&high, Some(MavMessage::VFR_HUD(hud)) if hud.alt.to_bits() == 550.0f32.to_bits());
+    assert!(above_sea, "above mean sea level: {high:?}");
 }
 
 #[test]

@@ -172,10 +172,10 @@ fn a_rate_beyond_the_budget_is_refused_in_flight_as_on_the_pad() {
     assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
     assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
     wire.run(7.0);
-    let (found, words) = wire.set_real("RATE_FINS", 20.0);
+    let (found, words) = wire.set_real("RATE_FINS", 50.0);
     assert_eq!(found.to_bits(), 2.0f32.to_bits());
     assert!(words.contains("budget is 2000"), "{words}");
-    assert_eq!(wire.ask(511, TD_FINS_DATA::ID as f32, 50_000.0).0, MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(wire.ask(511, TD_FINS_DATA::ID as f32, 20_000.0).0, MavResult::MAV_RESULT_DENIED as u8);
 }
 
 #[test]
