@@ -20,8 +20,11 @@ use crate::model::Model;
 use crate::model::seat::Seat;
 use crate::update::Msg;
 
-/// The size of the kept history: some hours of telemetry.
-const HISTORY_BYTES_MAX: usize = 24 * 1024 * 1024;
+/// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood. It is most of what a station
+/// ever needs.
+const HISTORY_BYTES_MAX: usize = 16 * 1024 * 1024;
+/// Messages are kept together in blocks of this size: one by one, each would take as much again for its place.
+const BLOCK_BYTES: usize = 64 * 1024;
 /// A screen that is this many messages behind is disconnected; it attaches again.
 const BEHIND_MAX: usize = 4_096;
 /// How many requests may wait.
@@ -52,8 +55,48 @@ struct History {
     hello: Hello,
     /// The latest checklist, which is told also if the history no longer reaches back to it.
     checklist: Option<Bytes>,
-    kept: VecDeque<Bytes>,
+    /// Whole messages, each with its length before it.
+    blocks: VecDeque<Bytes>,
+    /// The block that is being filled.
+    last: Vec<u8>,
+    /// The size of all of them.
     bytes: usize,
+}
+
+impl History {
+    fn new(hello: Hello) -> Self {
+        Self { hello, checklist: None, blocks: VecDeque::new(), last: Vec::new(), bytes: 0 }
+    }
+
+    fn keep(&mut self, message: &[u8]) {
+        if self.last.len() + message.len() > BLOCK_BYTES && !self.last.is_empty() {
+            self.blocks.push_back(Bytes::from(&self.last[..]));
+            self.last.clear();
+        }
+        self.last.extend_from_slice(message);
+        self.bytes += message.len();
+        while self.bytes > HISTORY_BYTES_MAX {
+            let Some(oldest) = self.blocks.pop_front() else { break };
+            self.bytes -= oldest.len();
+        }
+    }
+
+    /// All of it, in order.
+    fn kept(&self) -> impl Iterator<Item = Bytes> {
+        self.blocks.iter().cloned().chain([Bytes::from(&self.last[..])])
+    }
+}
+
+/// The end of a block: whole messages, at most this much of them.
+fn end_of(block: &[u8], most_bytes: usize) -> &[u8] {
+    let mut rest = block;
+    while rest.len() > most_bytes
+        && let Some((prefix, _)) = rest.split_first_chunk()
+        && let Ok(length) = length(*prefix)
+    {
+        rest = rest.get(prefix.len() + length..).unwrap_or_default();
+    }
+    rest
 }
 
 /// Serves screens until it goes out of scope.
@@ -86,7 +129,7 @@ impl Server {
         }
         let (news, _) = broadcast::channel(BEHIND_MAX);
         let (ask, requests) = mpsc::channel(REQUESTS_MAX);
-        let history = Mutex::new(History { hello, checklist: None, kept: VecDeque::new(), bytes: 0 });
+        let history = Mutex::new(History::new(hello));
         let shared = Arc::new(Shared { history, news, next_screen: AtomicU32::new(first_screen) });
         let for_screens = Arc::clone(&shared);
         let accepting = tokio::spawn(async move {
@@ -116,12 +159,7 @@ impl Server {
         if matches!(msg, Msg::Checklist(_)) {
             history.checklist = Some(Arc::clone(&bytes));
         }
-        history.bytes += bytes.len();
-        history.kept.push_back(Arc::clone(&bytes));
-        while history.bytes > HISTORY_BYTES_MAX {
-            let Some(oldest) = history.kept.pop_front() else { break };
-            history.bytes -= oldest.len();
-        }
+        history.keep(&bytes);
         // Fails only if no screen is attached.
         let _ = self.shared.news.send(bytes);
     }
@@ -178,14 +216,20 @@ impl Shared {
         // The greeting and the checklist come first, whatever is left out after them.
         let first = all.len().min(1 + usize::from(has_checklist));
         let (first, past) = all.split_at(first);
-        let mut kept = 0;
-        let from = past.iter().rposition(|bytes| {
-            kept += bytes.len();
-            kept > past_bytes
-        });
-        let past = &past[from.map_or(0, |place| place + 1)..];
+        let mut left = past_bytes;
+        let mut latest: Vec<&[u8]> = Vec::new();
+        for block in past.iter().rev() {
+            let end = end_of(block, left);
+            latest.push(end);
+            left -= end.len();
+            if end.len() < block.len() {
+                break;
+            }
+        }
         let live_mark = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
-        (first.iter().chain(past).chain(&live_mark).flat_map(|bytes| bytes.to_vec()).collect(), live)
+        let first = first.iter().map(|bytes| &bytes[..]);
+        let told = first.chain(latest.into_iter().rev()).chain(live_mark.iter().map(|bytes| &bytes[..]));
+        (told.flatten().copied().collect(), live)
     }
 
     /// The history, and a receiver for everything after it, with no gap and no overlap.
@@ -193,7 +237,7 @@ impl Shared {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
         let hello = ToScreen::Hello(Hello { screen, ..history.hello.clone() });
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
-        let past = hello.iter().chain(&history.checklist).chain(&history.kept).cloned().collect();
+        let past = hello.iter().chain(&history.checklist).cloned().chain(history.kept()).collect();
         (past, self.news.subscribe())
     }
 }
@@ -298,4 +342,52 @@ pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
     let mut bytes = vec![0; length(prefix).ok()?];
     read.read_exact(&mut bytes).await.ok()?;
     Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(number: u32) -> Vec<u8> {
+        let content = [&number.to_le_bytes()[..], &vec![7; 16 + number as usize % 300]].concat();
+        [&(content.len() as u32).to_le_bytes()[..], &content].concat()
+    }
+
+    fn numbers(mut bytes: &[u8]) -> Vec<u32> {
+        let mut numbers = Vec::new();
+        while let Some((prefix, rest)) = bytes.split_first_chunk() {
+            let length = length(*prefix).unwrap();
+            numbers.push(u32::from_le_bytes(*rest.first_chunk().unwrap()));
+            bytes = &rest[length..];
+        }
+        numbers
+    }
+
+    #[test]
+    fn the_history_keeps_the_latest_messages_whole_and_is_bounded() {
+        let mut history = History::new(Hello::default());
+        for number in 0..200_000 {
+            history.keep(&message(number));
+            assert!(history.bytes <= HISTORY_BYTES_MAX);
+        }
+        let kept: Vec<u8> = history.kept().flat_map(|block| block.to_vec()).collect();
+        assert_eq!(kept.len(), history.bytes);
+        let numbers = numbers(&kept);
+        assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1) && numbers.last() == Some(&199_999));
+        assert!(kept.len() > HISTORY_BYTES_MAX - 2 * BLOCK_BYTES, "no more than a block is given up at once");
+        assert!(history.blocks.len() <= HISTORY_BYTES_MAX / (BLOCK_BYTES - 400) + 1);
+    }
+
+    #[test]
+    fn a_watcher_gets_the_end_of_the_past_in_whole_messages() {
+        let all: Vec<u8> = (0..100).flat_map(message).collect();
+        for most in [0, 1, 400, 1_000, all.len() - 1, all.len(), all.len() + 1] {
+            let end = end_of(&all, most);
+            assert!(end.len() <= most && all.ends_with(end));
+            let numbers = numbers(end);
+            assert!(numbers.last().is_none_or(|last| *last == 99));
+            let more = numbers.first().map_or(99, |first| first.saturating_sub(1));
+            assert!(end.len() == all.len() || end.len() + message(more).len() > most, "no less than fits");
+        }
+    }
 }
