@@ -14,7 +14,7 @@ use crate::model::seat::Seat;
 use crate::model::{AutoStep, Model};
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
-const ABORT_REPORTED_EVERY: u32 = 20;
+const ABORT_REPORTED_EVERY: u32 = 100;
 
 /// Sends a command to the vehicle and starts to follow it.
 pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {

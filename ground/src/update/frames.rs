@@ -33,6 +33,10 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
         on_own_address(model, frame, now);
     } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
+        // After what the frame says: it may show that the abort is latched.
+        if model.commands.sender.on_heard(now) {
+            commands::poll(model, now);
+        }
     } else if frame.message_id() == HEARTBEAT_ID {
         note_stranger(model, frame.source(), now);
     }
@@ -60,9 +64,6 @@ fn note_stranger(model: &mut Model, source: Address, now: Duration) {
 
 fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.heard_at = Some(now);
-    if model.commands.sender.on_heard(now) {
-        commands::poll(model, now);
-    }
     if let Some(answer) = CommandAnswer::from_frame(frame) {
         if model.settings.us.accepts(answer.target) {
             commands::on_answer(model, answer, now);

@@ -180,18 +180,20 @@ impl CommandSender {
     }
 
     /// Notes that something was heard from the target. After a silence an abort that is not accepted yet is due at once: an
-    /// outage may be over, and the next one may begin soon. Returns whether something is due.
+    /// outage may be over, and the next one may begin soon. Returns whether that is so.
     pub fn on_heard(&mut self, now: Duration) -> bool {
         let heard_at = self.heard_at.replace(now);
+        let mut due = false;
         if heard_at.is_none_or(|at| now.saturating_sub(at) >= SILENCE) {
             for pending in &mut self.pending {
                 let urgent = pending.resend == Resend::UntilWithdrawn && !pending.is_accepted();
                 if urgent && pending.attempts > 0 {
                     pending.due_at = pending.due_at.min(now.max(pending.sent_at + URGENT_INTERVAL / 2));
+                    due |= pending.due_at <= now;
                 }
             }
         }
-        self.due_at().is_some_and(|at| at <= now)
+        due
     }
 
     /// Returns when [`CommandSender::poll`] has something to do next; `None` while no command is pending.
