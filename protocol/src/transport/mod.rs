@@ -137,3 +137,77 @@ impl Transport {
         self.sender.clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::net::SocketAddr;
+
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::net::{TcpStream, UdpSocket};
+
+    use super::*;
+
+    /// The next sender of which bytes arrive, believed as its owner does with an accepted frame.
+    async fn next_origin(link: &mut Transport) -> Origin {
+        loop {
+            let origin = match link.receive().await.unwrap() {
+                Received::Datagram { from, .. } => Origin::Datagram(from),
+                Received::Stream(id, _) => Origin::Stream(id),
+                _ => continue,
+            };
+            link.sender().believe(origin);
+            return origin;
+        }
+    }
+
+    fn run(test: impl Future<Output = ()>) {
+        tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(test);
+    }
+
+    #[test]
+    fn on_udp_bytes_for_one_sender_reach_that_one_alone() {
+        run(async {
+            let mut link = Transport::open(LinkAddress::UdpIn("127.0.0.1:0".to_owned())).await.unwrap();
+            let LinkAddress::UdpIn(address) = link.address().clone() else { unreachable!() };
+            let (mut clients, mut origins) = (Vec::new(), Vec::new());
+            for _ in 0..2 {
+                let client = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+                client.send_to(b"here", &address).await.unwrap();
+                origins.push(next_origin(&mut link).await);
+                // The link has taken the notice once it names the new peer.
+                while !matches!(link.receive().await, Some(Received::Up(_))) {}
+                clients.push(client);
+            }
+            link.sender().send_to(b"one".to_vec(), Some(origins[1]));
+            link.sender().send(b"all".to_vec());
+            let mut first = [[0; 3]; 2];
+            for (client, bytes) in clients.iter().zip(&mut first) {
+                client.recv(bytes).await.unwrap();
+            }
+            assert_eq!(first, [*b"all", *b"one"]);
+        });
+    }
+
+    #[test]
+    fn on_tcp_bytes_for_one_sender_reach_that_one_alone() {
+        run(async {
+            let mut link = Transport::open(LinkAddress::TcpIn("127.0.0.1:0".to_owned())).await.unwrap();
+            let LinkAddress::TcpIn(address) = link.address().clone() else { unreachable!() };
+            let address: SocketAddr = address.parse().unwrap();
+            let (mut clients, mut origins) = (Vec::new(), Vec::new());
+            for _ in 0..2 {
+                let mut client = TcpStream::connect(address).await.unwrap();
+                client.write_all(b"here").await.unwrap();
+                origins.push(next_origin(&mut link).await);
+                clients.push(client);
+            }
+            link.sender().send_to(b"one".to_vec(), Some(origins[1]));
+            link.sender().send(b"all".to_vec());
+            let mut first = [[0; 3]; 2];
+            for (client, bytes) in clients.iter_mut().zip(&mut first) {
+                client.read_exact(bytes).await.unwrap();
+            }
+            assert_eq!(first, [*b"all", *b"one"]);
+        });
+    }
+}
