@@ -1,5 +1,5 @@
 //! No page shows a command that its program would refuse: every line of ours in a block of code is given to the program,
-//! with `--help` at its end, so that it is read and not run.
+//! with `--help` at its end, so that it is read and not run. And a figure that stands on two pages is the same on both.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -127,4 +127,125 @@ fn every_help_has_an_example_that_its_program_understands() {
         }
     }
     assert!(helps > 35, "only {helps} commands were found");
+}
+
+/// The text of a page at the root of the workspace.
+fn page(name: &str) -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)).expect(name)
+}
+
+/// The same without line breaks.
+fn prose(name: &str) -> String {
+    page(name).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// How often a mission landed.
+#[derive(Debug)]
+struct Rate {
+    mission: String,
+    dispersion: String,
+    flights: u32,
+    legs: u32,
+    strict: u32,
+}
+
+fn rates() -> Vec<Rate> {
+    let text = page("onboard-sim/campaign/landing_rates.csv");
+    let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+    rows.map(|row| {
+        let cells: Vec<&str> = row.split(',').collect();
+        let [mission, dispersion, _seed, flights, legs, strict, _commit] = cells[..] else { panic!("{row}") };
+        let count = |cell: &str| cell.parse().unwrap_or_else(|_| panic!("{row}"));
+        let (flights, legs, strict) = (count(flights), count(legs), count(strict));
+        Rate { mission: mission.to_owned(), dispersion: dispersion.to_owned(), flights, legs, strict }
+    })
+    .collect()
+}
+
+fn rate(mission: &str, dispersion: &str) -> Rate {
+    let found = rates().into_iter().find(|rate| rate.mission == mission && rate.dispersion == dispersion);
+    found.unwrap_or_else(|| panic!("no rate of {mission} in {dispersion}"))
+}
+
+fn percent(count: u32, of: u32) -> String {
+    format!("{:.1} %", 100.0 * f64::from(count) / f64::from(of))
+}
+
+/// Wilson's 95 % interval, as in `88.3 to 92.0`.
+fn interval(count: u32, of: u32) -> String {
+    let (share, n, z) = (f64::from(count) / f64::from(of), f64::from(of), 1.959_964_f64);
+    let middle = share + z * z / (2.0 * n);
+    let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
+    let end = |value: f64| 100.0 * value / (1.0 + z * z / n);
+    format!("{:.1} to {:.1}", end(middle - half), end(middle + half))
+}
+
+/// The cells of the row of a table whose first cell begins with this.
+fn cells(page: &str, first: &str) -> Vec<String> {
+    let begins = format!("| {first}");
+    let row = page.lines().find(|line| line.starts_with(&begins)).unwrap_or_else(|| panic!("no row {first}"));
+    row.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+}
+
+#[test]
+fn the_landing_rates_on_the_pages_are_the_measured_ones() {
+    let (readme, mk3) = (page("README.md"), page("MK3.md"));
+    for rate in rates().iter().filter(|rate| matches!(rate.dispersion.as_str(), "field" | "real")) {
+        let of = if rate.flights == 1_000 { "1,000".to_owned() } else { rate.flights.to_string() };
+        let row = cells(&readme, &format!("`{}` |", rate.mission));
+        let column = if rate.dispersion == "field" { 2 } else { 3 };
+        assert_eq!(row[column], format!("{}, {} of {of}", rate.legs, rate.strict), "README.md: {rate:?}");
+    }
+    for dispersion in ["field", "real", "harsh", "real-harsh"] {
+        let row = cells(&mk3, &format!("`{dispersion}` |"));
+        let [mk2, mk3] = ["mk2", "mk3"].map(|mission| rate(mission, dispersion));
+        for (cell, count, of) in [
+            (&row[1], mk2.legs, mk2.flights),
+            (&row[2], mk3.legs, mk3.flights),
+            (&row[3], mk2.strict, mk2.flights),
+            (&row[4], mk3.strict, mk3.flights),
+        ] {
+            let alone = percent(count, of);
+            let expected = [alone.clone(), format!("{alone} ({})", interval(count, of))];
+            assert!(expected.contains(cell), "MK3.md {dispersion}: {cell}, not {expected:?}");
+        }
+    }
+}
+
+/// Every figure of a sentence about rates in the text of a page.
+#[test]
+fn what_the_pages_say_of_landing_rates_agrees_with_the_measured_ones() {
+    let [field, real, harsh, real_harsh] =
+        ["field", "real", "harsh", "real-harsh"].map(|dispersion| rate("mk2", dispersion));
+    let readme = prose("README.md");
+    for words in [
+        format!("`field` {} %, `real` {} %", interval(field.legs, 1_000), interval(real.legs, 1_000)),
+        format!("`harsh` {} of {}", harsh.legs, harsh.flights),
+        format!("`real-harsh` {} of {}", real_harsh.legs, real_harsh.flights),
+    ] {
+        assert!(readme.contains(&words), "README.md does not say: {words}");
+    }
+    // What other errors are worth is measured on MK3.md's flights.
+    let study = |first: &str| -> u32 {
+        let cell = cells(&page("MK3.md"), first).swap_remove(1);
+        let count = cell.split(':').next().and_then(|count| count.parse().ok());
+        count.unwrap_or_else(|| panic!("{first}: {cell}"))
+    };
+    let (known, as_real) = (study("both |"), study("as in `real` |"));
+    assert!(readme.contains(&format!("{known} of 300 `real` flights instead of {as_real}")));
+    let exact = study("errors of the sensors beyond those of `field`");
+    let mk3 = page("MK3.md");
+    let nothing = mk3.lines().find_map(|line| line.strip_prefix("| nothing | ")?.split_once(':'));
+    let (nothing, _) = nothing.expect("the same flights with every error");
+    assert!(readme.contains(&format!("exact sensors ({exact} instead of {nothing})")));
+    let safety = prose("SAFETY.md");
+    let said: Vec<&str> =
+        safety.split(". ").filter(|sentence| sentence.contains("landing rate of")).collect();
+    assert!(!said.is_empty(), "SAFETY.md gives no landing rate");
+    for sentence in said {
+        for figure in [percent(field.legs, field.flights), percent(real.legs, real.flights)] {
+            assert!(sentence.contains(&figure), "SAFETY.md: {figure} is missing in: {sentence}");
+        }
+        assert_eq!(sentence.matches(" %").count(), 2, "another figure in: {sentence}");
+    }
 }

@@ -1,23 +1,29 @@
 //! Every page at three sizes and in every theme: nothing is cut, every letter can be read, colour says nothing alone.
 //!
 //! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground --test ground pictures`
-//! also writes those that the README shows, to `ground/pictures`.
+//! also writes those that README.md and CREW.md show, to `ground/pictures`, from the flight that is recorded there:
+//! `onboard-sim fly --profile mk2 --start pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and
+//! `ground --auto --connect udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
 
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::page::Page;
 use ground::model::seat::Seat;
+use ground::replay::recording::{RecordedEvent, Recording};
 use ground::update::Msg;
 use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
-use protocol::dialect::{TdBooster, TdCheck, TdChute, TdLimit, TdPhase};
+use protocol::dialect::{
+    MavMessage, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdBooster, TdCheck, TdChute, TdLimit, TdPhase,
+};
 use ratatui::buffer::Buffer;
 use ratatui::style::Modifier;
 
-use crate::rig::Rig;
 use crate::rig::svg::{colours, picture, rgb};
+use crate::rig::{Rig, settings};
 use crate::screens::{armed, counting, on_the_pad};
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (140, 45), (200, 60)];
@@ -302,17 +308,73 @@ fn the_headline_shows_no_old_height() {
     }
 }
 
-/// The pictures of the README are what the screen shows.
+/// A moment of the recorded flight: a station that has heard everything up to it, and the vehicle's last words.
+struct Moment {
+    rig: Rig,
+    phase: TdPhase,
+    status: TD_FLIGHT_STATUS_DATA,
+    /// Metres above the pad.
+    height_m: f64,
+}
+
+/// Plays the flight until this holds; `None` plays it to its end.
+fn recorded(until: Option<fn(&Moment) -> bool>) -> Moment {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/flight.tlog");
+    let recording = Recording::load(&path, None, &mut |_| {}).expect("the recorded flight");
+    let mut reader = recording.reader().expect("the recorded flight");
+    let mut rig = Rig::new(settings(false, true));
+    rig.speaks = false;
+    let status = TD_FLIGHT_STATUS_DATA::default();
+    let mut moment = Moment { rig, phase: TdPhase::TD_PHASE_SAFE, status, height_m: f64::INFINITY };
+    while let Some((at, event)) = reader.next_event().expect("the recorded flight") {
+        let rig = &mut moment.rig;
+        while rig.now + Duration::from_millis(100) <= at {
+            rig.run(0.1);
+        }
+        match event {
+            RecordedEvent::Commanded(kind) => rig.msg(Msg::Commanded(kind)),
+            RecordedEvent::Sent(_) => {}
+            RecordedEvent::Heard(frame) => {
+                match frame.decode().expect("a message of the vehicle") {
+                    MavMessage::TD_FLIGHT_STATUS(status) => {
+                        (moment.phase, moment.status) = (status.phase, status);
+                    }
+                    MavMessage::LOCAL_POSITION_NED(place) => moment.height_m = -f64::from(place.z),
+                    _ => {}
+                }
+                moment.rig.msg(Msg::Frame(frame));
+            }
+        }
+        if until.is_some_and(|holds| holds(&moment)) {
+            break;
+        }
+    }
+    moment
+}
+
+/// The pictures of README.md and CREW.md: on the pad, in the descent, and after the landing.
+fn moments() -> [(&'static str, Palette, Moment); 3] {
+    let ready = |moment: &Moment| {
+        let phase = moment.phase == TdPhase::TD_PHASE_PAD_IDLE;
+        phase
+            && moment.status.checks_failed.is_empty()
+            && moment.rig.model.link.uplink.is_proven(moment.rig.now)
+    };
+    let falls = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_AERO_DESCENT && moment.height_m < 220.0;
+    [
+        ("pad-light", Palette::Light, recorded(Some(ready))),
+        ("descent-dark", Palette::Dark, recorded(Some(falls))),
+        ("landed-contrast", Palette::Contrast, recorded(None)),
+    ]
+}
+
+/// The pictures on the pages are what the screen shows at three moments of one recorded flight.
 #[test]
-fn regress_the_pictures_of_the_readme() {
+fn regress_the_pictures_of_the_pages() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures");
-    let pictures = [
-        ("pad-light", no_go(), Palette::Light),
-        ("descent-dark", flying(TdPhase::TD_PHASE_AERO_DESCENT), Palette::Dark),
-        ("landed-contrast", flying(TdPhase::TD_PHASE_TOUCHDOWN), Palette::Contrast),
-    ];
-    for (name, rig, palette) in pictures {
-        let (path, svg) = (folder.join(format!("{name}.svg")), picture(&drawn(&rig, SIZES[0], palette)));
+    for (name, palette, moment) in moments() {
+        let (path, svg) =
+            (folder.join(format!("{name}.svg")), picture(&drawn(&moment.rig, SIZES[0], palette)));
         if std::env::var_os("UPDATE_PICTURES").is_some() {
             fs::create_dir_all(&folder).unwrap();
             fs::write(&path, &svg).unwrap();
@@ -320,6 +382,29 @@ fn regress_the_pictures_of_the_readme() {
         let kept = fs::read_to_string(&path).unwrap_or_default();
         assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
         assert!(svg.len() < 30_000, "{name}: {} bytes", svg.len());
+    }
+}
+
+/// What the pictures say of phase, abort and height is what the vehicle sent at that moment.
+#[test]
+fn the_pictures_of_the_pages_say_what_the_vehicle_sent() {
+    for (name, palette, moment) in moments() {
+        let screen = rows(&drawn(&moment.rig, SIZES[0], palette)).join("\n");
+        let phase = format!("{:?}", moment.phase);
+        assert!(screen.contains(phase.trim_start_matches("TD_PHASE_")), "{name}: {phase}\n{screen}");
+        let (effect, words) = match name {
+            "pad-light" => (TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD, "disarm and inhibit on the pad"),
+            "descent-dark" => {
+                (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, "parachute NOW, landing motor inhibited")
+            }
+            _ => (TdAbortEffect::TD_ABORT_EFFECT_NONE, "nothing is left to abort"),
+        };
+        assert_eq!(moment.status.abort_effect, effect, "{name}");
+        assert!(screen.contains(&format!("abort now: {words}")), "{name}\n{screen}");
+        let shown = moment.rig.model.vehicle.height_m().expect("a height").value;
+        assert!((shown - moment.height_m).abs() < 2.0, "{name}: {shown} m, sent {} m", moment.height_m);
+        let armed = screen.contains(" ARMED ");
+        assert_eq!(armed, name == "descent-dark", "{name}\n{screen}");
     }
 }
 
