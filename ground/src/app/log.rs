@@ -1,6 +1,7 @@
 //! Opens the log and makes sure that it is finished whatever happens.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::log::recorder::{Recorder, RecorderError};
@@ -9,6 +10,7 @@ use time::OffsetDateTime;
 use time::macros::format_description;
 
 use crate::cli::LogChoice;
+use crate::model::station_log::LogSpace;
 
 /// How many logs may start in the same second.
 const SAME_SECOND_MAX: u32 = 100;
@@ -64,6 +66,38 @@ fn open_named_by_time(
     anyhow::bail!(
         "touchdown-{stamp}.mcap and {SAME_SECOND_MAX} others exist already; name the log with --log"
     )
+}
+
+/// How often the space is looked at; the rate is a mean over this time.
+const LOOKS_EVERY: Duration = Duration::from_secs(5);
+
+/// Watches the space that is left for the log, and how fast it grows.
+#[derive(Debug, Default)]
+pub struct SpaceWatch {
+    due: Duration,
+    /// When the files had how many bytes.
+    last: Option<(Duration, u64)>,
+    space: Option<LogSpace>,
+}
+
+impl SpaceWatch {
+    /// The space as it was last looked at; `None` where the system does not tell it.
+    pub fn look(&mut self, recorder: &Recorder, now: Duration) -> Option<LogSpace> {
+        if now < self.due {
+            return self.space;
+        }
+        self.due = now + LOOKS_EVERY;
+        let folder = recorder.path().parent().filter(|folder| !folder.as_os_str().is_empty());
+        let size = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
+        let bytes = size(recorder.path()) + recorder.tlog_path().map_or(0, size);
+        let last = self.last.replace((now, bytes));
+        let grows_bytes_s = last.map_or(0.0, |(at, before)| {
+            bytes.saturating_sub(before) as f64 / now.saturating_sub(at).as_secs_f64().max(1.0)
+        });
+        let free = fs4::available_space(folder.unwrap_or(Path::new("."))).ok();
+        self.space = free.map(|free_bytes| LogSpace { free_bytes, grows_bytes_s: grows_bytes_s as u32 });
+        self.space
+    }
 }
 
 /// Finishes the log when it goes out of scope, also while a panic unwinds.

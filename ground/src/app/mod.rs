@@ -228,6 +228,7 @@ async fn start(
         clock,
         log_time,
         recorder,
+        log_space: log::SpaceWatch::default(),
         demo,
         output,
         socket: cli.socket.clone(),

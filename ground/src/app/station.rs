@@ -17,6 +17,7 @@ use super::checklist::SignatureFile;
 use super::clock::{Clock, LogTime};
 use super::download::{Downloading, Word};
 use super::lines::Lines;
+use super::log::SpaceWatch;
 use super::output::Output;
 use super::server::{Server, ServerEvent, hello};
 use super::signals::Signals;
@@ -44,6 +45,7 @@ pub(super) struct Station {
     pub(super) clock: Clock,
     pub(super) log_time: LogTime,
     pub(super) recorder: Option<Recorder>,
+    pub(super) log_space: SpaceWatch,
     pub(super) demo: Option<Demo>,
     pub(super) output: Output,
     /// The socket path that was given, if any.
@@ -211,6 +213,7 @@ impl Station {
             ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Download)) => vec![Msg::DownloadWanted],
             ServerEvent::FromScreen(by, ToStation::Request(Request::RangeTest)) => vec![Msg::RangeTest(by)],
+            ServerEvent::FromScreen(by, ToStation::Request(Request::WithoutLog)) => vec![Msg::WithoutLog(by)],
             ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
                 vec![Msg::ParametersWanted]
             }
@@ -261,6 +264,7 @@ impl Station {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
             failed: !recorder.is_running(),
+            space: self.log_space.look(recorder, self.clock.now()),
         });
         let health = (health != model.log).then_some(Msg::Log(health));
         let book = self.sign_book(false);
@@ -333,6 +337,7 @@ impl Station {
                     let msg = match request {
                         Request::Command(kind) => Some(Msg::Requested { kind, by }),
                         Request::RangeTest => Some(Msg::RangeTest(by)),
+                        Request::WithoutLog => Some(Msg::WithoutLog(by)),
                         _ => None,
                     };
                     if let Some((server, msg)) = self.server.as_mut().zip(msg) {

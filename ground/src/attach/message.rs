@@ -4,7 +4,7 @@ use crate::model::action::Request;
 use crate::update::Msg;
 
 /// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 8;
+pub const VERSION: u32 = 9;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 

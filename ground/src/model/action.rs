@@ -24,6 +24,8 @@ pub enum Request {
     Download,
     /// Begin the radio range test.
     RangeTest,
+    /// Arm and start although the station's log is unfit.
+    WithoutLog,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
 }

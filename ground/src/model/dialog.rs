@@ -14,6 +14,8 @@ pub const START_TIME_LIMIT: Duration = Duration::from_secs(10);
 pub const START_WORD: &str = "START";
 /// The word that confirms what another operator asks.
 pub const CONFIRM_WORD: &str = "CONFIRM";
+/// The word that arms and starts although the station's log is unfit.
+pub const WITHOUT_LOG_WORD: &str = "NOLOG";
 /// The word that takes command.
 pub const TAKE_WORD: &str = "TAKE";
 /// The word that aborts a vehicle with another autopilot.
@@ -54,6 +56,11 @@ pub enum Dialog {
     Confirm {
         /// The ask: that one and no other is confirmed.
         ask: Ask,
+        typed: String,
+        until: Duration,
+    },
+    /// The word that goes on without the station's log is typed.
+    WithoutLog {
         typed: String,
         until: Duration,
     },
@@ -118,6 +125,10 @@ impl Dialog {
         Self::TakeCommand { typed: String::new(), until: now + ARM_TIME_LIMIT }
     }
 
+    pub fn without_log(now: Duration) -> Self {
+        Self::WithoutLog { typed: String::new(), until: now + ARM_TIME_LIMIT }
+    }
+
     pub fn hold(now: Duration) -> Self {
         Self::Hold { until: now + CONFIRM_TIME_LIMIT }
     }
@@ -160,6 +171,7 @@ impl Dialog {
             Self::Arm { until, .. }
             | Self::Start { until, .. }
             | Self::Confirm { until, .. }
+            | Self::WithoutLog { until, .. }
             | Self::TakeCommand { until, .. }
             | Self::AbortForeign { until, .. }
             | Self::Disarm { until }
@@ -178,6 +190,7 @@ impl Dialog {
             Self::Arm { .. } => "arming",
             Self::Start { .. } => "start",
             Self::Confirm { .. } => "confirmation",
+            Self::WithoutLog { .. } => "going on without a log",
             Self::TakeCommand { .. } => "take-over",
             Self::AbortForeign { .. } => "abort",
             Self::Disarm { .. } => "disarm",
@@ -200,6 +213,7 @@ impl Dialog {
             | Self::Sign { .. }
             | Self::Again { .. } => None,
             Self::Confirm { .. } => Some(CONFIRM_WORD),
+            Self::WithoutLog { .. } => Some(WITHOUT_LOG_WORD),
             Self::TakeCommand { .. } => Some(TAKE_WORD),
             Self::AbortForeign { .. } => Some(ABORT_WORD),
             Self::Arm { .. } => Some(ARM_WORD),
@@ -223,6 +237,7 @@ impl Dialog {
             Self::Arm { typed, .. }
             | Self::Start { typed, .. }
             | Self::Confirm { typed, .. }
+            | Self::WithoutLog { typed, .. }
             | Self::TakeCommand { typed, .. }
             | Self::AbortForeign { typed, .. }
             | Self::Quit { typed, .. } => typed,
@@ -236,6 +251,7 @@ impl Dialog {
         let (Self::Arm { typed, .. }
         | Self::Start { typed, .. }
         | Self::Confirm { typed, .. }
+        | Self::WithoutLog { typed, .. }
         | Self::TakeCommand { typed, .. }
         | Self::AbortForeign { typed, .. }
         | Self::Quit { typed, .. }) = self

@@ -40,6 +40,7 @@ pub mod quantity;
 pub mod range_test;
 pub mod recall;
 pub mod seat;
+pub mod station_log;
 pub mod telemetry;
 pub mod touchdown;
 pub mod trace;
@@ -83,6 +84,8 @@ use place::{Degrees, LastPlace};
 use range_test::RangeTest;
 use recall::{LookBack, Recall};
 use seat::Seat;
+use station_log::LogFault;
+pub use station_log::LogHealth;
 use two_person::KeyOwner;
 use vehicle::Vehicle;
 
@@ -203,14 +206,6 @@ pub struct Playback {
     pub phases: Arc<[(TdPhase, Duration)]>,
 }
 
-/// The state of the log writer.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct LogHealth {
-    /// Records dropped because the queue was full.
-    pub dropped: u64,
-    pub failed: bool,
-}
-
 /// When each periodic action is next due.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
@@ -240,6 +235,10 @@ pub struct Model {
     pub outcome: FlightSoFar,
     /// The state of the log writer.
     pub log: LogHealth,
+    /// When it last lost records.
+    pub(crate) log_loses_at: Option<Duration>,
+    /// The crew goes on although its log has this fault.
+    pub(crate) without_log: Option<LogFault>,
     pub alarms: Alarms,
     pub pages: Pages,
     pub history: History,
@@ -299,6 +298,8 @@ impl Model {
             events: Events::default(),
             outcome: FlightSoFar::default(),
             log: LogHealth::default(),
+            log_loses_at: None,
+            without_log: None,
             alarms,
             pages: Pages::default(),
             history: History::default(),

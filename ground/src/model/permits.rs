@@ -73,7 +73,13 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());
     };
-    (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase)))
+    // Last: it is the only reason that the crew can overrule.
+    if is_on_pad(phase) { model.why_no_log(now) } else { Some(format!("phase {}", words::phase(phase))) }
+}
+
+/// Whether this reason is that the station's log is unfit, so that the crew may go on without it.
+pub fn is_only_the_log(model: &Model, why: &str, now: Duration) -> bool {
+    model.why_no_log(now).as_deref() == Some(why)
 }
 
 /// Why the ground does not command to start the countdown.
@@ -93,7 +99,10 @@ pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
         return Some("the phase is unknown".to_owned());
     };
-    (phase != TdPhase::TD_PHASE_PAD_ARMED).then(|| format!("phase {}", words::phase(phase)))
+    if phase != TdPhase::TD_PHASE_PAD_ARMED {
+        return Some(format!("phase {}", words::phase(phase)));
+    }
+    model.why_no_log(now)
 }
 
 /// Why the ground does not confirm this ask.

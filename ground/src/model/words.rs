@@ -55,10 +55,15 @@ fn impact(speed_m_s: u8) -> String {
     format!("IMPACT{speed}, too low for a chute")
 }
 
+/// The name of an arming check. The vehicle's log is named as such, because the station has one of its own.
+pub fn check(name: &str) -> String {
+    let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+    if words.starts_with("log") { format!("vehicle {words}") } else { words }
+}
+
 /// The names of the failing checks.
 pub fn failed_checks(checks: TdCheck) -> Vec<String> {
-    let words = |name: &str| name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
-    checks.iter_names().map(|(name, _)| words(name)).collect()
+    checks.iter_names().map(|(name, _)| check(name)).collect()
 }
 
 #[cfg(test)]
@@ -97,7 +102,7 @@ mod tests {
     #[test]
     fn failing_checks_are_named() {
         let failing = TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_LOG_SPACE;
-        assert_eq!(failed_checks(failing), ["pin", "log space"]);
+        assert_eq!(failed_checks(failing), ["pin", "vehicle log space"]);
         assert!(failed_checks(TdCheck::empty()).is_empty());
     }
 }

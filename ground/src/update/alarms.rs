@@ -16,6 +16,7 @@ use crate::model::events::Speaker;
 use crate::model::link_state::{LinkState, RED_AFTER};
 use crate::model::motor::{Danger, KeepAway, hold_words};
 use crate::model::pad_check::PadCheck;
+use crate::model::station_log::LogStanding;
 use crate::model::{Model, Role, latch, unheard};
 
 /// An abort without an answer raises an alarm after this time.
@@ -90,10 +91,8 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let text = "ABORT NOT SENT: no station; the next one sends it, Esc cancels it".to_owned();
         found.push((AlarmKind::Unanswered(CommandKind::Abort), text));
     }
-    if model.log.failed {
-        found.push((AlarmKind::Log, "LOG FAILED: nothing more is recorded".to_owned()));
-    } else if model.log.dropped > 0 {
-        found.push((AlarmKind::Log, "LOG cannot keep up: records are lost".to_owned()));
+    if let LogStanding::Unfit(_, words) | LogStanding::Warned(words) = model.station_log(now) {
+        found.push((AlarmKind::Log, format!("STATION LOG {words}")));
     }
 }
 

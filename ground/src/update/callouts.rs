@@ -123,10 +123,15 @@ fn readiness(model: &mut Model, now: Duration) {
     let status = model.vehicle.status.as_ref().filter(|status| !status.is_stale(now));
     let Some(status) = status.filter(|status| is_on_pad(status.value.phase)) else { return };
     let failing = words::failed_checks(status.value.checks_failed);
-    let go = failing.is_empty() && model.link.uplink.is_proven(now);
+    let no_log = model.why_no_log(now);
+    let go = failing.is_empty() && no_log.is_none() && model.link.uplink.is_proven(now);
     let Some(before) = model.called.go.replace(go).filter(|before| *before != go) else { return };
     if before {
-        let why = if failing.is_empty() { "uplink".to_owned() } else { failing.join(", ") };
+        let why = match no_log {
+            _ if !failing.is_empty() => failing.join(", "),
+            Some(_) => "station log".to_owned(),
+            None => "uplink".to_owned(),
+        };
         call(model, Amount::Few, format!("no go: {why}"), WRONG);
     } else {
         call(model, Amount::Normal, "go", 0);

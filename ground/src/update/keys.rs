@@ -24,11 +24,12 @@ use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
 use crate::model::pad_check::{Standing, standing};
 use crate::model::page::Page;
 use crate::model::permits::{
-    why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take,
-    why_nothing_moves,
+    is_only_the_log, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat, why_not_start,
+    why_not_take, why_nothing_moves,
 };
 use crate::model::recall::{LOOKS_FOR, LookBack};
 use crate::model::seat::Seat;
+use crate::model::station_log::LogStanding;
 use crate::model::{Model, Role, quantity};
 
 /// How many lines PgUp and PgDn scroll.
@@ -208,6 +209,7 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
             None => ask(model, CommandKind::ConfirmArm, now),
             Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
         },
+        Dialog::WithoutLog { .. } => ask_without_log(model, now),
         Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
         Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
         Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
@@ -307,10 +309,12 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
         Act::Arm => match why_not_arm(model, now) {
             None => model.dialog = Dialog::arm(now),
+            Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
             Some(why) => refuse(model, &words(model, ARM_WORD), format!("cannot arm: {why}"), now),
         },
         Act::Start => match why_not_start(model, now) {
             None => model.dialog = Dialog::start(now),
+            Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
             Some(why) => refuse(model, &words(model, START_WORD), format!("cannot start: {why}"), now),
         },
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
@@ -394,6 +398,7 @@ fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     match why_not_confirm(model, &ask, now) {
         None => model.dialog = Dialog::confirm(ask, now),
+        Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
         Some(why) => refuse(model, &[CONFIRM_WORD], format!("cannot confirm: {why}"), now),
     }
     true
@@ -457,6 +462,31 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
         }
         Role::Watching | Role::Replaying => {}
     }
+}
+
+/// Goes on without the station's log, or asks the station to.
+fn ask_without_log(model: &mut Model, now: Duration) {
+    if model.settings.role == Role::Attached {
+        return model.outbox.push(Action::Request(Request::WithoutLog));
+    }
+    model.outbox.push(Action::Tell(Request::WithoutLog));
+    without_log(model, &model.settings.seat.clone(), now);
+}
+
+/// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
+/// log by the station's book, and on every screen.
+pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
+    let LogStanding::Unfit(fault, words) = model.station_log(now) else {
+        return model.info(now, "the station's log is fit: nothing to go on without");
+    };
+    if let Some(why) = why_not_seat(model, by) {
+        return model.warn(now, format!("not without a log: {why}"));
+    }
+    model.without_log = Some(fault);
+    let text =
+        format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
+    model.record_operator(now, "without log", by, &text);
+    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
 }
 
 /// Begins the radio range test, or asks the station to.

@@ -33,6 +33,7 @@ use crate::model::events::Speaker;
 use crate::model::link::LinkReport;
 use crate::model::place::LastPlace;
 use crate::model::seat::Seat;
+use crate::model::station_log::LogStanding;
 use crate::model::{LogHealth, Model, Role};
 
 pub use crate::model::action::{Action, Request};
@@ -50,6 +51,8 @@ pub enum Msg {
     Commanded(CommandKind),
     /// The operator on this screen has asked for the radio range test.
     RangeTest(Seat),
+    /// The crew goes on without the station's log.
+    WithoutLog(Seat),
     /// The crew has completed every step of this command on a screen of the station.
     Requested {
         kind: CommandKind,
@@ -140,6 +143,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
+        Msg::WithoutLog(by) => keys::without_log(model, &by, now),
         Msg::RangeTest(by) => pad_check::begin_range_test(model, by, now),
         Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
         Msg::Crew(seats) => {
@@ -256,5 +260,14 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     if health.dropped > 0 && model.log.dropped == 0 {
         model.warn(now, "the log cannot keep up: records are dropped");
     }
+    if health.dropped > model.log.dropped {
+        model.log_loses_at = Some(now);
+    }
     model.log = health;
+    // A word that was typed for another fault, or before the log was fit again, does not count.
+    let fault = match model.station_log(now) {
+        LogStanding::Unfit(fault, _) => Some(fault),
+        _ => None,
+    };
+    model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
 }

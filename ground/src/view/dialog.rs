@@ -12,7 +12,7 @@ use super::draw_lines;
 use super::theme::{TextRole, Theme};
 use crate::model::act::Act;
 use crate::model::dialog::{
-    ABORT_WORD, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD,
+    ABORT_WORD, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD, WITHOUT_LOG_WORD,
 };
 use crate::model::foreign::Foreign;
 use crate::model::pad_check::PadCheck;
@@ -79,6 +79,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 ],
             )
         }
+        Dialog::WithoutLog { typed, .. } => without_log(model, typed, left, theme, now),
         Dialog::Hold { .. } => (
             "HOLD the countdown",
             vec![
@@ -106,21 +107,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str
                 plain("Any other key cancels.".to_owned()),
             ],
         ),
-        Dialog::Quit { typed, .. } => {
-            let goes_on = match model.settings.role {
-                Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
-                Role::Station => "The station continues without a screen: `ground attach` shows it.",
-                _ => "The station continues; a countdown is held once nobody can command.",
-            };
-            (
-                "QUIT although armed or in flight",
-                vec![
-                    strong(format!("Type {QUIT_WORD} and Enter within {left:.0} s:  [{typed:<4}]")),
-                    plain(goes_on.to_owned()),
-                    plain("Quitting neither disarms nor aborts. Any other key cancels.".to_owned()),
-                ],
-            )
-        }
+        Dialog::Quit { typed, .. } => quit(model, typed, left, theme),
         Dialog::Again { of, .. } => again(of.name(), left, theme),
     };
     Some(dialog)
@@ -137,6 +124,45 @@ fn again(name: &str, left_s: f64, theme: Theme) -> (&'static str, Vec<Line<'stat
         plain("Any other key cancels. Nothing has been sent.".to_owned()),
     ];
     ("DID YOU TYPE THIS?", lines)
+}
+
+/// Who quits leaves the vehicle as it is.
+fn quit(model: &Model, typed: &str, left_s: f64, theme: Theme) -> (&'static str, Vec<Line<'static>>) {
+    let goes_on = match model.settings.role {
+        Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
+        Role::Station => "The station continues without a screen: `ground attach` shows it.",
+        _ => "The station continues; a countdown is held once nobody can command.",
+    };
+    let words = format!("Type {QUIT_WORD} and Enter within {left_s:.0} s:  [{typed:<4}]");
+    let lines = vec![
+        Line::styled(words, theme.style(TextRole::Caution)),
+        Line::styled(goes_on, theme.style(TextRole::Plain)),
+        Line::styled(
+            "Quitting neither disarms nor aborts. Any other key cancels.",
+            theme.style(TextRole::Plain),
+        ),
+    ];
+    ("QUIT although armed or in flight", lines)
+}
+
+/// What is wrong with the station's log, and what goes on without it.
+fn without_log(
+    model: &Model,
+    typed: &str,
+    left_s: f64,
+    theme: Theme,
+    now: Duration,
+) -> (&'static str, Vec<Line<'static>>) {
+    let why = model.why_no_log(now).unwrap_or_else(|| "It is fit again.".to_owned());
+    let words = format!("Type {WITHOUT_LOG_WORD} and Enter within {left_s:.0} s:  [{typed:<5}]");
+    let goes_on = "Then arm and start go on without a record, a book and a place.";
+    let lines = vec![
+        Line::styled(why, theme.style(TextRole::Alarm)),
+        Line::styled(words, theme.style(TextRole::Caution)),
+        Line::styled(goes_on, theme.style(TextRole::Plain)),
+        Line::styled(ANY_OTHER_KEY, theme.style(TextRole::Plain)),
+    ];
+    ("THE STATION'S LOG IS UNFIT", lines)
 }
 
 /// The step that is signed or voided, and who signs it.

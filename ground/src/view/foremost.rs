@@ -50,7 +50,7 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
         return word("ARMED", TextRole::Alarm);
     }
     let other_mission = why_other_mission(model).is_some() || why_nothing_moves(model, now).is_some();
-    let unsigned = model.why_checklist(now).is_some();
+    let unsigned = model.why_checklist(now).is_some() || model.why_no_log(now).is_some();
     if other_mission
         || unsigned
         || !status.value.checks_failed.is_empty()

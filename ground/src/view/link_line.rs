@@ -115,7 +115,7 @@ fn log(model: &Model, theme: Theme) -> Span<'static> {
     } else if model.settings.log_path.is_none() {
         ("  no log".to_owned(), TextRole::Caution)
     } else if model.log.failed {
-        ("  LOG FAILED".to_owned(), TextRole::Alarm)
+        ("  STATION LOG FAILED".to_owned(), TextRole::Alarm)
     } else if model.log.dropped > 0 {
         (format!("  log runs, {} DROPPED", model.log.dropped), TextRole::Caution)
     } else {

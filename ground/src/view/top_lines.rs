@@ -316,5 +316,8 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     if let Some(why) = model.why_checklist(now) {
         return Some((format!("NO-GO: {why}"), TextRole::Caution));
     }
+    if let Some(why) = model.why_no_log(now) {
+        return Some((format!("NO-GO: {why}"), TextRole::Caution));
+    }
     Some(("GO: every arming check passes".to_owned(), TextRole::Good))
 }

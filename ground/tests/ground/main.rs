@@ -28,6 +28,7 @@ mod radio;
 mod replay;
 mod rig;
 mod screens;
+mod station_log;
 mod terminal;
 mod two_person;
 mod uplink;

@@ -19,6 +19,7 @@ use crate::model::action::Request;
 use crate::model::alarm::AlarmKind;
 use crate::model::command::CommandKind;
 use crate::model::seat::Seat;
+use crate::model::station_log::LogSpace;
 use crate::place_file;
 use crate::update::Msg;
 pub use bytes::CodecError;
@@ -70,10 +71,15 @@ fn encode_msg(msg: &Msg, out: &mut Writer) -> Option<()> {
         Msg::Sent { bytes, drops } => drop(out.kind(5).u64(*bytes as u64).u64(*drops)),
         Msg::LinkUp(peer) => drop(out.kind(6).text(peer)),
         Msg::LinkDown(why) => drop(out.kind(7).text(why)),
-        Msg::Log(health) => drop(out.kind(8).u64(health.dropped).u8(u8::from(health.failed))),
+        Msg::Log(health) => {
+            out.kind(8).u64(health.dropped).u8(u8::from(health.failed)).u8(u8::from(health.space.is_some()));
+            let LogSpace { free_bytes, grows_bytes_s } = health.space.unwrap_or_default();
+            out.u64(free_bytes).u32(grows_bytes_s);
+        }
         Msg::Requested { kind, by } => {
             out.kind(9).u8(number_of(*kind)).u32(by.screen).text(&by.operator);
         }
+        Msg::WithoutLog(by) => drop(out.kind(27).u32(by.screen).text(&by.operator)),
         Msg::RangeTest(by) => drop(out.kind(25).u32(by.screen).text(&by.operator)),
         Msg::SimulatorEnded(why) => {
             out.kind(10).u8(u8::from(why.is_some())).text(why.as_deref().unwrap_or_default());
@@ -153,7 +159,11 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         5 => ToScreen::Msg(Msg::Sent { bytes: rest.size()?, drops: rest.u64()? }),
         6 => ToScreen::Msg(Msg::LinkUp(rest.text()?)),
         7 => ToScreen::Msg(Msg::LinkDown(rest.text()?)),
-        8 => ToScreen::Msg(Msg::Log(LogHealth { dropped: rest.u64()?, failed: rest.u8()? != 0 })),
+        8 => {
+            let (dropped, failed, is_known) = (rest.u64()?, rest.u8()? != 0, rest.u8()? != 0);
+            let space = LogSpace { free_bytes: rest.u64()?, grows_bytes_s: rest.u32()? };
+            ToScreen::Msg(Msg::Log(LogHealth { dropped, failed, space: is_known.then_some(space) }))
+        }
         9 => {
             let kind = kind_of(rest.u8()?)?;
             ToScreen::Msg(Msg::Requested { kind, by: seat(&mut rest)? })
@@ -189,6 +199,7 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
         }
         26 => ToScreen::Msg(Msg::SignRefused(rest.text()?)),
         25 => ToScreen::Msg(Msg::RangeTest(seat(&mut rest)?)),
+        27 => ToScreen::Msg(Msg::WithoutLog(seat(&mut rest)?)),
         22 => {
             let place = place_file::read(&rest.text()?).ok_or(CodecError("no place"))?;
             ToScreen::Msg(Msg::Place(Box::new(place)))
@@ -260,6 +271,7 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
         ToStation::Request(Request::Report) => out.kind(8),
         ToStation::Request(Request::Download) => out.kind(9),
         ToStation::Request(Request::RangeTest) => out.kind(10),
+        ToStation::Request(Request::WithoutLog) => out.kind(11),
         ToStation::Key(name) => out.kind(4).text(name),
         ToStation::Status => out.kind(5),
         ToStation::Stop { force, operator } => out.kind(6).u8(u8::from(*force)).text(operator),
@@ -289,6 +301,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         8 => ToStation::Request(Request::Report),
         9 => ToStation::Request(Request::Download),
         10 => ToStation::Request(Request::RangeTest),
+        11 => ToStation::Request(Request::WithoutLog),
         7 => ToStation::Request(Request::Sign { step: rest.u8()?, void: rest.u8()? != 0 }),
         _ => return Err(CodecError("an unknown kind of request")),
     };

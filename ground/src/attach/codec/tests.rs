@@ -11,6 +11,7 @@ use protocol::link_stats::{LinkFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 
 use crate::model::link::LinkReport;
+use crate::model::station_log::LogSpace;
 
 fn back(told: &ToScreen, now: Duration) -> (ToScreen, Duration) {
     let bytes = encode_to_screen(told, now).unwrap();
@@ -109,6 +110,7 @@ fn messages_to_a_station_survive_the_round_trip() {
         ToStation::Request(Request::Report),
         ToStation::Request(Request::Download),
         ToStation::Request(Request::RangeTest),
+        ToStation::Request(Request::WithoutLog),
         ToStation::Request(Request::Sign { step: 7, void: true }),
         ToStation::Key("Ctrl-X".to_owned()),
     ];
@@ -190,10 +192,14 @@ fn msg() -> impl Strategy<Value = Msg> {
         any::<String>().prop_map(Msg::LinkSays),
         any::<usize>().prop_map(Msg::HeardOver),
         (vec(link(), 0..4), option::of(signing())).prop_map(|(links, signing)| Msg::Links { links, signing }),
-        (any::<u64>(), any::<bool>()).prop_map(|(dropped, failed)| Msg::Log(LogHealth { dropped, failed })),
+        (any::<u64>(), any::<bool>(), any::<Option<(u64, u32)>>()).prop_map(|(dropped, failed, space)| {
+            let space = space.map(|(free_bytes, grows_bytes_s)| LogSpace { free_bytes, grows_bytes_s });
+            Msg::Log(LogHealth { dropped, failed, space })
+        }),
         (kind, seat()).prop_map(|(kind, by)| Msg::Requested { kind, by }),
         vec(seat(), 0..4).prop_map(Msg::Crew),
         seat().prop_map(Msg::RangeTest),
+        seat().prop_map(Msg::WithoutLog),
         Just(Msg::ScreenQuit),
         option::of(any::<String>()).prop_map(Msg::SimulatorEnded),
     ]

@@ -16,6 +16,11 @@ fn book(model: &Model) -> String {
     format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.kept)
 }
 
+/// The space that is left for the log, and how fast it grows.
+fn space(model: &Model) -> String {
+    model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words())
+}
+
 /// The state of the recording, its files and counts.
 pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let row = |label: &str, value: String, role: TextRole| {
@@ -42,6 +47,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
+        row("space", space(model), TextRole::Plain),
         row("running for", seconds(now), TextRole::Plain),
         row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),

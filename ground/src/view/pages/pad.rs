@@ -12,6 +12,7 @@ use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::command::CommandKind;
 use crate::model::permits::why_not_here;
+use crate::model::station_log::LogStanding;
 use crate::model::vehicle::{Vehicle, is_on_pad};
 use crate::model::{unheard, words};
 use crate::view::number::{STALE_MARK, fixed};
@@ -137,9 +138,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     };
     let mark = if status.is_stale(now) { STALE_MARK } else { " " };
     let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
-        let name = words::lower_case(&NameOf(name), "TD_CHECK_");
-        // The station has a log, too.
-        let name = if name.starts_with("log") { format!("vehicle {name}") } else { name };
+        let name = words::check(name);
         let found = found(&model.vehicle, bit);
         Line::from(vec![
             Span::styled(word, theme.style(TextRole::Alarm)),
@@ -150,16 +149,23 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
     let all = TdCheck::all();
+    let (station_log_fails, station_log) = station_log(model, theme, now);
     let mut lines: Vec<Line> = all
         .iter_names()
         .filter(|(_, bit)| fails(*bit))
         .map(|check| row(" NO ", check, failure(check.1)))
         .collect();
+    if station_log_fails {
+        lines.insert(0, station_log.clone());
+    }
     let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
     let count = format!(" GO {mark}{pass} of {of} checks");
     lines.push(Line::styled(count, theme.style(TextRole::Good)));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
+    if !station_log_fails {
+        lines.push(station_log);
+    }
     lines
 }
 
@@ -181,13 +187,22 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     }
 }
 
-/// Prints the name of a bit as it is.
-struct NameOf<'a>(&'a str);
-
-impl std::fmt::Debug for NameOf<'_> {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str(self.0)
-    }
+/// Whether the station's own log fails as a check, and its row.
+fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'static>) {
+    let space = model.log.space.map_or_else(|| "running".to_owned(), |space| space.words());
+    let (word, role, found) = match model.station_log(now) {
+        LogStanding::None => ("    ", TextRole::Label, "none (--log none)".to_owned()),
+        LogStanding::Fine => ("    ", TextRole::Plain, space),
+        LogStanding::Warned(words) => (" !! ", TextRole::Caution, words),
+        LogStanding::Unfit(_, words) if model.why_no_log(now).is_some() => (" NO ", TextRole::Alarm, words),
+        LogStanding::Unfit(_, words) => (" !! ", TextRole::Caution, format!("overruled: {words}")),
+    };
+    let line = Line::from(vec![
+        Span::styled(word, theme.style(role)),
+        Span::styled(" station log ", theme.style(TextRole::Plain)),
+        Span::styled(found, theme.style(if word == "    " { TextRole::Plain } else { TextRole::Caution })),
+    ]);
+    (word == " NO ", line)
 }
 
 /// The value that telemetry shows for a check; empty if there is none.

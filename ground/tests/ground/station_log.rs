@@ -1,0 +1,155 @@
+//! The station's own log as a check of its own.
+
+use ground::key::Key;
+use ground::model::dialog::Dialog;
+use ground::model::seat::Seat;
+use ground::model::station_log::{LogFault, LogHealth, LogSpace, LogStanding};
+use ground::model::{Role, Settings};
+use ground::update::{Action, Msg, Request};
+use protocol::log::record::Record;
+
+use crate::rig::{Rig, is_arm, settings, typed};
+use crate::screens::{armed, on_the_pad};
+
+const MIB: u64 = 1 << 20;
+
+fn health(free_mib: u64, grows_bytes_s: u32) -> LogHealth {
+    let space = Some(LogSpace { free_bytes: free_mib * MIB, grows_bytes_s });
+    LogHealth { space, ..LogHealth::default() }
+}
+
+const FAILED: LogHealth = LogHealth { dropped: 0, failed: true, space: None };
+
+fn enter(word: &str) -> Vec<Key> {
+    [typed(word), vec![Key::Enter]].concat()
+}
+
+/// The crew is warned before the disk is full: by what is left, and by the time that it lasts.
+#[test]
+fn the_space_is_judged_by_what_is_left_and_by_how_long_it_lasts() {
+    let mut rig = on_the_pad();
+    let mut standing = |health| {
+        rig.msg(Msg::Log(health));
+        rig.model.station_log(rig.now)
+    };
+    assert_eq!(standing(health(9_999, 30_000)), LogStanding::Fine);
+    assert_eq!(standing(health(255, 0)), LogStanding::Warned("255 MiB left".to_owned()));
+    let unfit = |words: &str| LogStanding::Unfit(LogFault::Full, words.to_owned());
+    assert_eq!(standing(health(63, 0)), unfit("63 MiB left"));
+    // 1 MB/s: 900 MB last 15 minutes.
+    assert_eq!(
+        standing(health(859, 1_000_000)),
+        LogStanding::Warned("859 MiB left, 15 min at this rate".to_owned())
+    );
+    assert_eq!(standing(health(858, 1_000_000)), unfit("858 MiB left, 14 min at this rate"));
+}
+
+/// NO-GO, with the reason on the pad page, in the alarm and in the voice; nothing is armed.
+#[test]
+fn a_failed_or_full_log_is_a_no_go_for_arming_from_this_station() {
+    for (broken, words) in [
+        (FAILED, "station log FAILED: nothing more is recorded"),
+        (health(12, 0), "station log 12 MiB left"),
+        (LogHealth { dropped: 7, ..LogHealth::default() }, "station log loses records, 7 so far"),
+    ] {
+        let mut rig = on_the_pad();
+        assert!(rig.screen(80, 24).contains(" GO: every arming check passes"));
+        rig.msg(Msg::Log(broken));
+        let screen = rig.screen(80, 24);
+        assert!(screen.contains(&format!("NO-GO: {words}")), "{screen}");
+        assert!(screen.contains(" NO  station log "), "{screen}");
+        assert!(screen.contains(&format!("ALARM STATION LOG {}", &words[12..20])), "{screen}");
+        rig.keys(&enter("AARM"));
+        assert!(!rig.take_commands().iter().any(is_arm), "{words}");
+    }
+}
+
+/// A log that has lost records, and loses none any more, is fit again, and says so.
+#[test]
+fn a_log_that_loses_no_more_records_is_fit_again() {
+    let mut rig = on_the_pad();
+    rig.msg(Msg::Log(LogHealth { dropped: 7, ..LogHealth::default() }));
+    assert!(rig.model.why_no_log(rig.now).is_some());
+    rig.run(31.0);
+    assert_eq!(rig.model.station_log(rig.now), LogStanding::Warned("has lost 7 records".to_owned()));
+    assert_eq!(rig.model.why_no_log(rig.now), None);
+}
+
+/// The crew goes on without a log by a word, which is recorded; then the ladder is the usual one.
+#[test]
+fn the_crew_may_go_on_without_a_log_by_a_word_that_is_recorded() {
+    let mut rig = on_the_pad();
+    rig.msg(Msg::Log(FAILED));
+    rig.key(Key::Char('A'));
+    assert!(matches!(rig.model.dialog, Dialog::WithoutLog { .. }));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("Type NOLOG and Enter") && screen.contains("FAILED"), "{screen}");
+    rig.keys(&enter("NOLOG"));
+    assert!(!rig.take_commands().iter().any(is_arm), "nothing is armed by it");
+    let words =
+        "WITHOUT A LOG: arm and start go on although the station log FAILED: nothing more is recorded";
+    assert!(rig.events().contains(words), "{}", rig.events());
+    assert!(rig.screen(80, 24).contains(" !!  station log overruled: FAILED"), "{}", rig.screen(80, 24));
+    rig.keys(&enter("AARM"));
+    assert!(rig.take_commands().iter().any(is_arm));
+
+    let mut rig = on_the_pad();
+    rig.msg(Msg::Log(FAILED));
+    rig.actions.clear();
+    rig.keys(&enter("ANOLOG"));
+    let recorded = |action: &Action| matches!(action, Action::Record(Record::OperatorAction(action)) if action.kind == "without log");
+    assert!(rig.actions.iter().any(recorded));
+    let entered = |action: &Action| matches!(action, Action::Enter(line) if line.kind == "without log");
+    assert!(rig.actions.iter().any(entered), "in the book");
+}
+
+/// The word counts for the fault that it was typed for, and only as long as the fault lasts.
+#[test]
+fn the_word_counts_for_one_fault_only() {
+    let mut rig = on_the_pad();
+    rig.msg(Msg::Log(health(12, 0)));
+    rig.keys(&enter("ANOLOG"));
+    assert_eq!(rig.model.why_no_log(rig.now), None);
+    rig.msg(Msg::Log(FAILED));
+    assert!(rig.model.why_no_log(rig.now).is_some(), "another fault");
+    rig.msg(Msg::Log(health(9_999, 0)));
+    rig.msg(Msg::Log(health(12, 0)));
+    assert!(rig.model.why_no_log(rig.now).is_some(), "it was fit in between");
+}
+
+/// A log that fails between arm and start stops the start.
+#[test]
+fn a_log_that_fails_after_the_arming_stops_the_start() {
+    let mut rig = armed();
+    rig.msg(Msg::Log(FAILED));
+    rig.take_commands();
+    rig.key(Key::Char('S'));
+    assert!(matches!(rig.model.dialog, Dialog::WithoutLog { .. }));
+    rig.keys(&[Key::Escape, Key::Char('S'), Key::Enter]);
+    assert!(rig.take_commands().is_empty());
+}
+
+/// `--log none` is a choice that was made already.
+#[test]
+fn a_station_that_was_told_to_keep_no_log_may_arm() {
+    let mut rig = Rig::new(Settings { log_path: None, ..settings(false, true) });
+    rig.run(1.0);
+    assert_eq!(rig.model.station_log(rig.now), LogStanding::None);
+    rig.keys(&enter("AARM"));
+    assert!(rig.take_commands().iter().any(is_arm));
+}
+
+/// An attached screen shows its station's log, and asks the station to go on without it.
+#[test]
+fn an_attached_screen_asks_its_station_to_go_on_without_a_log() {
+    let mut rig = Rig::new(Settings { role: Role::Attached, ..settings(false, true) });
+    rig.model.history_ends();
+    rig.run(1.0);
+    rig.msg(Msg::Log(FAILED));
+    rig.keys(&enter("ANOLOG"));
+    assert!(rig.actions.contains(&Action::Request(Request::WithoutLog)));
+    assert!(rig.model.why_no_log(rig.now).is_some(), "the station decides");
+    rig.msg(Msg::WithoutLog(Seat::new(2, "bob on pts/2")));
+    assert_eq!(rig.model.why_no_log(rig.now), None);
+    assert!(rig.events().contains("(screen 2, bob on pts/2)"), "{}", rig.events());
+}
