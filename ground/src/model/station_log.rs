@@ -38,11 +38,11 @@ impl LogSpace {
         self.free_bytes < needs.max(SPACE_MIN_BYTES).saturating_mul(times.into())
     }
 
-    /// As in `512 MiB left, 90 min at this rate`.
+    /// As in `512 MiB left (90 min)`: at the present rate.
     pub fn words(&self) -> String {
         let mib = self.free_bytes >> 20;
         match self.free_bytes.checked_div(self.grows_bytes_s.into()) {
-            Some(left_s) => format!("{mib} MiB left, {} min at this rate", left_s / 60),
+            Some(left_s) => format!("{mib} MiB left ({} min)", left_s / 60),
             None => format!("{mib} MiB left"),
         }
     }
@@ -77,9 +77,7 @@ impl Model {
         let LogHealth { dropped, failed, space } = self.log;
         let loses = self.log_loses_at.is_some_and(|at| now.saturating_sub(at) < LOSES_FOR);
         match space {
-            _ if failed => {
-                LogStanding::Unfit(LogFault::Failed, "FAILED: nothing more is recorded".to_owned())
-            }
+            _ if failed => LogStanding::Unfit(LogFault::Failed, "FAILED: nothing is recorded".to_owned()),
             _ if loses => LogStanding::Unfit(LogFault::Loses, format!("loses records, {dropped} so far")),
             Some(space) if space.is_less_than(1) => LogStanding::Unfit(LogFault::Full, space.words()),
             Some(space) if space.is_less_than(WARNED_TIMES) => LogStanding::Warned(space.words()),

@@ -37,18 +37,15 @@ fn the_space_is_judged_by_what_is_left_and_by_how_long_it_lasts() {
     let unfit = |words: &str| LogStanding::Unfit(LogFault::Full, words.to_owned());
     assert_eq!(standing(health(63, 0)), unfit("63 MiB left"));
     // 1 MB/s: 900 MB last 15 minutes.
-    assert_eq!(
-        standing(health(859, 1_000_000)),
-        LogStanding::Warned("859 MiB left, 15 min at this rate".to_owned())
-    );
-    assert_eq!(standing(health(858, 1_000_000)), unfit("858 MiB left, 14 min at this rate"));
+    assert_eq!(standing(health(859, 1_000_000)), LogStanding::Warned("859 MiB left (15 min)".to_owned()));
+    assert_eq!(standing(health(858, 1_000_000)), unfit("858 MiB left (14 min)"));
 }
 
 /// NO-GO, with the reason on the pad page, in the alarm and in the voice; nothing is armed.
 #[test]
 fn a_failed_or_full_log_is_a_no_go_for_arming_from_this_station() {
     for (broken, words) in [
-        (FAILED, "station log FAILED: nothing more is recorded"),
+        (FAILED, "station log FAILED: nothing is recorded"),
         (health(12, 0), "station log 12 MiB left"),
         (LogHealth { dropped: 7, ..LogHealth::default() }, "station log loses records, 7 so far"),
     ] {
@@ -86,8 +83,7 @@ fn the_crew_may_go_on_without_a_log_by_a_word_that_is_recorded() {
     assert!(screen.contains("Type NOLOG and Enter") && screen.contains("FAILED"), "{screen}");
     rig.keys(&enter("NOLOG"));
     assert!(!rig.take_commands().iter().any(is_arm), "nothing is armed by it");
-    let words =
-        "WITHOUT A LOG: arm and start go on although the station log FAILED: nothing more is recorded";
+    let words = "WITHOUT A LOG: arm and start go on although the station log FAILED: nothing is recorded";
     assert!(rig.events().contains(words), "{}", rig.events());
     assert!(rig.screen(80, 24).contains(" !!  station log overruled: FAILED"), "{}", rig.screen(80, 24));
     rig.keys(&enter("AARM"));

@@ -63,7 +63,7 @@ fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line
         return lines;
     };
     let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
-    lines.push(row("meant to land at", format!("north {north} m, east {east} m of the pad"), theme));
+    lines.push(row("meant to land", format!("north {north} m, east {east} m of the pad"), theme));
     lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
     if let Some(at) = model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)) {
         lines.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));

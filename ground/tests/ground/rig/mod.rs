@@ -217,7 +217,6 @@ impl Rig {
             latch: self.latch,
             last_hold_ms: 2_000,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
-            ..TD_FLIGHT_STATUS_DATA::default()
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
     }
