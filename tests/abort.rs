@@ -61,7 +61,7 @@ fn an_abort_in_the_countdown_prevents_the_release() {
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
     // The wait is longer than the countdown.
     let aborted_at_ms = flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms;
-    while flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms < aborted_at_ms + 6_000 {}
+    while flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE).time_boot_ms < aborted_at_ms + 11_000 {}
     let ended = ended(flight);
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(!ended.output.contains("LAND_ARMED"), "{}", ended.output);

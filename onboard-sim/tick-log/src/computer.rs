@@ -9,6 +9,7 @@ use flight::computer::plane::PlaneSensed;
 use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
+use flight::rules::two_person::Station;
 use log_records::computer_v1 as v1;
 
 use crate::pilot::{
@@ -205,12 +206,13 @@ fn plane_from_log(sensed: &v1::PlaneSensed) -> PlaneSensed {
 
 /// The station that armed the vehicle as a record.
 pub fn commander_to_log(commander: &Commander) -> v1::Commander {
-    let Commander { station: (system, component), age_s, by } = commander;
+    let Commander { station, age_s, by } = commander;
     v1::Commander {
-        system: u32::from(*system),
-        component: u32::from(*component),
+        system: u32::from(station.system),
+        component: u32::from(station.component),
         age_s: *age_s,
         by: by.as_ref().map(operator_to_log),
+        station: (station.number != 0).then_some(station.number),
     }
 }
 
@@ -219,7 +221,7 @@ pub fn commander_to_log(commander: &Commander) -> v1::Commander {
 /// # Errors
 /// This build does not know some value of it.
 pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, PilotLogError> {
-    let station = (byte(commander.system, frame, "system")?, byte(commander.component, frame, "component")?);
+    let station = station_from_log((commander.system, commander.component, commander.station), frame)?;
     let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
     Ok(Commander { station, age_s: commander.age_s, by })
 }
@@ -249,10 +251,11 @@ pub fn request_to_log(request: &Request) -> v1::Request {
     v1::Request {
         asked: asked as u32,
         uplink: uplink_to_log(request.uplink),
-        system: request.station.map(|(system, _)| u32::from(system)),
-        component: request.station.map(|(_, component)| u32::from(component)),
+        system: request.station.map(|station| u32::from(station.system)),
+        component: request.station.map(|station| u32::from(station.component)),
         by: request.by.as_ref().map(operator_to_log),
         confirms: request.confirms.map(u32::from),
+        station: request.station.map(|station| station.number).filter(|number| *number != 0),
     }
 }
 
@@ -263,15 +266,26 @@ pub fn request_to_log(request: &Request) -> v1::Request {
 pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotLogError> {
     let unknown =
         PilotLogError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
-    let station = request.system.zip(request.component).map(|(system, component)| {
-        Ok((byte(system, frame, "system")?, byte(component, frame, "component")?))
-    });
+    let ids = request.system.zip(request.component);
+    let station =
+        ids.map(|(system, component)| station_from_log((system, component, request.station), frame));
     Ok(Request {
         asked: *ASKED.get(request.asked as usize).ok_or(unknown)?,
         uplink: uplink_from_log(request.uplink.as_ref()),
         station: station.transpose()?,
         by: request.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?,
         confirms: request.confirms.map(|number| short(number, frame, "ask")).transpose()?,
+    })
+}
+
+fn station_from_log(
+    (system, component, number): (u32, u32, Option<u32>),
+    frame: u64,
+) -> Result<Station, PilotLogError> {
+    Ok(Station {
+        system: byte(system, frame, "system")?,
+        component: byte(component, frame, "component")?,
+        number: number.unwrap_or(0),
     })
 }
 
@@ -345,9 +359,13 @@ mod tests {
         })
     }
 
+    fn any_station() -> impl Strategy<Value = Station> {
+        any::<(u8, u8, u32)>().prop_map(|(system, component, number)| Station { system, component, number })
+    }
+
     fn any_request() -> impl Strategy<Value = Request> {
         let by = prop::option::of(any_operator());
-        let any = (0..ASKED.len(), any_uplink(), any::<Option<(u8, u8)>>(), by, any::<Option<u16>>());
+        let any = (0..ASKED.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
         any.prop_map(|(asked, uplink, station, by, confirms)| Request {
             asked: ASKED[asked],
             uplink,
@@ -373,7 +391,7 @@ mod tests {
             flags: [bool; 8],
             space_bytes: u64,
             uplink in any_uplink(),
-            commander in prop::option::of((any::<(u8, u8)>(), prop::option::of(any_operator()))),
+            commander in prop::option::of((any_station(), prop::option::of(any_operator()))),
             people in any_people(),
             requests in prop::collection::vec(any_request(), 0..4),
             rehearsed: Option<(bool, String, Option<(bool, String)>)>,
@@ -424,7 +442,8 @@ mod tests {
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
             let asked = |requests: &[Request]| {
-                requests.iter().map(|request| (request.asked, request.by, request.confirms)).collect::<Vec<_>>()
+                let asked = |request: &Request| (request.asked, request.station, request.by, request.confirms);
+                requests.iter().map(asked).collect::<Vec<_>>()
             };
             prop_assert_eq!(asked(&read.requests), asked(&requests));
         }

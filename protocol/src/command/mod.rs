@@ -7,7 +7,7 @@ mod sender;
 
 use crate::dialect::{MavCmd, MavResult};
 use crate::frame::{Encoder, Frame};
-use crate::identity::Address;
+use crate::identity::{Address, LARGEST_BOOT_NUMBER};
 
 pub use sender::{CommandEvent, CommandSender, Resend, Ticket};
 
@@ -56,10 +56,34 @@ impl CommandRequest {
         })
     }
 
+    /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0 or NaN.
+    pub fn meant_boot(&self) -> MeantBoot {
+        let param7 = self.params[6];
+        if param7.is_nan() || param7.abs() < 0.5 {
+            MeantBoot::Any
+        } else if (1.0..=LARGEST_BOOT_NUMBER as f32).contains(&param7)
+            && libm::truncf(param7).to_bits() == param7.to_bits()
+        {
+            MeantBoot::Boot(param7 as u32)
+        } else {
+            MeantBoot::Unreadable
+        }
+    }
+
     /// Returns whether the request is this MAV_CMD.
     pub fn is(&self, command: MavCmd) -> bool {
         self.command == command as u16
     }
+}
+
+/// The boot of a vehicle that a command is meant for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeantBoot {
+    /// It names none.
+    Any,
+    Boot(u32),
+    /// The parameter is no number of a boot: no permission.
+    Unreadable,
 }
 
 /// An answer to a command.

@@ -35,3 +35,14 @@ pub enum Received {
     /// The link does not work; the text says why. The transport tries again.
     Down(String),
 }
+
+impl Received {
+    /// The sender of received bytes; `None` for news of the link itself.
+    pub fn origin(&self) -> Option<Origin> {
+        match self {
+            Self::Datagram { from, .. } => Some(Origin::Datagram(*from)),
+            Self::Stream(id, _) | Self::Silence(id) => Some(Origin::Stream(*id)),
+            Self::Gone(_) | Self::Strangers(_) | Self::Up(_) | Self::Down(_) => None,
+        }
+    }
+}

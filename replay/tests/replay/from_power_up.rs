@@ -9,6 +9,7 @@ use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
+use flight::rules::two_person::Station;
 use flight::vehicle::profile::StartPoint;
 use proptest::prelude::*;
 use protocol::log::record::Record;
@@ -24,6 +25,8 @@ use tempfile::TempDir;
 
 /// More frames than any flight of either vehicle has.
 const LONGEST: u64 = 20_000;
+
+const STATION: Station = Station { system: 255, component: 190, number: 1 };
 
 /// The inputs from the crew in one frame.
 #[derive(Debug, Clone)]
@@ -43,7 +46,7 @@ fn asked(frame: u64, asked: Asked) -> Reached {
 /// A request of one of two operators.
 fn of(frame: u64, role: Role, asked: Asked, confirms: Option<u16>) -> Reached {
     let by = Some(Operator { number: role as u8, role, name: Name::new("Ann") });
-    let request = Request { asked, uplink: Uplink::NotNeeded, station: Some((255, 190)), by, confirms };
+    let request = Request { asked, uplink: Uplink::NotNeeded, station: Some(STATION), by, confirms };
     Reached { request: Some(request), ..self::asked(frame, asked) }
 }
 
@@ -118,7 +121,7 @@ impl Flown {
             while let Some(reached) = crew.next_if(|reached| reached.frame <= frame) {
                 requests.extend(reached.request);
                 let commander =
-                    reached.commander_age_s.map(|age_s| Commander { station: (255, 190), age_s, by: None });
+                    reached.commander_age_s.map(|age_s| Commander { station: STATION, age_s, by: None });
                 vehicle.set_uplink(reached.uplink, commander);
                 vehicle.set_pin_out(reached.pin_out);
             }
@@ -222,7 +225,7 @@ fn both_vehicles_verify_from_power_up_to_safed() {
 /// stays; and from below a drone.
 #[test]
 fn what_two_people_do_verifies() {
-    let flown = Flown::by_two(&two_people(5));
+    let flown = Flown::by_two(&two_people(9));
     assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
     assert_eq!(all_frames_identical(&flown.verified()), flown.frames());
     // Without taps the countdown is held.
@@ -247,7 +250,7 @@ fn what_two_people_do_verifies() {
 fn flights_from_the_pad_and_from_a_drone_verify() {
     let started = armed_and_started(2_600);
     let mut aborted = started.clone();
-    aborted.push(asked(4_000, Asked::Abort));
+    aborted.push(asked(5_000, Asked::Abort));
     for (start, crew, faults, passed) in [
         (StartPoint::Pad, &started, &[][..], Phase::Powered),
         (StartPoint::Pad, &aborted, &[], Phase::Chute),
@@ -267,7 +270,7 @@ fn an_abort_in_the_countdown_and_one_in_the_air_verify() {
     let mut on_the_pad = armed_and_started(1_200);
     on_the_pad.push(asked(1_300, Asked::Abort));
     let mut in_the_air = armed_and_started(1_200);
-    in_the_air.push(asked(3_000, Asked::Abort));
+    in_the_air.push(asked(4_000, Asked::Abort));
     for (crew, flew) in [(on_the_pad, false), (in_the_air, true)] {
         let flown = Flown::in_space(&crew, &[]);
         assert_eq!(flown.phases.contains(&Phase::Chute), flew, "{:?}", flown.phases);
@@ -392,11 +395,14 @@ fn any_crew() -> impl Strategy<Value = Vec<Reached>> {
         any_uplink(),
         prop::option::of(0.0..4.0),
         prop::bool::weighted(0.9),
-        prop::option::of((any::<u8>(), any::<u8>())),
+        prop::option::of((any::<u8>(), any::<u8>(), any::<u32>())),
     );
-    let one = one.prop_map(|(frame, asked, uplink, commander_age_s, pin_out, station)| Reached {
+    let one = one.prop_map(|(frame, asked, uplink, commander_age_s, pin_out, ids)| Reached {
         frame,
-        request: asked.map(|asked| Request { asked, uplink, station, by: None, confirms: None }),
+        request: asked.map(|asked| {
+            let station = ids.map(|(system, component, number)| Station { system, component, number });
+            Request { asked, uplink, station, by: None, confirms: None }
+        }),
         uplink,
         commander_age_s,
         pin_out,

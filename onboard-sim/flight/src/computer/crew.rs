@@ -5,7 +5,8 @@ use alloc::string::String;
 
 use crate::rules::arming::{self, Check, Uplink};
 use crate::rules::operator::Operator;
-use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal};
+use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal, StartPoint};
+use crate::rules::two_person::Station;
 
 use super::news::Severity;
 use super::table::PhaseTable;
@@ -68,8 +69,8 @@ pub struct Request {
     pub asked: Asked,
     /// How well the requesting station is heard. [`Uplink::NotNeeded`] for the vehicle's own programme.
     pub uplink: Uplink,
-    /// MAVLink system and component of the station; `None` for the vehicle's own programme.
-    pub station: Option<(u8, u8)>,
+    /// `None` for the vehicle's own programme.
+    pub station: Option<Station>,
     /// Whose key has signed it; `None` for the key that all stations share, or none.
     pub by: Option<Operator>,
     /// The number of the ask that it confirms.
@@ -130,14 +131,19 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
     }
 }
 
-/// The event for a request; `None` for one that is no matter of the phase table. `abort` is the event that an abort
-/// would be now.
-pub(super) fn event_of(asked: Asked, checks: &[Check], countdown_s: f64, abort: Event) -> Option<Event> {
+/// The event for a request; `None` for one that is no matter of the phase table. A countdown is of this length, before a
+/// flight that starts there, and `abort` is the event that an abort would be now.
+pub(super) fn event_of(
+    asked: Asked,
+    checks: &[Check],
+    (countdown_s, start): (f64, StartPoint),
+    abort: Event,
+) -> Option<Event> {
     Some(match asked {
         Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
         Asked::Disarm => Event::DisarmRequested,
         Asked::Start => Event::StartRequested { countdown_s },
-        Asked::Hold => Event::Hold { cause: HoldCause::Commanded },
+        Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
         Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill | Asked::EndCheck => return None,
     })

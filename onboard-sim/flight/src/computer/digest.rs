@@ -8,7 +8,7 @@ use crate::computer::pilot::BoosterCommands;
 use crate::guidance::controller::ControllerState;
 use crate::rules::operator::Operator;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
-use crate::rules::two_person::{Ask, Tapping};
+use crate::rules::two_person::{Ask, Station, Tapping};
 
 /// The part of the phase table that decides in the air. Times of the vehicle's clock decide nothing there, nor do the
 /// pin and the arming, which a person may change on the ground.
@@ -65,6 +65,16 @@ impl Remembers for Operator {
     fn remember(&self, memory: &mut Memory) {
         [self.number, self.role as u8].remember(memory);
         self.name.bytes().remember(memory);
+    }
+}
+
+impl Remembers for Station {
+    fn remember(&self, memory: &mut Memory) {
+        [self.system, self.component].remember(memory);
+        // Logs from before stations were told apart have the same digest.
+        if self.number != 0 {
+            self.number.remember(memory);
+        }
     }
 }
 

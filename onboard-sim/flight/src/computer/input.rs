@@ -7,6 +7,7 @@ use super::pilot::{PilotInput, Sensed};
 use super::plane::PlaneSensed;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
+use crate::rules::two_person::Station;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
@@ -45,8 +46,7 @@ pub enum Feeling {
 /// The station that armed the vehicle, and how long ago it was last heard, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Commander {
-    /// MAVLink system and component.
-    pub station: (u8, u8),
+    pub station: Station,
     pub age_s: f64,
     /// Whose key it armed with.
     pub by: Option<Operator>,

@@ -59,7 +59,7 @@ use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
 use crate::guidance::controller::ControlLevel;
 use crate::guidance::powered::LandingSolved;
 use crate::rules::arming::Uplink;
-use crate::rules::phase::{Event, HOLD_LIMIT_S, Mode, Motor, Phase};
+use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
 use crate::vehicle::profile::ArmingLimits;
 
 /// Frame length of a rocket in space, ms.
@@ -309,6 +309,16 @@ impl Computer {
     /// Phase, latches, countdown and motor.
     pub fn mode(&self) -> &Mode {
         self.table.mode()
+    }
+
+    /// Why the landing motor is inhibited for good, by what came first.
+    pub fn latch(&self) -> Option<Latch> {
+        self.table.latch()
+    }
+
+    /// Time before the release from which on nothing holds the countdown, s; `None` if a hold comes in time until then.
+    pub fn last_hold_s(&self) -> Option<f64> {
+        self.start_point().last_hold_s()
     }
 
     /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED depends on the

@@ -56,7 +56,7 @@ impl Computer {
         }
     }
 
-    fn start_point(&self) -> StartPoint {
+    pub(super) fn start_point(&self) -> StartPoint {
         match &self.vehicle {
             Vehicle::Space(space) => space.start_point(),
             Vehicle::Plane(_) => StartPoint::Ignition,

@@ -8,7 +8,9 @@ use super::news::Severity;
 use super::{Commander, Computer, Input, Vehicle};
 use crate::rules::operator::Operator;
 use crate::rules::phase::{Event, HoldCause, Phase, UPLINK_SILENT_S, transition};
-use crate::rules::two_person::{Act, Ask, CONFIRM_WITHIN_S, Refusal, Reply, TAP_WITHIN_S, TwoPerson};
+use crate::rules::two_person::{
+    Act, Ask, CONFIRM_WITHIN_S, Refusal, Reply, Station, TAP_WITHIN_S, TwoPerson,
+};
 
 /// What the computer remembers of its crew.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,6 +27,7 @@ impl Computer {
     /// Decides a request; `None` for an abort in the air in space, which the pilot handles in this frame.
     pub(super) fn answer(&mut self, request: &Request) -> Option<Answer> {
         let mode = *self.table.mode();
+        let time_s = self.table.time_s();
         let Request { asked, uplink, station, by, .. } = *request;
         if let Some(reason) = self.why_not_of(request) {
             return Some(self.deny(asked, reason));
@@ -43,21 +46,31 @@ impl Computer {
             _ if is_so_already(&mode, asked) => return Some(Answer::ACCEPTED),
             _ => {}
         }
-        if let (Asked::Abort, Some(by), false) = (asked, by, mode.interlocks.abort_latched) {
-            self.table.say(Severity::Warning, format!("{by} aborts"));
+        if asked == Asked::Abort && !mode.interlocks.abort_latched {
+            let who = match (by, station) {
+                (Some(by), _) => Some(format!("{by}")),
+                (None, Some(station)) if self.people.is_some() => {
+                    Some(format!("station {station}, with the key that all share,"))
+                }
+                _ => None,
+            };
+            if let Some(who) = who {
+                self.table.say(Severity::Warning, format!("{who} aborts"));
+            }
         }
         let on_ground = mode.phase.on_pad() || matches!(mode.phase, Phase::Touchdown | Phase::Safed);
         if asked == Asked::Abort && matches!(self.vehicle, Vehicle::Space(_)) && !on_ground {
             return None;
         }
         let checks = self.arming_checks_by(uplink);
-        let event = event_of(asked, &checks, self.countdown_s, self.abort_event())?;
-        if let (Asked::Hold, Some(_), Some((system, component))) = (asked, mode.countdown_end_s, station) {
+        let start = self.start_point();
+        let event = event_of(asked, &checks, (self.countdown_s, start), self.abort_event())?;
+        if let (Asked::Hold, true, Some(station)) = (asked, mode.may_hold(start, time_s), station) {
             let who = by.map_or_else(String::new, |by| format!("{by}, "));
-            self.table.say(Severity::Notice, format!("{who}station {system}/{component} asks for a hold"));
+            self.table.say(Severity::Notice, format!("{who}station {station} asks for a hold"));
         }
         // What the phase table would refuse is not worth a second person's confirmation.
-        let refusal = transition(&mode, event, self.table.time_s()).refusal;
+        let refusal = transition(&mode, event, time_s).refusal;
         let agreed = match refusal.map_or_else(|| self.agree(request), |_| Ok(None)) {
             Ok(agreed) => agreed,
             Err(answer) => return Some(answer),
@@ -78,6 +91,10 @@ impl Computer {
         if station.is_none() {
             let shared = act_of(asked).is_some() && people != People::One;
             return shared.then(|| "two people arm and start, not the vehicle by itself".into());
+        }
+        // Whoever holds any key of this crew may stop the launch: the links let nobody else through.
+        if matches!(asked, Asked::Abort | Asked::Hold) {
+            return None;
         }
         match by {
             None => Some("only an operator with a key of their own commands".into()),
@@ -112,9 +129,15 @@ impl Computer {
     /// Notes what an accepted request means for the crew.
     fn note_done(&mut self, asked: Asked, by: Option<Operator>, agreed: Option<Agreed>) {
         let time_s = self.table.time_s();
+        let commander = self.commander.and_then(|commander| commander.by);
+        let commands = |by: Operator| commander.is_some_and(|commander| commander.number == by.number);
         let two_person = &mut self.crew.two_person;
         match (asked, agreed) {
             (Asked::Arm, Some((ask, _))) => two_person.armed(ask),
+            // Whose station commands is watched by its silence already: the other one of the two taps.
+            (Asked::Start, Some((ask, confirmed_by))) if commands(confirmed_by) => {
+                two_person.begin_taps(ask.by, time_s);
+            }
             (Asked::Start, Some((_, confirmed_by))) => two_person.begin_taps(confirmed_by, time_s),
             (Asked::Disarm | Asked::Hold | Asked::Abort, _) => {
                 two_person.withdraw();
@@ -161,12 +184,18 @@ impl Computer {
         if before == station {
             return Answer::ACCEPTED;
         }
-        let named = |(system, component): (u8, u8), by: Option<Operator>| {
-            by.map_or_else(|| format!("{system}/{component}"), |by| format!("{by} ({system}/{component})"))
+        let named = |station: Station, by: Option<Operator>| {
+            by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
         };
         let (old, new) = (named(before, before_by), named(station, request.by));
         if age_s <= UPLINK_SILENT_S {
             return self.deny(Asked::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
+        }
+        // Nobody commands and taps: that takes two.
+        if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping(), request.by)
+            && tapping.by.number == by.number
+        {
+            return self.deny(Asked::TakeCommand, format!("{by} taps: hold the countdown first"));
         }
         // A role hands over to its like; range safety may always take over.
         if let (Some(before_by), Some(by)) = (before_by, request.by)
@@ -192,15 +221,24 @@ impl Computer {
 
     /// Holds the countdown if the station that armed the vehicle has fallen silent.
     pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
-        let Some(Commander { station: (system, component), age_s, by }) = input.commander else { return };
-        if self.table.mode().countdown_end_s.is_none() || age_s <= UPLINK_SILENT_S {
-            return;
-        }
-        let words = format!("nothing heard of {system}/{component} for {UPLINK_SILENT_S} s");
-        self.table.say(Severity::Critical, words);
-        if self.table.happen(Event::Hold { cause: HoldCause::UplinkSilent }).is_ok() {
+        let Some(Commander { station, age_s, by }) = input.commander else { return };
+        if age_s > UPLINK_SILENT_S
+            && self.hold(HoldCause::UplinkSilent, || {
+                format!("nothing heard of {station} for {UPLINK_SILENT_S} s")
+            })
+        {
             self.crew.held_by = by;
         }
+    }
+
+    /// Holds a running countdown, and says why; not in its last moment, when nothing holds any more.
+    fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
+        let start = self.start_point();
+        if !self.table.mode().may_hold(start, self.table.time_s()) {
+            return false;
+        }
+        self.table.say(Severity::Critical, why());
+        self.table.happen(Event::Hold { cause, start }).is_ok()
     }
 
     /// Holds the countdown if the tap of whoever confirmed the start is overdue. After the release taps mean nothing.
@@ -210,11 +248,10 @@ impl Computer {
             return;
         }
         let Some(by) = self.crew.two_person.lapsed(self.table.time_s()) else { return };
-        self.table.say(Severity::Critical, format!("no tap of {by} for {TAP_WITHIN_S} s"));
-        if self.table.happen(Event::Hold { cause: HoldCause::TapOverdue }).is_ok() {
+        if self.hold(HoldCause::TapOverdue, || format!("no tap of {by} for {TAP_WITHIN_S} s")) {
             self.crew.held_by = Some(by);
+            self.crew.two_person.end_taps();
         }
-        self.crew.two_person.end_taps();
     }
 }
 

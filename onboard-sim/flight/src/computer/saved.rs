@@ -15,7 +15,7 @@ use super::memory::checksum;
 use super::pilot::SavedPilot;
 use super::{Commands, Computer, Release, Severity, Vehicle};
 use crate::guidance::controller::ControlLevel;
-use crate::rules::phase::{Interlocks, Mode};
+use crate::rules::phase::{Interlocks, Latch, Mode};
 
 /// After a longer time without power, s, nothing is taken up: whoever switches a computer off and on again later has a
 /// computer at power-up. No fall that is lost for so long can be saved.
@@ -31,6 +31,7 @@ pub struct Saved {
     /// Vehicle time of the frame, s.
     time_s: f64,
     mode: Mode,
+    latch: Option<Latch>,
     /// From its release on; it may still stand on its rail under the first current of its ascent motor.
     in_the_air: Option<InTheAir>,
 }
@@ -109,7 +110,8 @@ impl Computer {
             level: self.level,
             pilot: space.pilot.saved(),
         });
-        Some(Saved { frame: self.frame, time_s: self.table.time_s(), mode, in_the_air })
+        let latch = self.table.latch();
+        Some(Saved { frame: self.frame, time_s: self.table.time_s(), mode, latch, in_the_air })
     }
 
     /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
@@ -123,7 +125,7 @@ impl Computer {
         self.frame = saved.frame;
         match (&saved.in_the_air, &mut self.vehicle) {
             (Some(flown), Vehicle::Space(space)) => {
-                self.table.go_on(saved.mode);
+                self.table.go_on(saved.mode, saved.latch);
                 // The crew has been told of it.
                 let _ = self.motor_watch.news(&saved.mode, saved.time_s);
                 self.release = Some(flown.release);
@@ -131,18 +133,18 @@ impl Computer {
                 self.level = flown.level;
                 space.pilot = space.pilot.resumed(&flown.pilot, time_s - flown.release.time_s);
             }
-            _ => self.wake_on_the_pad(&saved.mode, time_s),
+            _ => self.wake_on_the_pad(saved, time_s),
         }
         self
     }
 
     /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to the pad must not be told
     /// less.
-    fn wake_on_the_pad(&mut self, before: &Mode, time_s: f64) {
-        let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = before.interlocks;
+    fn wake_on_the_pad(&mut self, saved: &Saved, time_s: f64) {
+        let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = saved.mode.interlocks;
         let mut mode = Mode::power_up(time_s);
         mode.interlocks = Interlocks { landing_motor_inhibited, abort_latched, ..mode.interlocks };
-        self.table.go_on(mode);
+        self.table.go_on(mode, saved.latch);
         let (severity, words) = if armed {
             (Severity::Warning, "the flight computer has restarted: DISARMED")
         } else {
@@ -251,7 +253,7 @@ mod tests {
                 let interlocks = Interlocks { armed: true, pin_out: true, ..Interlocks::default() };
                 let motor = if phase == Phase::Powered { Motor::Burning } else { Motor::Unlit };
                 let mode = Mode { phase, interlocks, motor, countdown_end_s: Some(7.0), ..*computer.mode() };
-                computer.table.go_on(mode);
+                computer.table.go_on(mode, None);
                 computer.restart(0.25);
                 if released {
                     assert_eq!(*computer.mode(), mode);
@@ -268,9 +270,10 @@ mod tests {
     fn an_abort_on_the_pad_stays_latched_through_a_reset() {
         let mut computer = powered_up();
         let interlocks = Interlocks { abort_latched: true, ..Interlocks::default() };
-        computer.table.go_on(Mode { interlocks, ..*computer.mode() });
+        computer.table.go_on(Mode { interlocks, ..*computer.mode() }, Some(Latch::Commanded));
         computer.restart(0.25);
         assert!(computer.mode().interlocks.abort_latched);
+        assert_eq!(computer.latch(), Some(Latch::Commanded));
         assert!(!computer.mode().interlocks.armed);
     }
 }

@@ -6,12 +6,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::news::{News, Severity, words_of, words_of_landing_here};
-use crate::rules::phase::{Effect, Effects, Event, Mode, Refusal, transition};
+use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Refusal, transition};
 
 /// Phase and latches, and the reports of this frame.
 #[derive(Debug, Clone)]
 pub struct PhaseTable {
     mode: Mode,
+    /// What latched first. It follows from the events and decides nothing, so no digest holds it.
+    latch: Option<Latch>,
     /// Vehicle time of this frame, s.
     time_s: f64,
     news: Vec<News>,
@@ -20,12 +22,12 @@ pub struct PhaseTable {
 impl PhaseTable {
     /// The table at power-up.
     pub(super) fn new(time_s: f64) -> Self {
-        Self { mode: Mode::power_up(time_s), time_s, news: Vec::new() }
+        Self { mode: Mode::power_up(time_s), latch: None, time_s, news: Vec::new() }
     }
 
     /// Takes up a mode after a reset. Nothing happens: its effects were carried out before.
-    pub(super) fn go_on(&mut self, mode: Mode) {
-        self.mode = mode;
+    pub(super) fn go_on(&mut self, mode: Mode, latch: Option<Latch>) {
+        (self.mode, self.latch) = (mode, latch);
     }
 
     /// Begins a frame.
@@ -36,6 +38,11 @@ impl PhaseTable {
     /// Phase, latches, countdown and motor.
     pub fn mode(&self) -> &Mode {
         &self.mode
+    }
+
+    /// Why the landing motor is inhibited for good.
+    pub fn latch(&self) -> Option<Latch> {
+        self.latch
     }
 
     /// Vehicle time of this frame, s.
@@ -54,6 +61,7 @@ impl PhaseTable {
             return Err(refusal);
         }
         self.mode = next.mode;
+        self.latch = self.latch.or_else(|| Latch::of(&event, before.interlocks, next.mode.interlocks));
         let countdown_s = if let Event::StartRequested { countdown_s } = event { countdown_s } else { 0.0 };
         for effect in next.effects.iter() {
             // At touchdown, the motor may have been inhibited long before: it is not reported again.

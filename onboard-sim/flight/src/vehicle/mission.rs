@@ -17,7 +17,8 @@ use crate::vehicle::profile::{ArmingLimits, GateLimits, StartPoint, TouchdownBox
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Default length of the countdown, s.
+/// Length of the countdown of a mission whose text does not say it, s: what all missions had before it was 10 s, so that their
+/// logs verify. The built-in ones say it.
 const COUNTDOWN_S: f64 = 5.0;
 
 /// Where a mission starts, and the state at apogee, nose up, if it starts there.

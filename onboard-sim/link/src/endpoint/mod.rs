@@ -7,7 +7,7 @@ mod budget;
 mod files;
 mod lane;
 mod lists;
-pub mod mission;
+pub mod meant;
 mod pad_check;
 mod questions;
 mod refusals;
@@ -24,7 +24,7 @@ use flight::computer::crew::Asked;
 use flight::computer::news::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Interlocks, Mode, Phase};
-use flight::rules::two_person::TwoPerson;
+use flight::rules::two_person::{Station, TwoPerson};
 use mavlink_core::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
@@ -47,7 +47,8 @@ use self::refusals::{Refusals, Warnings};
 pub use self::requests::Heard;
 use self::requests::Waiting;
 use crate::commands::{self, Command};
-use crate::stations::Stations;
+pub use crate::stations::Path;
+use crate::stations::{Sender, Stations};
 use crate::streams::{STANDARD, Standard, Streams};
 use crate::telemetry;
 use crate::vehicle::Vehicle;
@@ -70,7 +71,8 @@ pub struct VehicleEndpoint {
     capacities_bytes_s: Vec<u32>,
     text_id: u16,
     now_s: f64,
-    warned_of_twin: bool,
+    /// When another vehicle under our ids was last heard.
+    twin_heard_at_s: Option<f64>,
     /// The known stations, and how well each is heard.
     stations: Stations,
     /// Whether the vehicle starts by itself, so that no station has to be heard.
@@ -82,7 +84,7 @@ pub struct VehicleEndpoint {
     refusals: Refusals,
     warnings: Warnings,
     told: Option<Told>,
-    told_crew: Option<(TwoPerson, Option<Operator>, Option<Address>)>,
+    told_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)>,
     aborted_at_s: Option<f64>,
     files: FileService,
     check_teller: CheckTeller,
@@ -155,7 +157,7 @@ impl VehicleEndpoint {
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
             text_id: 0,
             now_s: 0.0,
-            warned_of_twin: false,
+            twin_heard_at_s: None,
             known: BTreeSet::new(),
             stations: Stations::default(),
             starts_by_itself: false,
@@ -200,23 +202,20 @@ impl VehicleEndpoint {
         Self { us, lanes, ..self }
     }
 
-    /// Takes a frame from a link. The vehicle decides requests in its next frame ([`VehicleEndpoint::heard`],
+    /// Takes a frame that came in this way. The vehicle decides requests in its next frame ([`VehicleEndpoint::heard`],
     /// [`VehicleEndpoint::on_answers`]); answers come out of [`VehicleEndpoint::poll`].
-    pub fn on_frame(&mut self, link: usize, frame: &Frame, vehicle: &dyn Vehicle) {
+    pub fn on_frame(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &dyn Vehicle) {
         if frame.source() == self.us {
-            if !self.warned_of_twin {
-                self.warned_of_twin = true;
-                let Address { system_id, component_id } = self.us;
-                let words = format!("another system {system_id} component {component_id} is on this link");
-                self.say(Severity::Warning, &words);
-            }
+            self.note_twin(vehicle.time_s());
             return;
         }
+        let path = path.into();
+        let link = path.link;
         if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
             self.lane(link).on_radio(radio.txbuf, vehicle.time_s());
             return;
         }
-        self.stations.accepted(frame, vehicle.time_s());
+        self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s());
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
@@ -226,11 +225,11 @@ impl VehicleEndpoint {
         if let Some(request) = CommandRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
                 let by = operator_of(frame, vehicle);
-                self.on_command(link, (&request, by), vehicle);
+                self.on_command(path, (&request, by), vehicle);
             }
             return;
         }
-        if self.on_question(link, frame, vehicle) {
+        if self.on_question(path, frame, vehicle) {
             return;
         }
         match frame.decode() {
@@ -265,6 +264,11 @@ impl VehicleEndpoint {
             // An unknown message: no answer is better than a guess.
             Err(_) => {}
         }
+    }
+
+    /// Takes a copy of a frame, which had come in another way before.
+    pub fn on_copy(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &dyn Vehicle) {
+        self.stations.copied(frame, &sender_of(frame, path.into(), vehicle));
     }
 
     /// Warns the crew about a command without a valid signature. It is not acknowledged: otherwise a forger could cause
@@ -364,23 +368,27 @@ impl VehicleEndpoint {
     /// Takes a command, which may be for everybody. `by` is the operator whose key has signed it.
     pub fn on_command(
         &mut self,
-        link: usize,
+        path: impl Into<Path>,
         (request, by): (&CommandRequest, Option<Operator>),
         vehicle: &dyn Vehicle,
     ) {
+        let path = path.into();
+        let link = path.link;
+        let key = by.map_or(0, |by| by.number);
+        let station = self.stations.of(&Sender { address: request.source, key, path });
         let (result, reason) = match commands::parse(request) {
-            Ok(asked) if let Some(why) = mission::why_other(request, &asked, vehicle) => {
-                (MavResult::MAV_RESULT_DENIED, Some(why))
+            Ok(asked) if let Some(unfit) = self.why_not_meant(request, &asked, station, vehicle) => {
+                (unfit.result, unfit.reason)
             }
             Err(unfit) => (unfit.result, unfit.reason),
-            Ok(Command::Vehicle(asked)) => return self.put(link, (request, by), asked, vehicle),
+            Ok(Command::Vehicle(asked)) => return self.put(link, (request, by, station), asked, vehicle),
             Ok(Command::ForcedDisarm) => {
                 let asked = if means_abort(vehicle) { Asked::Abort } else { Asked::Disarm };
-                return self.put(link, (request, by), asked, vehicle);
+                return self.put(link, (request, by, station), asked, vehicle);
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 let now_s = self.now_s;
-                if let Some(reason) = self.rates_forbidden(request.source, by, vehicle) {
+                if let Some(reason) = self.rates_forbidden(station, by, vehicle) {
                     (MavResult::MAV_RESULT_DENIED, Some(format!("message {message_id}: {reason}")))
                 } else {
                     self.with_rates_of(link, |streams| streams.set_interval(message_id, interval_us, now_s))
@@ -407,16 +415,16 @@ impl VehicleEndpoint {
     /// set them; if the vehicle armed itself, every station may.
     fn rates_forbidden(
         &self,
-        station: Address,
+        station: Station,
         by: Option<Operator>,
         vehicle: &dyn Vehicle,
     ) -> Option<String> {
         if !vehicle.operators().is_empty() && by.is_none() {
             return Some("only an operator with a key of their own sets rates".to_owned());
         }
-        let Address { system_id, component_id } =
+        let armed_by =
             self.stations.armed_by().filter(|by| vehicle.mode().interlocks.armed && *by != station)?;
-        Some(format!("while armed, only {system_id}/{component_id}, which armed, sets rates"))
+        Some(format!("while armed, only {armed_by}, which armed, sets rates"))
     }
 
     /// Changes the rates of one link: an interval applies to the link that asked. A link that shared a lane with others
@@ -514,6 +522,12 @@ impl VehicleEndpoint {
 /// The operator whose key has signed a frame.
 fn operator_of(frame: &Frame, vehicle: &dyn Vehicle) -> Option<Operator> {
     vehicle.operators().iter().find(|operator| operator.number == frame.key_number()).copied()
+}
+
+/// Who has sent a frame. Without operators the key number in a signature means nothing.
+fn sender_of(frame: &Frame, path: Path, vehicle: &dyn Vehicle) -> Sender {
+    let key = if vehicle.operators().is_empty() { 0 } else { frame.key_number() };
+    Sender { address: frame.source(), key, path }
 }
 
 /// Whether a forced disarm is an abort, as in the air. Other ground stations call it an emergency stop or a kill.

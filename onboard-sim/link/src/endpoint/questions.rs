@@ -7,14 +7,15 @@ use protocol::ftp::FileRequest;
 use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::lists::ListQuestion;
-use super::{VehicleEndpoint, operator_of};
+use super::{Path, VehicleEndpoint, operator_of, sender_of};
 use crate::parameters;
 use crate::vehicle::Vehicle;
 use flight::computer::news::Severity;
 
 impl VehicleEndpoint {
     /// Answers a question about parameters, files or lists; returns whether the frame was one.
-    pub(super) fn on_question(&mut self, link: usize, frame: &Frame, vehicle: &dyn Vehicle) -> bool {
+    pub(super) fn on_question(&mut self, path: Path, frame: &Frame, vehicle: &dyn Vehicle) -> bool {
+        let link = path.link;
         if let Some(request) = FileRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
                 self.on_file_request(link, &request, operator_of(frame, vehicle), vehicle);
@@ -43,7 +44,8 @@ impl VehicleEndpoint {
                 lane.request(vec![answer]);
             }
             ParamQuestion::Set { id, value, value_type } => {
-                let forbidden = self.rates_forbidden(asker, by, vehicle);
+                let station = self.stations.of(&sender_of(frame, path, vehicle));
+                let forbidden = self.rates_forbidden(station, by, vehicle);
                 let now_s = self.now_s;
                 let set = self.with_rates_of(link, |streams| {
                     parameters::set(id, value, value_type, forbidden, streams, now_s)

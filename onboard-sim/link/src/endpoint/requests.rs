@@ -7,8 +7,8 @@ use flight::computer::crew::{Answer, Asked, Ending, People, Request};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
+use flight::rules::two_person::Station;
 use protocol::command::{CommandAnswer, CommandRequest};
-use protocol::identity::Address;
 
 use super::VehicleEndpoint;
 use crate::commands;
@@ -48,7 +48,7 @@ impl VehicleEndpoint {
     pub(super) fn put(
         &mut self,
         link: usize,
-        (command, by): (&CommandRequest, Option<Operator>),
+        (command, by, station): (&CommandRequest, Option<Operator>, Station),
         asked: Asked,
         vehicle: &dyn Vehicle,
     ) {
@@ -59,11 +59,10 @@ impl VehicleEndpoint {
         let uplink = if self.starts_by_itself {
             Uplink::NotNeeded
         } else {
-            self.stations.uplink(command.source, vehicle.time_s())
+            self.stations.uplink(station, vehicle.time_s())
         };
-        let Address { system_id, component_id } = command.source;
         let confirms = commands::confirmed_ask(command);
-        let request = Request { asked, uplink, station: Some((system_id, component_id)), by, confirms };
+        let request = Request { asked, uplink, station: Some(station), by, confirms };
         // A station that repeats an abort before the decision is answered once. Nobody else's abort makes it a
         // repetition: an observer may name the same address.
         let repeats =
@@ -88,7 +87,7 @@ impl VehicleEndpoint {
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &dyn Vehicle) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
-            self.note_commander(&command, &request, answer, vehicle);
+            self.note_commander(&request, answer, vehicle);
             let result = commands::mav_result(answer.ending);
             if request.asked == Asked::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
@@ -102,27 +101,19 @@ impl VehicleEndpoint {
 
     /// The first station that armed it is in command: of two people the one who asked. A station that takes over is
     /// next.
-    fn note_commander(
-        &mut self,
-        command: &CommandRequest,
-        request: &Request,
-        answer: &Answer,
-        vehicle: &dyn Vehicle,
-    ) {
-        if answer.ending != Ending::Accepted {
-            return;
-        }
-        let here = (command.source, request.by);
+    fn note_commander(&mut self, request: &Request, answer: &Answer, vehicle: &dyn Vehicle) {
+        let Some(station) = request.station.filter(|_| answer.ending == Ending::Accepted) else { return };
+        let here = (station, request.by);
         match request.asked {
             Asked::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
                 let asked = vehicle.computer().crew().two_person.armed_by();
-                let asked =
-                    asked.filter(|_| matches!(vehicle.people(), Some(People::Two { .. }))).map(|ask| {
-                        let (system_id, component_id) = ask.station;
-                        (Address { system_id, component_id }, Some(ask.by))
-                    });
+                let asked = asked
+                    .filter(|_| matches!(vehicle.people(), Some(People::Two { .. })))
+                    .map(|ask| (ask.station, Some(ask.by)));
                 self.stations.set_commander(Some(asked.unwrap_or(here)));
             }
+            // Disarmed and armed again before the next frame: the next one is in command.
+            Asked::Disarm => self.stations.set_commander(None),
             Asked::TakeCommand => self.stations.set_commander(Some(here)),
             _ => {}
         }
@@ -134,7 +125,7 @@ impl VehicleEndpoint {
             return (Uplink::NotNeeded, None);
         }
         let commander = self.stations.commander().map(|(station, by)| Commander {
-            station: (station.system_id, station.component_id),
+            station,
             age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
             by,
         });

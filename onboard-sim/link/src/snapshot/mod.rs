@@ -8,7 +8,7 @@ use flight::computer::pilot::ApogeeAhead;
 use flight::computer::{AbortEffect, Commander, Computer, LogState};
 use flight::guidance::controller::ControlLevel;
 use flight::rules::operator::Operator;
-use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
+use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::rigid::RigidState;
@@ -44,6 +44,11 @@ pub struct Snapshot {
     pub approach_wait_s: Option<f64>,
     /// Why the last countdown was held, and the time left until the vehicle disarms, s.
     pub held: Option<(HoldCause, f64)>,
+    /// While a countdown runs: time before the release from which on nothing holds the countdown, s; `None` if a hold comes in
+    /// time until then.
+    pub last_hold_s: Option<f64>,
+    /// Why the landing motor is inhibited for good.
+    pub latch: Option<Latch>,
     /// Bit k: arming check k fails now. Nought off the pad.
     pub checks_failed: u16,
     /// What an abort would do.
@@ -352,6 +357,8 @@ impl Known<'_> {
             motor: mode.motor_status(time_s),
             approach_wait_s: mode.approach_wait_s(time_s),
             held: mode.held(time_s),
+            last_hold_s: computer.last_hold_s().filter(|_| mode.countdown_end_s.is_some()),
+            latch: computer.latch(),
             checks_failed: failing.unwrap_or(0),
             abort_effect: computer.abort_effect(),
             motion,

@@ -24,6 +24,23 @@ fn station(system_id: u8) -> Address {
     Address { system_id, component_id: 190 }
 }
 
+/// One path for everybody.
+fn sender(address: Address) -> Sender {
+    Sender { address, key: 0, path: Path::from(0) }
+}
+
+fn hear(stations: &mut Stations, frame: &Frame, time_s: f64) {
+    stations.accepted(frame, &sender(frame.source()), time_s);
+}
+
+fn known(stations: &Stations, address: Address) -> flight::rules::two_person::Station {
+    stations.of(&sender(address))
+}
+
+fn age_s(stations: &Stations, address: Address, time_s: f64) -> Option<f64> {
+    stations.age_s(known(stations, address), time_s)
+}
+
 /// The reports sent at a time, by addressee.
 fn told(stations: &mut Stations, time_s: f64) -> Vec<(Address, TD_UPLINK_DATA)> {
     let read = |message| match message {
@@ -39,15 +56,15 @@ fn told(stations: &mut Stations, time_s: f64) -> Vec<(Address, TD_UPLINK_DATA)> 
 #[test]
 fn any_accepted_frame_counts_for_the_age_and_a_heartbeat_alone_proves_the_uplink() {
     let mut stations = Stations::default();
-    assert_eq!(stations.age_s(GROUND, 1.0), None);
-    stations.accepted(&command_from(GROUND), 1.0);
-    assert_eq!(stations.age_s(GROUND, 1.5), Some(0.5));
-    assert_eq!(stations.uplink(GROUND, 1.5), Uplink::NeverHeard);
-    stations.accepted(&beat_from(GROUND), 2.0);
-    stations.accepted(&command_from(GROUND), 3.0);
-    assert_eq!(stations.age_s(GROUND, 3.5), Some(0.5));
-    assert_eq!(stations.uplink(GROUND, 3.5), Uplink::Heard { age_s: 1.5 });
-    assert_eq!(stations.uplink(station(7), 3.5), Uplink::NeverHeard);
+    assert_eq!(age_s(&stations, GROUND, 1.0), None);
+    hear(&mut stations, &command_from(GROUND), 1.0);
+    assert_eq!(age_s(&stations, GROUND, 1.5), Some(0.5));
+    assert_eq!(stations.uplink(known(&stations, GROUND), 1.5), Uplink::NeverHeard);
+    hear(&mut stations, &beat_from(GROUND), 2.0);
+    hear(&mut stations, &command_from(GROUND), 3.0);
+    assert_eq!(age_s(&stations, GROUND, 3.5), Some(0.5));
+    assert_eq!(stations.uplink(known(&stations, GROUND), 3.5), Uplink::Heard { age_s: 1.5 });
+    assert_eq!(stations.uplink(known(&stations, station(7)), 3.5), Uplink::NeverHeard);
     assert_eq!(stations.best_uplink(4.0), Uplink::Heard { age_s: 2.0 });
 }
 
@@ -55,8 +72,8 @@ fn any_accepted_frame_counts_for_the_age_and_a_heartbeat_alone_proves_the_uplink
 #[test]
 fn a_radio_s_report_proves_nothing_whatever_address_it_names() {
     let mut stations = Stations::default();
-    stations.accepted(&frame_from(GROUND, &MavMessage::RADIO_STATUS(RADIO::default())), 1.0);
-    assert_eq!(stations.age_s(GROUND, 1.0), None);
+    hear(&mut stations, &frame_from(GROUND, &MavMessage::RADIO_STATUS(RADIO::default())), 1.0);
+    assert_eq!(age_s(&stations, GROUND, 1.0), None);
 }
 
 #[test]
@@ -80,11 +97,11 @@ fn each_station_is_told_its_own_age_twice_a_second() {
     for frame in 0..500 {
         let time_s = 0.02 * f64::from(frame);
         if frame % 5 == 0 {
-            stations.accepted(&beat_from(GROUND), time_s);
+            hear(&mut stations, &beat_from(GROUND), time_s);
         }
         if frame == 100 {
-            stations.accepted(&beat_from(station(7)), time_s);
-            stations.set_commander(Some((station(7), None)));
+            hear(&mut stations, &beat_from(station(7)), time_s);
+            stations.set_commander(Some((known(&stations, station(7)), None)));
         }
         for (to, uplink) in told(&mut stations, time_s) {
             messages += 1;
@@ -104,7 +121,7 @@ fn each_station_is_told_its_own_age_twice_a_second() {
 #[test]
 fn ages_and_counts_saturate() {
     let mut stations = Stations::default();
-    stations.accepted(&beat_from(GROUND), 0.0);
+    hear(&mut stations, &beat_from(GROUND), 0.0);
     for _ in 0..70_000 {
         stations.refused(GROUND, Rejection::Unsigned, 1.0);
     }
@@ -116,22 +133,22 @@ fn ages_and_counts_saturate() {
 #[test]
 fn a_flood_of_strangers_pushes_out_no_station_that_has_proved_itself() {
     let mut stations = Stations::default();
-    stations.accepted(&beat_from(GROUND), 0.0);
-    stations.accepted(&command_from(station(7)), 0.0);
-    stations.set_commander(Some((station(7), None)));
+    hear(&mut stations, &beat_from(GROUND), 0.0);
+    hear(&mut stations, &command_from(station(7)), 0.0);
+    stations.set_commander(Some((known(&stations, station(7)), None)));
     for system_id in 8..=250 {
-        stations.accepted(&command_from(station(system_id)), 1.0);
+        hear(&mut stations, &command_from(station(system_id)), 1.0);
         assert!(stations.known.len() <= MAX_STATIONS);
     }
-    assert_eq!(stations.age_s(GROUND, 1.0), Some(1.0));
-    assert_eq!(stations.age_s(station(7), 1.0), Some(1.0), "it armed the vehicle");
-    assert_eq!(stations.age_s(station(250), 1.0), Some(0.0), "the free place went round");
+    assert_eq!(age_s(&stations, GROUND, 1.0), Some(1.0));
+    assert_eq!(age_s(&stations, station(7), 1.0), Some(1.0), "it armed the vehicle");
+    assert_eq!(age_s(&stations, station(250), 1.0), Some(0.0), "the free place went round");
     // A minute after its last heartbeat the entry of a station is free.
-    stations.accepted(&beat_from(station(9)), 30.0);
-    stations.accepted(&beat_from(station(10)), 59.0);
-    assert_eq!(stations.age_s(station(10), 59.0), None, "all three are proven, or armed it");
-    stations.accepted(&beat_from(station(10)), 61.0);
-    assert_eq!((stations.age_s(GROUND, 61.0), stations.age_s(station(10), 61.0)), (None, Some(0.0)));
+    hear(&mut stations, &beat_from(station(9)), 30.0);
+    hear(&mut stations, &beat_from(station(10)), 59.0);
+    assert_eq!(age_s(&stations, station(10), 59.0), None, "all three are proven, or armed it");
+    hear(&mut stations, &beat_from(station(10)), 61.0);
+    assert_eq!((age_s(&stations, GROUND, 61.0), age_s(&stations, station(10), 61.0)), (None, Some(0.0)));
 }
 
 /// The probability of a run of lost frames of this length, among frames lost independently with a given probability.
@@ -171,11 +188,183 @@ fn with_half_the_frames_lost_a_countdown_is_held_less_than_once_in_a_thousand() 
     const RATE_HZ: f64 = 10.0;
     // One frame fewer, to allow for a frame that comes a little late.
     let silent_frames = (UPLINK_SILENT_S * RATE_HZ) as usize - 1;
-    // The longest countdown that is flown is 5 s; half a minute is safe, too.
-    for countdown_s in [5.0, 30.0] {
+    // The built-in missions count down for 10 s; half a minute is safe, too.
+    for countdown_s in [10.0, 30.0] {
         let frames = ((countdown_s + UPLINK_SILENT_S) * RATE_HZ) as usize;
         let chance = chance_of_a_run(frames, silent_frames, LOST);
         assert!(chance < 1e-3, "{chance} in {countdown_s} s");
     }
     assert!(chance_of_a_run(5 + 2, 2, LOST) > 0.5);
+}
+
+/// A program that speaks as [`GROUND`], whatever others do.
+struct Program {
+    encoder: Encoder,
+    session: u32,
+    sender: Sender,
+}
+
+impl Program {
+    fn new(session: u32, key: u8, link: usize) -> Self {
+        let sender = Sender { key, path: Path::from(link), ..sender(GROUND) };
+        Self { encoder: Encoder::new(GROUND), session, sender }
+    }
+
+    fn on(self, stream: u64) -> Self {
+        let path = Path { origin: Some(Origin::Stream(stream)), ..self.sender.path };
+        Self { sender: Sender { path, ..self.sender }, ..self }
+    }
+
+    fn beat(&mut self) -> Frame {
+        let (custom_mode, mavtype) = (self.session, MavType::MAV_TYPE_GCS);
+        self.encoder.encode(&MavMessage::HEARTBEAT(BEAT { custom_mode, mavtype, ..BEAT::default() }))
+    }
+
+    fn beats(&mut self, stations: &mut Stations, time_s: f64) -> flight::rules::two_person::Station {
+        let beat = self.beat();
+        stations.accepted(&beat, &self.sender, time_s);
+        stations.of(&self.sender)
+    }
+}
+
+/// A new session is a program that was started again, another key another person, and without a session another socket is
+/// another program.
+#[test]
+fn programs_with_the_same_ids_are_told_apart_and_told_of_each_other() {
+    for (mut one, mut other) in [
+        (Program::new(7, 0, 0), Program::new(8, 0, 0)),
+        (Program::new(7, 1, 0), Program::new(7, 2, 0)),
+        (Program::new(0, 0, 0).on(1), Program::new(0, 0, 0).on(2)),
+        (Program::new(7, 0, 0).on(1), Program::new(0, 0, 0).on(2)),
+    ] {
+        let mut stations = Stations::default();
+        let first = one.beats(&mut stations, 0.0);
+        assert_eq!(stations.same_ids(first, 0.0), 0);
+        let second = other.beats(&mut stations, 0.5);
+        assert_ne!(first, second);
+        assert_eq!((stations.same_ids(first, 0.5), stations.same_ids(second, 0.5)), (1, 1));
+        stations.set_commander(Some((first, None)));
+        let reports = told(&mut stations, 0.5);
+        let reports: Vec<_> = reports
+            .iter()
+            .map(|(to, uplink)| (*to, uplink.session, uplink.commands, uplink.same_id))
+            .collect();
+        assert_eq!(reports, [(GROUND, one.session, 1, 1), (GROUND, other.session, 0, 1)]);
+        // The second goes on; the first is in command, and is silent.
+        for tenth in 6..80 {
+            other.beats(&mut stations, 0.1 * f64::from(tenth));
+        }
+        assert_eq!(stations.age_s(first, 7.9), Some(7.9));
+        assert_eq!(stations.same_ids(second, 7.9), 0, "more than 5 s later");
+        // No longer in command, it leaves no trace.
+        stations.set_commander(None);
+        other.beats(&mut stations, 8.0);
+        assert_eq!(stations.known.len(), 1);
+    }
+}
+
+#[test]
+fn a_program_that_is_started_again_and_again_always_has_a_place() {
+    let mut stations = Stations::default();
+    for session in 1..50 {
+        let from_s = 6.0 * f64::from(session);
+        let mut program = Program::new(session, 0, 0);
+        program.beats(&mut stations, from_s);
+        let station = program.beats(&mut stations, from_s + 1.0);
+        assert_eq!(stations.uplink(station, from_s + 1.0), Uplink::Heard { age_s: 0.0 }, "{session}");
+    }
+}
+
+/// Without a session, too; frames are lost on either link.
+#[test]
+fn a_program_over_two_links_is_one_station() {
+    for session in [0, 9] {
+        let mut stations = Stations::default();
+        let mut program = Program::new(session, 0, 0);
+        let over = |link: usize| Sender { path: Path::from(link), ..sender(GROUND) };
+        let mut number = None;
+        for beat in 0..60 {
+            let time_s = 0.1 * f64::from(beat);
+            let frame = program.beat();
+            match beat % 6 {
+                0 | 1 => {
+                    stations.accepted(&frame, &over(0), time_s);
+                    stations.copied(&frame, &over(1));
+                }
+                2 => stations.accepted(&frame, &over(0), time_s),
+                3 => {
+                    stations.accepted(&frame, &over(1), time_s);
+                    stations.copied(&frame, &over(0));
+                }
+                4 => stations.accepted(&frame, &over(1), time_s),
+                _ => {}
+            }
+            let stations_by_link = [stations.of(&over(0)), stations.of(&over(1))];
+            assert_eq!(stations_by_link[0], stations_by_link[1]);
+            assert_eq!(*number.get_or_insert(stations_by_link[0]), stations_by_link[0]);
+            assert_eq!(stations.same_ids(stations_by_link[0], time_s), 0);
+        }
+    }
+    // The first heartbeats arrive over one link each: the first copy shows that it is one program.
+    let mut stations = Stations::default();
+    let mut program = Program::new(0, 0, 0);
+    let over = |link: usize| Sender { path: Path::from(link), ..sender(GROUND) };
+    stations.accepted(&program.beat(), &over(0), 0.0);
+    stations.accepted(&program.beat(), &over(1), 0.1);
+    stations.set_commander(Some((stations.of(&over(1)), None)));
+    let frame = program.beat();
+    stations.accepted(&frame, &over(0), 0.2);
+    stations.copied(&frame, &over(1));
+    assert_eq!(stations.of(&over(0)), stations.of(&over(1)));
+    assert_eq!(stations.armed_by(), Some(stations.of(&over(0))));
+    assert_eq!(stations.same_ids(stations.of(&over(0)), 0.2), 0);
+}
+
+/// Over a radio both take the same path: whose frame it was cannot be known, so only heartbeats keep a station alive.
+#[test]
+fn a_station_with_a_session_lives_by_its_heartbeats_alone() {
+    let mut stations = Stations::default();
+    let mut program = Program::new(9, 0, 0);
+    let station = program.beats(&mut stations, 0.0);
+    hear(&mut stations, &command_from(GROUND), 1.5);
+    assert_eq!(known(&stations, GROUND), station);
+    assert_eq!(stations.age_s(station, 2.0), Some(2.0));
+    // Whoever has no session and sends no heartbeats while it works lives by any frame.
+    let mut stations = Stations::default();
+    hear(&mut stations, &beat_from(GROUND), 0.0);
+    hear(&mut stations, &command_from(GROUND), 1.5);
+    assert_eq!(age_s(&stations, GROUND, 2.0), Some(0.5));
+}
+
+/// A command that comes before the first heartbeat, over a path that no heartbeat takes: nobody is heard there.
+#[test]
+fn a_command_over_an_unknown_path_is_nobody_s_whose_heartbeat_is_heard() {
+    let mut stations = Stations::default();
+    let mut program = Program::new(9, 0, 0);
+    let station = program.beats(&mut stations, 0.0);
+    let elsewhere = Program::new(0, 0, 0).on(4).sender;
+    stations.accepted(&command_from(GROUND), &elsewhere, 0.1);
+    let other = stations.of(&elsewhere);
+    assert_ne!(other, station);
+    assert_eq!(stations.uplink(other, 0.1), Uplink::NeverHeard);
+    assert_eq!((stations.same_ids(station, 0.1), stations.same_ids(other, 0.1)), (0, 1));
+    // Its heartbeat tells which one it was.
+    let mut late = Program::new(10, 0, 0).on(4);
+    assert_eq!(late.beats(&mut stations, 0.2), other);
+}
+
+#[test]
+fn another_one_that_finds_no_place_is_told_of_all_the_same() {
+    let mut stations = Stations::default();
+    let mut one = Program::new(7, 0, 0);
+    let first = one.beats(&mut stations, 0.0);
+    for system_id in [7, 8] {
+        hear(&mut stations, &beat_from(station(system_id)), 0.0);
+    }
+    let mut other = Program::new(8, 0, 1);
+    let second = other.beats(&mut stations, 1.0);
+    assert_eq!(second.number, 0);
+    assert_eq!((stations.same_ids(first, 1.0), stations.same_ids(second, 1.0)), (1, 1));
+    assert_eq!(stations.uplink(second, 1.0), Uplink::NeverHeard);
+    assert_eq!(stations.same_ids(first, 6.1), 0);
 }

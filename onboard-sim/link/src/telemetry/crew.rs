@@ -28,7 +28,7 @@ fn mission(snapshot: &Snapshot) -> MavMessage {
 fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
     let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
     let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
-    let (system, component) = crew.commander.map_or((0, 0), |(station, _)| station);
+    let commander = crew.commander.map(|(station, _)| station);
     MavMessage::TD_CREW(TD_CREW_DATA {
         time_boot_ms: boot_ms(time_s),
         ask_number: crew.ask.map_or(0, |(_, number, ..)| number),
@@ -46,8 +46,8 @@ fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
         asked_by: number(crew.ask.map(|(_, _, by, _)| by)),
         tapped_by: number(crew.tap.map(|(by, _)| by)),
         commanded_by: number(crew.commander.and_then(|(_, by)| by)),
-        commanding_system: system,
-        commanding_component: component,
+        commanding_system: commander.map_or(0, |station| station.system),
+        commanding_component: commander.map_or(0, |station| station.component),
         held_by: number(crew.held_by),
     })
 }

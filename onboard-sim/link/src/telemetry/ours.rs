@@ -1,6 +1,6 @@
 //! The messages of our dialect that every vehicle sends.
 
-use flight::rules::phase::{HoldCause, Interlocks, MotorStatus, Phase};
+use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
@@ -37,8 +37,8 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
         abort_impact_m_s,
         boot_number,
         vehicle_flags: TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
-        latch: TdLatch::TD_LATCH_NONE,
-        last_hold_ms: 0,
+        latch: td_latch(snapshot.latch),
+        last_hold_ms: snapshot.last_hold_s.map_or(0, |s| libm::round(1000.0 * s) as u16),
     })
 }
 
@@ -64,6 +64,19 @@ fn interlocks(locks: Interlocks) -> TdInterlock {
     bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
     bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
     bits
+}
+
+fn td_latch(latch: Option<Latch>) -> TdLatch {
+    match latch {
+        None => TdLatch::TD_LATCH_NONE,
+        Some(Latch::Commanded) => TdLatch::TD_LATCH_COMMANDED,
+        Some(Latch::UncommandedLiftOff) => TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF,
+        Some(Latch::UncommandedRelease) => TdLatch::TD_LATCH_UNCOMMANDED_RELEASE,
+        Some(Latch::NoSeparation) => TdLatch::TD_LATCH_NO_SEPARATION,
+        Some(Latch::Gate) => TdLatch::TD_LATCH_GATE,
+        Some(Latch::NoLight) => TdLatch::TD_LATCH_NO_LIGHT,
+        Some(Latch::Other) => TdLatch::TD_LATCH_OTHER,
+    }
 }
 
 fn td_motor(status: MotorStatus) -> TdMotor {

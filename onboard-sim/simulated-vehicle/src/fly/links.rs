@@ -17,7 +17,7 @@ use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::FlyError;
 use super::recording::{note, record_raw};
-use crate::endpoint::Outgoing;
+use crate::endpoint::{Outgoing, Path};
 
 /// Longest interval between saved timestamps, in units of 10 us.
 const REMEMBER_EVERY: u64 = 100_000;
@@ -85,8 +85,10 @@ impl Intake {
 
 /// A frame from a link.
 pub(super) enum Heard {
-    /// A frame to act on, and the number of its link.
-    Frame(usize, Frame),
+    /// A frame to act on, and how it came in.
+    Frame(Path, Frame),
+    /// A frame that had come in another way before.
+    Copy(Path, Frame),
     /// A frame to ignore: its signature is missing or wrong.
     Rejected(Frame, Rejection),
 }
@@ -132,6 +134,7 @@ impl Links {
         for (number, OpenLink { transport, sender, name }) in self.open.iter_mut().enumerate() {
             for _ in 0..MAX_AT_ONCE {
                 let Some(received) = transport.try_receive() else { break };
+                let path = Path { link: number, origin: received.origin() };
                 for news in self.hub.take(number, received, now, clock) {
                     match news {
                         News::Believed(origin) => {
@@ -140,9 +143,12 @@ impl Links {
                         }
                         News::Frame(frame) => {
                             self.intake.record(name, &frame, time_s);
-                            heard.push(Heard::Frame(number, frame));
+                            heard.push(Heard::Frame(path, frame));
                         }
-                        News::Copy(frame) => self.intake.record(name, &frame, time_s),
+                        News::Copy(frame) => {
+                            self.intake.record(name, &frame, time_s);
+                            heard.push(Heard::Copy(path, frame));
+                        }
                         // Counted but not recorded: a flood of forgeries must not fill the log.
                         News::Rejected(frame, why) => heard.push(Heard::Rejected(frame, why)),
                         News::Strangers(words) => note(recorder, time_s, &format!("link {name}: {words}")),

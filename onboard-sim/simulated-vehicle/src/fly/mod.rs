@@ -345,7 +345,8 @@ pub async fn fly_observed(
         let arrived = links.receive(vehicle.time_s());
         for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             match heard {
-                Heard::Frame(link, frame) => endpoint.on_frame(link, &frame, &vehicle),
+                Heard::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle),
+                Heard::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle),
                 Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }

@@ -11,8 +11,13 @@ fn every_builtin_mission_is_sound() {
 }
 
 #[test]
-fn the_countdown_is_range_checked_and_five_seconds_by_default() {
+fn the_countdown_is_range_checked_ten_seconds_and_five_in_a_text_that_does_not_say() {
+    for (name, text) in BUILTIN {
+        let mission = from_toml(text, name).expect("a valid mission");
+        assert!((mission.start.countdown_s - 10.0).abs() < 1e-12, "{name}");
+    }
     let (name, text) = BUILTIN[0];
+    let text = &text.replace("countdown_s = 10.0\n", "");
     let of = |countdown: &str| from_toml(&text.replace("[start]", countdown), name);
     assert!((of("[start]").expect("a valid mission").start.countdown_s - 5.0).abs() < 1e-12);
     assert!((of("[start]\ncountdown_s = 0").expect("a valid mission").start.countdown_s).abs() < 1e-12);

@@ -5,7 +5,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 
-use super::{HoldCause, Phase, StartPoint};
+use super::{HoldCause, LAST_HOLD_S, Phase, StartPoint};
 
 /// Something that happened or was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,8 @@ pub enum Event {
     /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a hold.
     Hold {
         cause: HoldCause,
+        /// Where the flight starts, which decides until when a hold comes in time.
+        start: StartPoint,
     },
     /// A hold has lasted for [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).
     HoldElapsed,
@@ -230,6 +232,8 @@ pub enum Refusal {
     NoCountdown,
     /// The countdown is already held.
     AlreadyHeld,
+    /// The release is too near for a hold.
+    TooLateToHold,
     /// No hold has reached its time limit.
     HoldNotOver,
     /// The countdown has not ended, or was never started.
@@ -265,6 +269,9 @@ impl Refusal {
             Self::CountdownRunning => "a countdown is running: disarm to cancel it".to_owned(),
             Self::NoCountdown => "no countdown is running".to_owned(),
             Self::AlreadyHeld => "already held".to_owned(),
+            Self::TooLateToHold => {
+                format!("the last {LAST_HOLD_S} s have begun, and nothing holds any more: abort to stop it")
+            }
             Self::HoldNotOver => "no hold has lasted its time".to_owned(),
             Self::CountdownNotElapsed => "the countdown has not ended".to_owned(),
             Self::BadCountdown => "the countdown must be a number of seconds, 0 or more".to_owned(),

@@ -7,12 +7,14 @@
 
 mod event;
 mod hold;
+mod latch;
 mod motor;
 mod transition;
 
 pub use crate::vehicle::profile::StartPoint;
 pub use event::{Effect, Effects, Event, Refusal};
-pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, UPLINK_SILENT_S};
+pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, LAST_HOLD_S, UPLINK_SILENT_S};
+pub use latch::Latch;
 pub use motor::{MISFIRE_WAIT_S, MOTOR_HOT_S, Motor, MotorStatus};
 use serde::{Deserialize, Serialize};
 pub use transition::{Transition, transition};

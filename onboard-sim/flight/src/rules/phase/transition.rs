@@ -109,7 +109,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
 
         // A hold cancels the countdown: only a new start counts down again.
-        (P::PadArmed, E::Hold { cause }) => match (mode.countdown_end_s, mode.hold) {
+        (P::PadArmed, E::Hold { cause, start }) => match (mode.countdown_end_s, mode.hold) {
+            (Some(_), _) if !mode.may_hold(start, time_s) => Row::Refuse(Refusal::TooLateToHold),
             (Some(_), _) => Row::Go(
                 Mode { countdown_end_s: None, hold: Some(Hold { cause, at_s: time_s }), ..*mode },
                 phase,

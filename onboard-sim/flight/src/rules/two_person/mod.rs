@@ -5,9 +5,11 @@
 //!
 //! An ask has a number, and a confirmation names it: two people who ask at the same moment have not confirmed each
 //! other, and a confirmation that was meant for an earlier ask, or is sent again later, confirms nothing. From the
-//! agreed start to the release the one who confirmed it taps a key; without a tap for [`TAP_WITHIN_S`] the countdown is
-//! held. A terminal reports no release of a key, so the taps stand for the hand on a dead-man's switch, which amateur
+//! agreed start to the release the one who confirmed it taps a key (or the one who asked, if the other is in command: it
+//! takes two in the countdown, too); without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of a key, so the taps stand for the hand on a dead-man's switch, which amateur
 //! launch sites ask of a second person.
+
+use core::fmt;
 
 use super::operator::Operator;
 use crate::computer::memory::remembers;
@@ -41,8 +43,23 @@ impl Act {
     }
 }
 
-/// MAVLink system and component of a station.
-pub type Station = (u8, u8);
+/// A ground station, as the vehicle tells it apart from others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Station {
+    /// MAVLink system.
+    pub system: u8,
+    /// MAVLink component.
+    pub component: u8,
+    /// Which of those that were heard under these ids: every station has another number. 0 in logs from before they were
+    /// told apart.
+    pub number: u32,
+}
+
+impl fmt::Display for Station {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}/{}", self.system, self.component)
+    }
+}
 
 /// An ask that waits for its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,7 +201,7 @@ impl TwoPerson {
         self.armed
     }
 
-    /// The countdown has begun: from now on this operator taps.
+    /// The countdown has begun: from now on this operator taps, who is not in command.
     pub fn begin_taps(&mut self, by: Operator, time_s: f64) {
         self.tapping = Some(Tapping { by, at_s: time_s });
     }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::rules::operator::{Name, Role};
 
-const STATION: Station = (255, 190);
+const STATION: Station = Station { system: 255, component: 190, number: 1 };
 
 fn operator(number: u8, role: Role) -> Operator {
     Operator { number, role, name: Name::new("") }

@@ -4,7 +4,6 @@ use protocol::dialect::{TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA};
 use protocol::mission::MissionHash;
 
 use super::*;
-use vehicle_link::commands::Command;
 
 const ARM: u16 = 400;
 
@@ -124,7 +123,7 @@ proptest! {
             confirmation: 0,
         };
         let vehicle = planar().of_mission("mk2", "the right one");
-        let why = vehicle_link::endpoint::mission::why_other(&request, &Command::Vehicle(Asked::Arm), &vehicle);
+        let why = vehicle_link::endpoint::meant::why_other_mission(&request, &vehicle);
         prop_assert_eq!(why.is_none(), arms);
     }
 }

@@ -171,7 +171,7 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
     let mut wire = Wire::new();
     assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
     assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
-    let sent = wire.run_asked(14.0, |_| Vec::new());
+    let sent = wire.run_asked(19.0, |_| Vec::new());
     assert_ne!(
         count(
             &sent.0.iter().map(|(_, frame)| frame.clone()).collect::<Vec<_>>(),

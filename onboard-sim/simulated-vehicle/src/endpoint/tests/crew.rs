@@ -294,6 +294,32 @@ fn the_start_goes_on_while_the_confirmer_taps() {
     assert_eq!(launch.crew.clone().unwrap().held_by, 4);
 }
 
+/// The silence of the station that commands is watched already.
+#[test]
+fn of_the_two_who_start_the_one_who_does_not_command_taps() {
+    // Bob asked for the arming, and commands.
+    let mut launch = Launch::armed_by_two();
+    launch.asks(RANGE, START);
+    assert_eq!(launch.confirms(FLIGHT, START).0, ACCEPTED);
+    assert_eq!(launch.says(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
+    assert_eq!(launch.says(RANGE, TAP, 0.0, 0.0).0, ACCEPTED);
+    let crew = launch.crew.clone().unwrap();
+    assert_eq!((crew.commanded_by, crew.tapped_by), (2, 1));
+    // Nor does she take command while she taps: in the last moment nothing holds, and he may be silent.
+    while launch.vehicle.mode().countdown_remaining_s(launch.vehicle.time_s()).unwrap() > 3.0 {
+        launch.says(RANGE, TAP, 0.0, 0.0);
+    }
+    launch.speaking = vec![RANGE];
+    for _ in 0..5 {
+        launch.says(RANGE, TAP, 0.0, 0.0);
+    }
+    launch.run(0.15);
+    assert!(launch.counts_down());
+    let (answer, words) = launch.says(RANGE, TAKE_COMMAND, 0.0, 0.0);
+    assert_eq!(answer, DENIED);
+    assert!(words.contains("RANGE SAFETY Ann taps"), "{words}");
+}
+
 /// After the release a missing tap means nothing.
 #[test]
 fn taps_end_with_the_release() {
@@ -311,16 +337,29 @@ fn taps_end_with_the_release() {
 }
 
 #[test]
-fn anyone_with_a_key_holds_and_aborts_and_nobody_else() {
+fn whoever_holds_a_key_of_this_crew_holds_and_aborts_and_nobody_else() {
     let mut launch = Launch::armed_by_two();
     launch.asks(FLIGHT, START);
     launch.confirms(RANGE, START);
-    for station in [OBSERVER, STRANGER] {
-        assert_ne!(launch.says(station, PAUSE, 0.0, 0.0).0, ACCEPTED);
-        assert_ne!(launch.says(station, ABORT, 1.0, 0.0).0, ACCEPTED);
-        launch.says(RANGE, TAP, 0.0, 0.0);
-    }
+    assert_ne!(launch.says(STRANGER, PAUSE, 0.0, 0.0).0, ACCEPTED);
+    assert_ne!(launch.says(STRANGER, ABORT, 1.0, 0.0).0, ACCEPTED);
+    launch.says(RANGE, TAP, 0.0, 0.0);
+    // An observer has the key that all share.
+    assert_eq!(launch.says(OBSERVER, ARM, 0.0, 0.0).0, DENIED, "a disarm");
     assert!(launch.counts_down() && !launch.vehicle.aborted());
+    let (answer, words) = launch.says(OBSERVER, PAUSE, 0.0, 0.0);
+    assert_eq!(answer, ACCEPTED);
+    assert!(words.contains("station 251/190 asks for a hold"), "{words}");
+    assert!(!launch.counts_down());
+    let mut aborted = Launch::armed_by_two();
+    let (answer, words) = aborted.says(OBSERVER, ABORT, 1.0, 0.0);
+    assert_eq!(answer, ACCEPTED);
+    assert!(words.contains("station 251/190, with the key that all share, aborts"), "{words}");
+    assert!(aborted.vehicle.aborted());
+    launch.asks(FLIGHT, START);
+    assert_eq!(launch.confirms(RANGE, START).0, ACCEPTED);
+    // Texts have a share of each second.
+    launch.run(1.5);
     let (answer, words) = launch.says(FLIGHT_TOO, PAUSE, 0.0, 0.0);
     assert_eq!(answer, ACCEPTED);
     assert!(words.contains("FLIGHT Cat, station 253/190 asks for a hold"), "{words}");

@@ -396,6 +396,7 @@ mod crew;
 mod files;
 mod links;
 mod manners;
+mod meant;
 mod questions;
 mod rocket;
 mod slow_line;

@@ -153,7 +153,7 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
     wire.run(0.2);
     assert_eq!(wire.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
     assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
-    wire.run(7.0);
+    wire.run(wire.vehicle.computer().countdown_s() + 2.0);
     assert!(!wire.vehicle.phase().on_pad(), "{:?}", wire.vehicle.phase());
     let (result, rate_hz, words) = set_rates(&mut wire, other);
     assert_eq!((result, rate_hz.to_bits()), (MavResult::MAV_RESULT_DENIED as u8, 4.0f32.to_bits()));

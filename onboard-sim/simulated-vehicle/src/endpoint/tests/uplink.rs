@@ -1,8 +1,8 @@
 //! Tests the uplink: arming waits for it, a countdown is held without it, and every station gets a report on it.
 
 use flight::rules::arming::{UPLINK_CHECK, all_passed};
-use flight::rules::phase::{HOLD_LIMIT_S, UPLINK_SILENT_S};
-use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdMotor};
+use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_SILENT_S};
+use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor};
 use protocol::signing::Rejection;
 use sim::dispersion::Dispersion;
 
@@ -234,6 +234,48 @@ fn after_the_release_silence_holds_nothing() {
     pad.speaking.clear();
     pad.run(5.0);
     assert!(!pad.vehicle.phase().on_pad() && pad.said("HOLD") == 0);
+}
+
+/// Neither silence nor a command; an abort and a disarm do.
+#[test]
+fn in_the_last_moment_nothing_holds_and_the_crew_is_told_why() {
+    for mut pad in [Pad::planar(), Pad::in_space()] {
+        pad.count_down();
+        assert_eq!(pad.status().last_hold_ms, 2_000);
+        pad.run(pad.vehicle.computer().countdown_s() - LAST_HOLD_S - 0.5);
+        // Silent for 2 s at T-0.3 s.
+        pad.speaking.clear();
+        pad.run(0.3);
+        assert!(pad.counting());
+        pad.run(0.2);
+        assert_eq!(pad.ask(CREW, HOLD, 0.0), DENIED);
+        assert_eq!(pad.said("hold refused: the last 2 s have begun, and nothing holds any more"), 1);
+        assert_eq!(pad.said("asks for a hold"), 0);
+        pad.run(LAST_HOLD_S);
+        assert!(!pad.vehicle.phase().on_pad() && pad.said("HOLD") == 0 && pad.said("nothing heard") == 0);
+    }
+    for (command, param1) in [(ABORT, 1.0), (ARM, 0.0)] {
+        let mut pad = Pad::planar();
+        pad.count_down();
+        pad.run(pad.vehicle.computer().countdown_s() - 1.0);
+        assert_eq!(pad.ask(CREW, command, param1), ACCEPTED);
+        pad.run(3.0);
+        assert!(pad.vehicle.phase().on_pad() && !pad.vehicle.mode().interlocks.armed);
+    }
+    // A drone's pilot lets go at no set time.
+    let mut pad = Pad::hanging();
+    pad.count_down();
+    assert_eq!(pad.status().last_hold_ms, 0);
+    pad.run(pad.vehicle.computer().countdown_s() - 1.0);
+    assert_eq!(pad.ask(CREW, HOLD, 0.0), ACCEPTED);
+}
+
+#[test]
+fn a_latched_abort_has_its_reason_on_the_wire() {
+    let mut pad = Pad::planar();
+    assert_eq!(pad.status().latch, TdLatch::TD_LATCH_NONE);
+    assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED);
+    assert_eq!(pad.status().latch, TdLatch::TD_LATCH_COMMANDED);
 }
 
 #[test]

@@ -2,8 +2,13 @@
 
 use super::*;
 
-const SILENT: Event = Event::Hold { cause: HoldCause::UplinkSilent };
+const SILENT: Event = hold(HoldCause::UplinkSilent, StartPoint::Pad);
 const START: Event = Event::StartRequested { countdown_s: 5.0 };
+const CAUSES: [HoldCause; 3] = [HoldCause::UplinkSilent, HoldCause::Commanded, HoldCause::TapOverdue];
+
+const fn hold(cause: HoldCause, start: StartPoint) -> Event {
+    Event::Hold { cause, start }
+}
 
 /// Armed at 2 s, the countdown started at 3 s, held at 4 s.
 fn held() -> Mode {
@@ -13,8 +18,8 @@ fn held() -> Mode {
 #[test]
 fn a_hold_clears_the_countdown_and_keeps_the_vehicle_armed() {
     let counting = after(&with_arm(&[START]));
-    for cause in [HoldCause::UplinkSilent, HoldCause::Commanded] {
-        let answer = transition(&counting, Event::Hold { cause }, 4.0);
+    for cause in CAUSES {
+        let answer = transition(&counting, hold(cause, StartPoint::Pad), 4.0);
         assert_eq!(answer.effects, Effects::of(&[Effect::HoldCountdown]));
         assert_eq!((answer.mode.phase, answer.mode.countdown_end_s), (Phase::PadArmed, None));
         assert!(answer.mode.interlocks.armed);
@@ -23,10 +28,37 @@ fn a_hold_clears_the_countdown_and_keeps_the_vehicle_armed() {
     }
 }
 
+/// The countdown ends at 8 s.
 #[test]
-fn an_expired_countdown_can_be_held_until_the_release() {
+fn in_the_last_two_seconds_nothing_holds_and_an_abort_and_a_disarm_still_end_it() {
     let counting = after(&with_arm(&[START]));
-    assert_eq!(transition(&counting, SILENT, 8.0).refusal, None);
+    for cause in CAUSES {
+        for start in [StartPoint::Pad, StartPoint::Apogee, StartPoint::Ignition] {
+            assert_eq!(transition(&counting, hold(cause, start), 5.99).refusal, None);
+            for time_s in [6.0, 7.0, 8.0, 9.0, f64::NAN] {
+                let late = transition(&counting, hold(cause, start), time_s);
+                assert_eq!((late.refusal, late.mode), (Some(Refusal::TooLateToHold), counting), "{time_s}");
+            }
+        }
+    }
+    for time_s in [6.0, 7.9, 8.0] {
+        for event in [ABORT, Event::DisarmRequested, Event::PinInserted] {
+            let ended = transition(&counting, event, time_s);
+            assert_eq!((ended.refusal, ended.mode.countdown_end_s), (None, None), "{event:?}");
+            assert!(!ended.mode.interlocks.armed);
+        }
+    }
+}
+
+/// Its pilot lets go some time after the countdown.
+#[test]
+fn below_a_drone_a_countdown_can_be_held_until_the_release() {
+    let counting = after(&with_arm(&[START]));
+    for time_s in [7.0, 8.0, 30.0] {
+        for cause in CAUSES {
+            assert_eq!(transition(&counting, hold(cause, StartPoint::Drone), time_s).refusal, None);
+        }
+    }
 }
 
 #[test]

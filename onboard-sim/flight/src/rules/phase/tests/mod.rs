@@ -25,8 +25,9 @@ fn every_event() -> Vec<Event> {
         Event::ThrustConfirmed,
         Event::NoThrustTimeout,
         Event::SafingDone,
-        Event::Hold { cause: HoldCause::UplinkSilent },
-        Event::Hold { cause: HoldCause::Commanded },
+        Event::Hold { cause: HoldCause::UplinkSilent, start: StartPoint::Pad },
+        Event::Hold { cause: HoldCause::Commanded, start: StartPoint::Pad },
+        Event::Hold { cause: HoldCause::Commanded, start: StartPoint::Drone },
         Event::HoldElapsed,
     ];
     for flag in flags {
@@ -327,6 +328,29 @@ fn a_set_of_effects_lists_exactly_its_members() {
     assert_eq!(effects.iter().collect::<Vec<_>>(), [Effect::IgniteAscentMotor, Effect::RecordLoss]);
 }
 
+#[test]
+fn each_way_to_an_inhibited_motor_has_its_cause() {
+    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    for (mode, event, cause) in [
+        (counting, ABORT, Latch::Commanded),
+        (in_order(Phase::Powered), ABORT, Latch::Commanded),
+        (in_order(Phase::PadIdle), Event::LiftOff, Latch::UncommandedLiftOff),
+        (counting, Event::ReleasedEarly { parachute_fills: true }, Latch::UncommandedRelease),
+        (in_order(Phase::Coast), Event::Apogee { booster_attached: true }, Latch::NoSeparation),
+        (in_order(Phase::LandArmed), Event::GateShutForGood { parachute_fills: false }, Latch::Gate),
+        (in_order(Phase::Ignition), Event::NoThrustTimeout, Latch::NoLight),
+        (in_order(Phase::Boost), Event::NoLiftOff, Latch::Other),
+    ] {
+        let answer = transition(&mode, event, 6.5);
+        assert_eq!(Latch::of(&event, mode.interlocks, answer.mode.interlocks), Some(cause), "{event:?}");
+    }
+    // A touchdown inhibits the motor, as it should.
+    let down = transition(&in_order(Phase::Powered), Event::Contact { thrust_below_weight: true }, 6.5);
+    assert!(down.mode.interlocks.landing_motor_inhibited);
+    let event = Event::Contact { thrust_below_weight: true };
+    assert_eq!(Latch::of(&event, in_order(Phase::Powered).interlocks, down.mode.interlocks), None);
+}
+
 mod ground;
 mod holds;
 
@@ -345,7 +369,7 @@ fn likely_event() -> impl Strategy<Value = Event> {
         Event::IgnitionGate { open: true },
         Event::LiftOff,
         Event::Apogee { booster_attached: false },
-        Event::Hold { cause: HoldCause::UplinkSilent },
+        Event::Hold { cause: HoldCause::UplinkSilent, start: StartPoint::Pad },
         Event::ThrustConfirmed,
         Event::Contact { thrust_below_weight: true },
     ]);
@@ -360,7 +384,7 @@ proptest! {
         events in prop::collection::vec(likely_event(), 0..60),
     ) {
         let mut mode = Mode::power_up(0.0);
-        let (mut lit, mut ascents) = (0, 0);
+        let (mut lit, mut ascents, mut latch) = (0, 0, None);
         for (second, event) in events.into_iter().enumerate() {
             let answer = transition(&mode, event, second as f64);
             if answer.effects.contains(Effect::IgniteAscentMotor) {
@@ -385,6 +409,10 @@ proptest! {
                 prop_assert!(!mode.phase.in_landing_burn(), "parachute under thrust");
             }
             let (before, after) = (mode.interlocks, answer.mode.interlocks);
+            if answer.refusal.is_none() {
+                latch = latch.or_else(|| Latch::of(&event, before, after));
+            }
+            prop_assert_eq!(latch.is_some(), after.abort_latched || after.no_light_latched, "a latch without a cause");
             prop_assert!(!before.abort_latched || after.abort_latched, "an abort latch was cleared");
             prop_assert!(!before.landing_motor_inhibited || after.landing_motor_inhibited, "an inhibit was cleared");
             if answer.refusal.is_some() {

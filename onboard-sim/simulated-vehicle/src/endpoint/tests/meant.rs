@@ -1,0 +1,465 @@
+//! Who commands which vehicle: the boot that a command names, programs that share their ids, and a million random requests
+//! of a crew of two people.
+
+use flight::computer::crew::People;
+use flight::rules::operator::{Name, Operator, Role};
+use flight::rules::phase::{LAST_HOLD_S, UPLINK_SILENT_S};
+use flight::rules::two_person::{CONFIRM_WITHIN_S, TAP_WITHIN_S};
+use protocol::dialect::{MavType, TD_UPLINK_DATA};
+use protocol::hub::Origin;
+use protocol::signing::{Key, Memory, Signing};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::super::Path;
+use super::*;
+
+const ARM: u16 = 400;
+const START: u16 = 300;
+const HOLD: u16 = 193;
+const ABORT: u16 = 185;
+const TAP: u16 = 54_000;
+const TAKE_COMMAND: u16 = 54_001;
+const CHECK: u16 = 54_002;
+/// What can move something, with its parameter 1.
+const MOVING: [(u16, f32); 6] =
+    [(ARM, 1.0), (START, 0.0), (TAP, 0.0), (TAKE_COMMAND, 0.0), (CHECK, 1.0), (CHECK, 2.0)];
+
+const BOOT: u32 = 7_654_321;
+
+const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
+const NOT_NOW: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
+
+/// A program that speaks to the vehicle.
+#[derive(Clone)]
+struct Program {
+    address: Address,
+    path: Path,
+    by: Option<Operator>,
+    /// Its heartbeat, signed if it has an operator.
+    beat: Frame,
+    speaks: bool,
+    /// When it was last heard, s.
+    heard_at_s: f64,
+}
+
+impl Program {
+    fn new(system_id: u8, session: u32, stream: u64, by: Option<Operator>) -> Self {
+        let address = Address { system_id, component_id: 190 };
+        let beat = Encoder::new(address).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: session,
+            mavtype: MavType::MAV_TYPE_GCS,
+            ..HEARTBEAT_DATA::default()
+        }));
+        // The endpoint trusts whose signature it is: here nobody checks it.
+        let number = by.map_or(0, |by: Operator| by.number);
+        let key = |number: u8| Key::new([number; Key::LEN]);
+        let mut signing = Signing::new(key(number), Memory::default()).as_operator(number, key(100));
+        let link_id = signing.link_id(0);
+        let beat = if by.is_some() { signing.sign(&beat, link_id, 37_500_000_000_000) } else { beat };
+        let path = Path { link: 0, origin: Some(Origin::Stream(stream)) };
+        Self { address, path, by, beat, speaks: true, heard_at_s: f64::NEG_INFINITY }
+    }
+
+    fn request(&self, command: u16, param1: f32, confirms: u16, boot: f32) -> CommandRequest {
+        let params = [param1, 0.0, f32::from(confirms), 0.0, 0.0, 0.0, boot];
+        CommandRequest { source: self.address, target: VEHICLE, command, params, confirmation: 0 }
+    }
+}
+
+struct Range {
+    vehicle: Vehicle,
+    endpoint: VehicleEndpoint,
+    programs: Vec<Program>,
+    frames: u64,
+    sent: Vec<Frame>,
+}
+
+impl Range {
+    fn of(vehicle: Vehicle, endpoint: VehicleEndpoint, programs: Vec<Program>) -> Self {
+        let endpoint = endpoint.booted(BOOT);
+        let mut range = Self { vehicle, endpoint, programs, frames: 0, sent: Vec::new() };
+        range.run(6.0);
+        range
+    }
+
+    fn without_operators(programs: Vec<Program>) -> Self {
+        Self::of(planar(), VehicleEndpoint::new(), programs)
+    }
+
+    fn frame(&mut self) {
+        if self.frames.is_multiple_of(5) {
+            let time_s = self.vehicle.time_s();
+            for program in self.programs.iter_mut().filter(|program| program.speaks) {
+                self.endpoint.on_frame(program.path, &program.beat, &self.vehicle);
+                program.heard_at_s = time_s;
+            }
+        }
+        self.frames += 1;
+        let (_, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
+        self.sent.extend(leaving.into_iter().map(|leaving| leaving.frame));
+    }
+
+    fn run(&mut self, duration_s: f64) {
+        let end_s = self.vehicle.time_s() + duration_s - 1e-9;
+        while self.vehicle.time_s() < end_s {
+            self.frame();
+        }
+    }
+
+    fn put(&mut self, program: usize, request: &CommandRequest) {
+        let Program { path, by, .. } = self.programs[program];
+        self.endpoint.on_command(path, (request, by), &self.vehicle);
+    }
+
+    /// The answer to a request, and what the vehicle said.
+    fn asks(&mut self, program: usize, request: &CommandRequest) -> (u8, String) {
+        self.sent.clear();
+        self.put(program, request);
+        self.run(0.3);
+        let answers: Vec<u8> =
+            self.sent.iter().filter_map(CommandAnswer::from_frame).map(|answer| answer.result).collect();
+        assert_eq!(answers.len(), 1, "{answers:?}");
+        // Texts that are the same but for their figures are counted for 5 s.
+        let words = texts(&self.sent).join("; ");
+        self.run(6.0);
+        (answers[0], words)
+    }
+
+    fn commands(&mut self, program: usize, command: u16, param1: f32) -> u8 {
+        let request = self.programs[program].request(command, param1, 0, 0.0);
+        self.put(program, &request);
+        self.sent.clear();
+        self.run(0.1);
+        let answer = self.sent.iter().filter_map(CommandAnswer::from_frame).next();
+        answer.map(|answer| answer.result).expect("an answer")
+    }
+
+    fn counts_down(&self) -> bool {
+        self.vehicle.mode().countdown_end_s.is_some()
+    }
+
+    /// The reports to this address, in the order of their sessions.
+    fn reports(&mut self, to: Address) -> Vec<TD_UPLINK_DATA> {
+        self.sent.clear();
+        self.run(0.6);
+        let reports = self.sent.iter().filter_map(|frame| match frame.decode() {
+            Ok(MavMessage::TD_UPLINK(report)) => Some(report),
+            _ => None,
+        });
+        let mut reports: Vec<_> = reports.filter(|report| report.target_system == to.system_id).collect();
+        let of = |report: &TD_UPLINK_DATA| (report.session, report.commands, report.same_id);
+        reports.sort_by_key(of);
+        reports.dedup_by_key(|report| of(report));
+        reports
+    }
+}
+
+#[test]
+fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
+    let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
+    let other = (BOOT + 1) as f32;
+    for (command, param1) in MOVING {
+        let request = range.programs[0].request(command, param1, 0, other);
+        let (answer, words) = range.asks(0, &request);
+        assert_eq!(answer, DENIED, "{command}");
+        assert!(words.contains("refused: for boot 7654322; this is boot 7654321"), "{words}");
+        for nonsense in [0.75, -1.0, 16_777_216.0, f32::INFINITY] {
+            let request = range.programs[0].request(command, param1, 0, nonsense);
+            assert_eq!(range.asks(0, &request).0, DENIED, "{nonsense}");
+        }
+    }
+    for boot in [BOOT as f32, 0.0, f32::NAN] {
+        let [arm, disarm] = [1.0, 0.0].map(|param1| range.programs[0].request(ARM, param1, 0, boot));
+        assert_eq!(range.asks(0, &arm).0, ACCEPTED, "{boot}");
+        assert_eq!(range.asks(0, &disarm).0, ACCEPTED);
+    }
+    let arm = range.programs[0].request(ARM, 1.0, 0, BOOT as f32);
+    let start = range.programs[0].request(START, 0.0, 0, BOOT as f32);
+    for (command, param1) in [(HOLD, 0.0), (ARM, 0.0), (ABORT, 1.0)] {
+        assert!(
+            [&arm, &start]
+                .map(|request| {
+                    range.put(0, request);
+                    range.frame();
+                })
+                .len()
+                == 2
+        );
+        assert!(range.counts_down());
+        range.run(0.5);
+        let request = range.programs[0].request(command, param1, 0, other);
+        assert_eq!(range.asks(0, &request).0, ACCEPTED, "{command}");
+        assert!(!range.counts_down());
+    }
+    assert!(range.vehicle.aborted());
+}
+
+#[test]
+fn while_another_vehicle_under_our_ids_is_heard_a_command_must_name_its_boot() {
+    let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
+    let twin = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    range.endpoint.on_frame(0, &twin, &range.vehicle);
+    let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[0].request(ARM, 1.0, 0, boot));
+    let disarm = range.programs[0].request(ARM, 0.0, 0, 0.0);
+    let (answer, words) = range.asks(0, &unnamed);
+    assert_eq!(answer, NOT_NOW);
+    assert!(words.contains("another vehicle has these ids"), "{words}");
+    assert!(!range.vehicle.mode().interlocks.armed);
+    range.endpoint.on_frame(0, &twin, &range.vehicle);
+    assert_eq!(range.asks(0, &named).0, ACCEPTED);
+    assert_eq!(range.asks(0, &disarm).0, ACCEPTED);
+    assert_eq!(range.asks(0, &unnamed).0, ACCEPTED, "some seconds later");
+}
+
+#[test]
+fn a_command_for_every_vehicle_stops_and_moves_nothing() {
+    let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
+    let everybody = Address { system_id: 0, component_id: 0 };
+    for (command, param1) in MOVING {
+        let request = CommandRequest {
+            target: everybody,
+            ..range.programs[0].request(command, param1, 0, BOOT as f32)
+        };
+        let (answer, words) = range.asks(0, &request);
+        assert_eq!(answer, DENIED, "{command}");
+        assert!(words.contains("refused: it is for every vehicle"), "{words}");
+    }
+    assert!(!range.vehicle.mode().interlocks.armed);
+    // Some clients name the system and every component of it.
+    let whole = |request| CommandRequest { target: Address { system_id: 1, component_id: 0 }, ..request };
+    for (command, param1) in [(HOLD, 0.0), (ARM, 0.0), (ABORT, 1.0)] {
+        for (command, param1) in [(ARM, 1.0), (START, 0.0)] {
+            let request = whole(range.programs[0].request(command, param1, 0, 0.0));
+            range.put(0, &request);
+            range.frame();
+        }
+        assert!(range.counts_down());
+        range.run(0.5);
+        let request =
+            CommandRequest { target: everybody, ..range.programs[0].request(command, param1, 0, 0.0) };
+        assert_eq!(range.asks(0, &request).0, ACCEPTED, "{command}");
+        assert!(!range.counts_down());
+    }
+    assert!(range.vehicle.aborted());
+}
+
+/// With sessions over one path, as behind one radio; and two programs without, each with a socket of its own.
+#[test]
+fn the_one_that_armed_holds_by_its_silence_although_another_with_its_ids_goes_on() {
+    for [first, second] in [[(7, 1), (8, 1)], [(0, 1), (0, 2)]] {
+        let program = |(session, stream)| Program::new(255, session, stream, None);
+        let mut range = Range::without_operators(vec![program(first)]);
+        assert_eq!(range.commands(0, ARM, 1.0), ACCEPTED);
+        assert_eq!(range.commands(0, START, 0.0), ACCEPTED);
+        range.programs.push(program(second));
+        let reports = range.reports(GROUND);
+        let told: Vec<_> =
+            reports.iter().map(|report| (report.session, report.commands, report.same_id)).collect();
+        let mut expected = [(first.0, 1, 1), (second.0, 0, 1)];
+        expected.sort_unstable();
+        assert_eq!(told, expected);
+        // Nothing but what stops is taken from these ids.
+        range.programs[0].speaks = false;
+        range.run(UPLINK_SILENT_S - 0.2);
+        assert!(range.counts_down());
+        range.run(0.4);
+        assert!(!range.counts_down() && range.vehicle.mode().interlocks.armed);
+        assert_eq!(range.commands(1, START, 0.0), NOT_NOW);
+        assert_eq!(range.commands(1, TAKE_COMMAND, 0.0), NOT_NOW);
+        range.run(6.0);
+        // The other one is alone now, and not in command before it has taken it.
+        let reports = range.reports(GROUND);
+        assert!(
+            reports
+                .iter()
+                .any(|report| (report.session, report.commands, report.same_id) == (second.0, 0, 0))
+        );
+        assert_eq!(range.commands(1, TAKE_COMMAND, 0.0), ACCEPTED);
+        assert_eq!(range.commands(1, START, 0.0), ACCEPTED);
+        range.run(UPLINK_SILENT_S + 0.5);
+        assert!(range.counts_down());
+        range.programs[1].speaks = false;
+        range.run(UPLINK_SILENT_S + 0.2);
+        assert!(!range.counts_down());
+    }
+}
+
+#[test]
+fn two_programs_with_the_same_ids_arm_nothing_and_both_abort() {
+    let mut range =
+        Range::without_operators(vec![Program::new(255, 7, 1, None), Program::new(255, 8, 2, None)]);
+    for program in [0, 1] {
+        let request = range.programs[program].request(ARM, 1.0, 0, BOOT as f32);
+        let (answer, words) = range.asks(program, &request);
+        assert_eq!(answer, NOT_NOW);
+        assert!(words.contains("1 more under the ids 255/190 in the last 5 s"), "{words}");
+    }
+    range.programs[1].speaks = false;
+    range.run(5.2);
+    assert_eq!(range.commands(0, ARM, 1.0), ACCEPTED, "alone");
+    range.programs[1].speaks = true;
+    range.run(0.2);
+    assert_eq!(range.commands(1, ARM, 0.0), ACCEPTED, "a disarm");
+    assert_eq!(range.commands(1, ABORT, 1.0), ACCEPTED);
+}
+
+const FIRST_ASK: u16 = 40_000;
+
+fn operators() -> Vec<Operator> {
+    let people =
+        [("Ann", Role::RangeSafety), ("Bob", Role::Flight), ("Cat", Role::Flight), ("Dan", Role::Pad)];
+    let operator =
+        |(number, (name, role)): (u8, (&str, Role))| Operator { number, role, name: Name::new(name) };
+    (1..).zip(people).map(operator).collect()
+}
+
+/// Two stations each of Ann and Bob, one each of Cat and Dan, one with the shared key, and two that share ids with another.
+fn crowd() -> Vec<Program> {
+    let people = operators();
+    let by = |number: usize| Some(people[number - 1]);
+    vec![
+        Program::new(255, 11, 1, by(1)),
+        Program::new(254, 12, 2, by(2)),
+        Program::new(253, 13, 3, by(3)),
+        Program::new(252, 14, 4, by(4)),
+        Program::new(251, 15, 5, by(1)),
+        Program::new(250, 16, 6, None),
+        Program::new(254, 17, 7, by(2)),
+        Program::new(255, 18, 8, by(4)),
+    ]
+}
+
+/// What an onlooker writes down: who asked for what and was heard, alone under their ids, for this vehicle.
+struct Heard {
+    program: usize,
+    command: u16,
+    confirms: u16,
+    at_s: f64,
+}
+
+/// The rule, told a second time and checked in every frame: a vehicle is armed, and a countdown begins, only by an ask and the
+/// confirmation of another person in another role, both from stations that are heard, alone under their ids, for this boot
+/// of this vehicle. In the countdown one person commands and another one taps; without the heartbeats of the one or the taps of the
+/// other it is held, but for its last moment.
+#[test]
+fn a_million_random_requests_move_nothing_but_by_the_rule() {
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let two = People::Two { first_ask: FIRST_ASK };
+    let fresh = || {
+        let vehicle = planar().with_crew(two, operators());
+        let mut range = Range::of(vehicle, VehicleEndpoint::sending_to_crew(&STANDARD), crowd());
+        for program in [6, 7] {
+            range.programs[program].speaks = false;
+        }
+        range.run(6.0);
+        range
+    };
+    let mut range = fresh();
+    let mut heard: Vec<Heard> = Vec::new();
+    let (mut requests, mut armed, mut started, mut released, mut taken) = (0_u32, 0, 0, 0, 0);
+    while requests < 1_000_000 {
+        let time_s = range.vehicle.time_s();
+        let before = *range.vehicle.mode();
+        let crew = range.vehicle.computer().crew().two_person;
+        let commander_before = range.endpoint.heard(time_s).commander;
+        heard.retain(|heard| time_s - heard.at_s <= CONFIRM_WITHIN_S + 1.0);
+        // Stations fall silent and come back; most of the time the twins are silent.
+        let dice = random.next_u32();
+        if dice.is_multiple_of(64) {
+            let place = (dice >> 8) as usize % range.programs.len();
+            range.programs[place].speaks = if place < 6 { dice >> 16 & 7 != 0 } else { dice >> 16 & 7 == 0 };
+        }
+        for _ in 0..25 {
+            requests += 1;
+            let dice = random.next_u32();
+            let program = (dice & 0xFF) as usize % range.programs.len();
+            let (command, param1) = match dice >> 8 & 31 {
+                0..=9 => (ARM, 1.0),
+                10..=19 => (START, 0.0),
+                20..=26 => (TAP, 0.0),
+                27..=29 => (TAKE_COMMAND, 0.0),
+                // Rarely, or nothing would ever fly.
+                30 if dice >> 13 & 127 == 0 => (HOLD, 0.0),
+                31 if dice >> 13 & 255 == 0 => (ARM, 0.0),
+                _ => (TAP, 0.0),
+            };
+            let confirms = match dice >> 21 & 3 {
+                0 => 0,
+                1 | 2 => crew.waiting(time_s).map_or(0, |ask| ask.number),
+                _ => FIRST_ASK.wrapping_add((dice >> 23 & 63) as u16),
+            };
+            let boot = [BOOT as f32, BOOT as f32, 0.0, (BOOT - 1) as f32][(dice >> 29 & 3) as usize];
+            let request = range.programs[program].request(command, param1, confirms, boot);
+            let to_all = dice >> 23 & 15 == 0;
+            let target = if to_all { Address { system_id: 0, component_id: 0 } } else { VEHICLE };
+            range.put(program, &CommandRequest { target, ..request });
+            let of = &range.programs[program];
+            let alone = range.programs.iter().enumerate().all(|(other, twin)| {
+                other == program || twin.address != of.address || time_s - twin.heard_at_s > 5.0
+            });
+            let is_heard = time_s - of.heard_at_s <= UPLINK_SILENT_S;
+            let ours = boot as u32 != BOOT - 1 && !to_all;
+            if alone && ours && (is_heard || command != ARM) && of.by.is_some() {
+                heard.push(Heard { program, command, confirms, at_s: time_s });
+            }
+        }
+        range.frame();
+        let now_s = range.vehicle.time_s();
+        let mode = *range.vehicle.mode();
+        let crew_after = range.vehicle.computer().crew().two_person;
+        // Two people of two roles have agreed in this frame: the confirmation came now, the ask some time before.
+        let agreed = |command: u16| {
+            heard.iter().filter(|one| one.command == command && one.at_s == time_s && one.confirms != 0).any(
+                |confirmation| {
+                    let by = range.programs[confirmation.program].by.unwrap();
+                    heard.iter().any(|ask| {
+                        let asker = range.programs[ask.program].by.unwrap();
+                        ask.command == command
+                            && ask.confirms == 0
+                            && (time_s - ask.at_s) <= CONFIRM_WITHIN_S + 0.05
+                            && asker.number != by.number
+                            && asker.role != by.role
+                    })
+                },
+            )
+        };
+        if mode.interlocks.armed && !before.interlocks.armed {
+            armed += 1;
+            assert!(agreed(ARM), "armed at {now_s} s without two people");
+        }
+        if mode.countdown_end_s.is_some() && before.countdown_end_s.is_none() {
+            started += 1;
+            assert!(agreed(START), "started at {now_s} s without two people");
+        }
+        let commander = range.endpoint.heard(now_s).commander;
+        if let (Some(old), Some(new)) = (commander_before, commander)
+            && before.interlocks.armed
+            && mode.interlocks.armed
+            && old.station != new.station
+            && !heard.iter().any(|one| one.command == ARM && one.at_s == time_s && one.confirms != 0)
+        {
+            taken += 1;
+            let (old_by, new_by) = (old.by.unwrap(), new.by.unwrap());
+            assert!(old.age_s > UPLINK_SILENT_S, "taken from a station that is heard");
+            assert!(new_by.role == old_by.role || new_by.role == Role::RangeSafety);
+        }
+        if let Some(end_s) = mode.countdown_end_s {
+            let tapping = crew_after.tapping().expect("somebody taps");
+            let commander = commander.expect("somebody commands");
+            assert_ne!(tapping.by.number, commander.by.unwrap().number, "one person does the work of two");
+            if end_s - now_s > LAST_HOLD_S {
+                assert!(commander.age_s <= UPLINK_SILENT_S + 0.05, "{} s", commander.age_s);
+                assert!(now_s - tapping.at_s <= TAP_WITHIN_S + 0.05);
+            }
+        }
+        if !mode.phase.on_pad() {
+            released += 1;
+            assert!(before.countdown_end_s.is_some_and(|end_s| now_s >= end_s - 1e-9));
+            range = fresh();
+            heard.clear();
+        }
+    }
+    assert!(armed > 20 && started > 20 && released > 2 && taken > 2, "{armed} {started} {released} {taken}");
+}
