@@ -100,7 +100,7 @@ fn row(
 }
 
 /// The words on lines of at most this many columns; only a longer word is split.
-fn wrapped(words: &str, room: usize) -> Vec<String> {
+pub fn wrapped(words: &str, room: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in words.split_whitespace() {
         for part in word.chars().collect::<Vec<_>>().chunks(room) {

@@ -279,6 +279,7 @@ fn a_vehicle_that_was_never_heard_has_hints_on_the_main_page() {
     for size in [(80, 24), (80, 22), (120, 40), (40, 12)] {
         let screen = rig.screen(size.0, size.1);
         assert!(screen.contains("Nothing heard from system 1"), "{screen}");
+        assert!(size.0 < 80 || screen.contains("fitted?"), "{screen}");
     }
     let screen = rig.screen(80, 24);
     assert!(screen.contains("It listens on 127.0.0.1:14550"), "{screen}");

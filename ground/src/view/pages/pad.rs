@@ -134,14 +134,19 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
         let hints = unheard::hints(model, now).unwrap_or_default();
-        return hints.into_iter().map(|words| Line::from(format!(" {words}"))).collect();
+        let wrapped = |words: String| checklist::wrapped(&words, usize::from(CHECK_COLUMNS - 2));
+        let lines = hints.into_iter().flat_map(wrapped);
+        return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
     let mark = if status.is_stale(now) { STALE_MARK } else { " " };
     let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
         let name = words::check(name);
         let found = found(&model.vehicle, bit);
         Line::from(vec![
-            Span::styled(word, theme.style(TextRole::Alarm)),
+            Span::styled(
+                word,
+                theme.style(if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm }),
+            ),
             Span::styled(format!("{mark}{name:<19.19}"), theme.style(TextRole::Plain)),
             Span::styled(format!("{found:>10} "), theme.style(TextRole::Plain)),
             Span::styled(reason, theme.style(TextRole::Caution)),
