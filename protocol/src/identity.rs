@@ -29,6 +29,9 @@ pub const NETWORK_BUDGET_BYTES_S: u32 = 20_000;
 /// number up to 2^24 exactly.
 pub const LARGEST_BOOT_NUMBER: u32 = 0x00FF_FFFF;
 
+/// The commit that this build was made from; other words in a development build.
+pub const GIT_COMMIT: &str = env!("TOUCHDOWN_GIT_COMMIT");
+
 impl Address {
     /// Returns the same component of another system: two rockets on one link need different system ids.
     #[must_use]

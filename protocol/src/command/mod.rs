@@ -14,6 +14,7 @@ pub use sender::{CommandEvent, CommandSender, Resend, Ticket};
 const COMMAND_INT_ID: u32 = 75;
 const COMMAND_LONG_ID: u32 = 76;
 const COMMAND_ACK_ID: u32 = 77;
+const COMMAND_CANCEL_ID: u32 = 80;
 
 /// A command as received, from COMMAND_LONG or COMMAND_INT.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +54,21 @@ impl CommandRequest {
             command: u16::from_le_bytes([payload[28], payload[29]]),
             params,
             confirmation,
+        })
+    }
+
+    /// The command that a COMMAND_CANCEL frame names, without its parameters; `None` for any other message.
+    pub fn cancelled_by(frame: &Frame) -> Option<Self> {
+        if frame.message_id() != COMMAND_CANCEL_ID {
+            return None;
+        }
+        let payload = frame.padded_payload();
+        Some(Self {
+            source: frame.source(),
+            target: Address { system_id: payload[2], component_id: payload[3] },
+            command: u16::from_le_bytes([payload[0], payload[1]]),
+            params: [f32::NAN; 7],
+            confirmation: 0,
         })
     }
 

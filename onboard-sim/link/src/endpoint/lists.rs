@@ -1,13 +1,14 @@
-//! Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board.
+//! Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board, extended parameters.
 //!
 //! Other ground stations ask for them whatever the capabilities say, and report a failure to their user if there is no
 //! answer. So every question is answered: the lists are empty, and nothing can be put into them. Protocols:
 //! <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of common.xml. Questions are parsed from raw
 //! bytes, because a mission type that the dialect does not know must be answered, too.
 
+use mavlink_core::types::CharArray;
 use protocol::dialect::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult,
-    MavMissionType,
+    MavMissionType, MavParamError, PARAM_ERROR_DATA, PARAM_EXT_ACK_DATA, ParamAck,
 };
 use protocol::frame::Frame;
 use protocol::identity::Address;
@@ -50,10 +51,43 @@ impl ListQuestion {
                 let answer = LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] };
                 Self { target, answer: MavMessage::LOG_DATA(answer) }
             }
+            PARAM_EXT_REQUEST_READ => {
+                let target = Address { system_id: bytes[2], component_id: bytes[3] };
+                let id = bytes[4..20].first_chunk().copied().unwrap_or_default();
+                Self { target, answer: no_parameter(id, integer(0).cast_signed(), frame.source()) }
+            }
+            PARAM_EXT_REQUEST_LIST => {
+                let target = Address { system_id: bytes[0], component_id: bytes[1] };
+                Self { target, answer: no_parameter([0; 16], -1, frame.source()) }
+            }
+            PARAM_EXT_SET => {
+                let target = Address { system_id: bytes[0], component_id: bytes[1] };
+                let answer = PARAM_EXT_ACK_DATA {
+                    param_id: CharArray::new(bytes[2..18].first_chunk().copied().unwrap_or_default()),
+                    param_result: ParamAck::PARAM_ACK_FAILED,
+                    ..PARAM_EXT_ACK_DATA::default()
+                };
+                Self { target, answer: MavMessage::PARAM_EXT_ACK(answer) }
+            }
             _ => return None,
         })
     }
 }
+
+/// There are no extended parameters. The standard has no answer for that to a question; this is the one of the parameters.
+fn no_parameter(id: [u8; 16], index: i16, asker: Address) -> MavMessage {
+    MavMessage::PARAM_ERROR(PARAM_ERROR_DATA {
+        param_index: index,
+        target_system: asker.system_id,
+        target_component: asker.component_id,
+        param_id: CharArray::new(id),
+        error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+    })
+}
+
+const PARAM_EXT_REQUEST_READ: u32 = 320;
+const PARAM_EXT_REQUEST_LIST: u32 = 321;
+const PARAM_EXT_SET: u32 = 323;
 
 const MISSION_WRITE_PARTIAL_LIST: u32 = 38;
 const MISSION_ITEM: u32 = 39;

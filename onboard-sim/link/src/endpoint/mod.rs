@@ -30,9 +30,9 @@ use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
 use protocol::dialect::PING_DATA;
 use protocol::dialect::{
-    AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavMessage, MavResult, MavSeverity,
+    AVAILABLE_MODES_DATA, HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavMessage, MavResult, MavSeverity,
     TD_BOOK_KEPT_DATA, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
+    TD_OPERATOR_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
 use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
@@ -229,6 +229,12 @@ impl VehicleEndpoint {
             }
             return;
         }
+        if let Some(cancelled) = CommandRequest::cancelled_by(frame) {
+            if self.us.accepts(cancelled.target) {
+                self.on_cancel(path, (&cancelled, operator_of(frame, vehicle)), vehicle);
+            }
+            return;
+        }
         if self.on_question(path, frame, vehicle) {
             return;
         }
@@ -402,10 +408,33 @@ impl VehicleEndpoint {
         }
     }
 
+    /// Takes back a command that is being carried out: only a check takes a while. Any other is done or refused at once, and the
+    /// answer says that it cannot be cancelled.
+    fn on_cancel(
+        &mut self,
+        path: Path,
+        (cancelled, by): (&CommandRequest, Option<Operator>),
+        vehicle: &dyn Vehicle,
+    ) {
+        if cancelled.is(MavCmd::MAV_CMD_TD_PAD_CHECK) && vehicle.computer().pad_check().is_running() {
+            let key = by.map_or(0, |by| by.number);
+            let station = self.stations.of(&Sender { address: cancelled.source, key, path });
+            self.put(path.link, (cancelled, by, station), Asked::EndCheck, vehicle);
+        } else {
+            self.acknowledge(path.link, cancelled, (MavResult::MAV_RESULT_DENIED, 0));
+        }
+    }
+
     /// Answers a command. Repeated refusals to one station are not answered every time.
     fn acknowledge(&mut self, link: usize, request: &CommandRequest, (result, detail): (MavResult, i32)) {
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
-        if !refused || self.refusals.may_answer(request.source, self.now_s) {
+        if !refused
+            || self.refusals.may_answer(
+                request.source,
+                result != MavResult::MAV_RESULT_UNSUPPORTED,
+                self.now_s,
+            )
+        {
             let answer = CommandAnswer { detail, ..CommandAnswer::to(request, result) };
             self.lane(link).answer(Answer::Command(answer));
         }
@@ -483,7 +512,18 @@ impl VehicleEndpoint {
             _ => telemetry::message(message_id, &vehicle.snapshot(), boot_number).into_iter().collect(),
         };
         if messages.is_empty() {
-            return (MavResult::MAV_RESULT_UNSUPPORTED, None);
+            // One that this vehicle sends has no content now.
+            let sends = matches!(
+                lane.streams.interval_of(message_id),
+                MavMessage::MESSAGE_INTERVAL(interval) if interval.interval_us != 0
+            );
+            let of_crew = matches!(message_id, TD_CREW_DATA::ID | TD_OPERATOR_DATA::ID);
+            let result = if sends && !(of_crew && vehicle.operators().is_empty()) {
+                MavResult::MAV_RESULT_TEMPORARILY_REJECTED
+            } else {
+                MavResult::MAV_RESULT_UNSUPPORTED
+            };
+            return (result, None);
         }
         if !lane.request(messages) {
             return (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, None);

@@ -13,6 +13,9 @@ use protocol::identity::Address;
 const AT_ONCE: f64 = 8.0;
 /// After those, answers per second to one station's refused commands: each repetition waits 0.5 s.
 const PER_S: f64 = 2.0;
+/// A command that the vehicle does not know costs this much of an answer: clients try out many in a row, and wait for each.
+/// It has no text. Twenty at ten a second are all answered, and five a second for as long as they like.
+const COST_OF_UNSUPPORTED: f64 = 0.4;
 /// Number of stations tracked separately. A flood of forged addresses shares the last entry.
 const MAX_STATIONS: usize = 16;
 
@@ -31,15 +34,16 @@ struct Left {
 
 impl Refusals {
     /// Whether to answer one more refused command of a station.
-    pub(super) fn may_answer(&mut self, station: Address, now_s: f64) -> bool {
+    pub(super) fn may_answer(&mut self, station: Address, is_supported: bool, now_s: f64) -> bool {
+        let cost = if is_supported { 1.0 } else { COST_OF_UNSUPPORTED };
         let known = self.stations.contains_key(&station) || self.stations.len() < MAX_STATIONS - 1;
         let place = if known { station } else { Address { system_id: 0, component_id: 0 } };
         let left = self.stations.entry(place).or_insert(Left { answers: AT_ONCE, at_s: now_s });
         left.answers = (left.answers + PER_S * (now_s - left.at_s).max(0.0)).min(AT_ONCE);
         left.at_s = now_s;
-        let may = left.answers >= 1.0;
+        let may = left.answers >= cost;
         if may {
-            left.answers -= 1.0;
+            left.answers -= cost;
         }
         may
     }
@@ -122,20 +126,20 @@ mod tests {
     fn a_station_that_repeats_is_answered_at_once_first_and_then_twice_a_second() {
         let mut refusals = Refusals::default();
         let answered = |refusals: &mut Refusals, from_s: f64| {
-            (0..200).filter(|n| refusals.may_answer(GROUND, from_s + 0.05 * f64::from(*n))).count()
+            (0..200).filter(|n| refusals.may_answer(GROUND, true, from_s + 0.05 * f64::from(*n))).count()
         };
         // 10 s at 20 Hz.
         assert!((26..=28).contains(&answered(&mut refusals, 0.0)));
         assert!((18..=20).contains(&answered(&mut refusals, 10.0)));
         // Another station does not have to wait because of this one.
-        assert!(refusals.may_answer(Address { system_id: 254, component_id: 190 }, 20.0));
+        assert!(refusals.may_answer(Address { system_id: 254, component_id: 190 }, true, 20.0));
     }
 
     #[test]
     fn forged_addresses_share_one_place() {
         let mut refusals = Refusals::default();
         let stations = (1..=255).map(|system_id| Address { system_id, component_id: 1 });
-        let answered = stations.clone().filter(|station| refusals.may_answer(*station, 0.0)).count();
+        let answered = stations.clone().filter(|station| refusals.may_answer(*station, true, 0.0)).count();
         assert_eq!(answered, MAX_STATIONS - 1 + AT_ONCE as usize);
         assert_eq!(refusals.stations.len(), MAX_STATIONS);
     }

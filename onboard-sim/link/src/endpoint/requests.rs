@@ -9,6 +9,7 @@ use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use protocol::command::{CommandAnswer, CommandRequest};
+use protocol::dialect::MavResult;
 
 use super::VehicleEndpoint;
 use crate::commands;
@@ -88,7 +89,12 @@ impl VehicleEndpoint {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
             self.note_commander(&request, answer, vehicle);
-            let result = commands::mav_result(answer.ending);
+            // A COMMAND_CANCEL has no parameters.
+            let is_cancelled = request.asked == Asked::EndCheck && command.params[0].is_nan();
+            let result = match commands::mav_result(answer.ending) {
+                MavResult::MAV_RESULT_ACCEPTED if is_cancelled => MavResult::MAV_RESULT_CANCELLED,
+                result => result,
+            };
             if request.asked == Asked::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
             } else {

@@ -14,6 +14,8 @@ mod pad_check;
 mod power;
 mod space;
 
+use alloc::vec::Vec;
+
 use flight::rules::phase::Phase;
 use mavlink_core::MessageData as _;
 use mavlink_core::types::CharArray;
@@ -31,6 +33,8 @@ use protocol::dialect::{
 pub use self::ours::td_phase;
 pub(crate) use self::pad_check::pad_check;
 use crate::snapshot::Snapshot;
+use protocol::identity::GIT_COMMIT;
+use protocol::mission::MissionHash;
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
@@ -45,7 +49,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option
         LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
         VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
         CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
-        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version()),
+        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(boot_number)),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
         ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
         TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, boot_number)),
@@ -195,17 +199,31 @@ fn current_mode(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-fn autopilot_version() -> MavMessage {
+/// A simulated vehicle is a new one at each power-up: its unique id is the number of its boot, below two letters, so that it is
+/// never zero.
+fn autopilot_version(boot_number: u32) -> MavMessage {
     let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST,
         // Major, minor, patch, then 0 for a development version.
         flight_sw_version: version.take(3).fold(0, |packed, part| (packed << 8) | (part & 0xff)) << 8,
+        uid: u64::from_be_bytes(*b"TD\0\0\0\0\0\0") | u64::from(boot_number),
+        flight_custom_version: version_hash(),
         ..AUTOPILOT_VERSION_DATA::default()
     })
+}
+
+/// The first 8 bytes of the commit, as the standard has it; in a development build, which names none, a hash of its version.
+fn version_hash() -> [u8; 8] {
+    let byte = |place: usize| u8::from_str_radix(GIT_COMMIT.get(2 * place..2 * place + 2)?, 16).ok();
+    let bytes: Option<Vec<u8>> = (0..8).map(byte).collect();
+    bytes
+        .and_then(|bytes| bytes.first_chunk().copied())
+        .unwrap_or_else(|| MissionHash::of(concat!("development build of ", env!("CARGO_PKG_VERSION"))).0)
 }
 
 /// MAVLink 2 and nothing older: 100 times the version.

@@ -1,8 +1,9 @@
 //! Tests the questions that other ground stations ask every vehicle.
 
 use protocol::dialect::{
-    ATTITUDE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HOME_POSITION_DATA, LOG_ENTRY_DATA,
-    MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMissionResult, SYSTEM_TIME_DATA, VFR_HUD_DATA,
+    ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HOME_POSITION_DATA,
+    LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMissionResult, MavParamError,
+    MavProtocolCapability, ParamAck, SYSTEM_TIME_DATA, VFR_HUD_DATA,
 };
 
 use super::*;
@@ -173,4 +174,97 @@ fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight(
         assert_eq!(wire.ask(400, 0.0, code).0, 0);
         assert!(wire.vehicle.aborted(), "in flight it is an abort");
     }
+}
+
+/// Clients find out in this way what a vehicle can do.
+#[test]
+fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
+    let mut wire = Wire::new();
+    let mut answers = Vec::new();
+    for command in 30_000..30_020 {
+        let params = [0.0; 7];
+        let request = CommandRequest { source: GROUND, target: VEHICLE, command, params, confirmation: 0 };
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+        answers.extend(wire.run(0.1).iter().filter_map(CommandAnswer::from_frame));
+    }
+    answers.extend(wire.run(0.5).iter().filter_map(CommandAnswer::from_frame));
+    let answers: Vec<_> = answers.iter().map(|answer| (answer.command, answer.result)).collect();
+    let unsupported = MavResult::MAV_RESULT_UNSUPPORTED as u8;
+    assert_eq!(answers, (30_000..30_020).map(|command| (command, unsupported)).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_cannot_be_cancelled_is_answered() {
+    let mut wire = Wire::new();
+    for (command, ours) in [(400_u16, true), (54_002, true), (400, false)] {
+        let [low, high] = command.to_le_bytes();
+        let sent = wire.question(80, &[low, high, if ours { 1 } else { 2 }, 1]);
+        let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+        assert_eq!(answers.len(), usize::from(ours));
+        assert!(
+            answers.iter().all(
+                |answer| (answer.command, answer.result) == (command, MavResult::MAV_RESULT_DENIED as u8)
+            )
+        );
+    }
+}
+
+/// A verdict before the landing, a message of crews without a crew, one that nobody knows.
+#[test]
+fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
+    let mut wire = Wire::new();
+    for (message_id, result) in [
+        (TD_LANDING_VERDICT_DATA::ID, MavResult::MAV_RESULT_TEMPORARILY_REJECTED),
+        (protocol::dialect::TD_CREW_DATA::ID, MavResult::MAV_RESULT_UNSUPPORTED),
+        (9_999, MavResult::MAV_RESULT_UNSUPPORTED),
+    ] {
+        assert_eq!(wire.ask(512, message_id as f32, 0.0).0, result as u8, "message {message_id}");
+    }
+}
+
+#[test]
+fn the_version_announces_files_and_has_an_id_and_a_hash() {
+    let mut wire = Wire::new();
+    wire.endpoint = VehicleEndpoint::new().booted(77);
+    assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
+    let sent = wire.run(1.0);
+    let version = find(&sent, |message| match message {
+        MavMessage::AUTOPILOT_VERSION(version) => Some(version),
+        _ => None,
+    });
+    // It may have come with the answer.
+    let snapshot = wire.vehicle.snapshot();
+    let now = vehicle_link::telemetry::message(AUTOPILOT_VERSION_DATA::ID, &snapshot, 77);
+    let Some(MavMessage::AUTOPILOT_VERSION(now)) = now else { panic!("it always has content") };
+    assert!(version.is_none_or(|version| version == now));
+    assert!(now.capabilities.contains(MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP));
+    assert_eq!(now.uid & 0xFFFF_FFFF, 77);
+    assert_ne!((now.uid, now.flight_custom_version), (77, [0; 8]));
+}
+
+#[test]
+fn there_are_no_extended_parameters_and_every_question_is_answered() {
+    let mut wire = Wire::new();
+    let mut read = [0; 20];
+    read[..4].copy_from_slice(&[0xFF, 0xFF, 1, 1]);
+    read[4..8].copy_from_slice(b"NAME");
+    for question in [(320, &read[..]), (321, &[1, 1])] {
+        let sent = wire.question(question.0, question.1);
+        let error = find(&sent, |message| match message {
+            MavMessage::PARAM_ERROR(error) => Some((error.error, error.target_system, error.param_index)),
+            _ => None,
+        });
+        assert_eq!(error, Some((MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, 255, -1)));
+    }
+    let mut set = [0; 147];
+    set[..6].copy_from_slice(&[1, 1, b'N', b'A', b'M', b'E']);
+    let sent = wire.question(323, &set);
+    let answer = find(&sent, |message| match message {
+        MavMessage::PARAM_EXT_ACK(answer) => Some((answer.param_result, answer.param_id)),
+        _ => None,
+    });
+    let (result, id) = answer.expect("an answer");
+    assert_eq!(result, ParamAck::PARAM_ACK_FAILED);
+    assert_eq!(id.to_str(), Ok("NAME"));
+    assert!(texts(&wire.run(1.0)).is_empty(), "no words about it");
 }

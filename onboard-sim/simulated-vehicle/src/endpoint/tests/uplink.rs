@@ -2,7 +2,7 @@
 
 use flight::rules::arming::{UPLINK_CHECK, all_passed};
 use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_SILENT_S};
-use protocol::dialect::{TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor};
+use protocol::dialect::{COMMAND_CANCEL_DATA, TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor};
 use protocol::signing::Rejection;
 use sim::dispersion::Dispersion;
 
@@ -268,6 +268,22 @@ fn in_the_last_moment_nothing_holds_and_the_crew_is_told_why() {
     assert_eq!(pad.status().last_hold_ms, 0);
     pad.run(pad.vehicle.computer().countdown_s() - 1.0);
     assert_eq!(pad.ask(CREW, HOLD, 0.0), ACCEPTED);
+}
+
+#[test]
+fn a_running_check_can_be_cancelled() {
+    let mut pad = Pad::in_space();
+    assert_eq!(pad.ask(CREW, MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0), ACCEPTED);
+    pad.run(0.5);
+    assert!(pad.vehicle.computer().pad_check().is_running());
+    let cancel =
+        COMMAND_CANCEL_DATA { command: MavCmd::MAV_CMD_TD_PAD_CHECK, target_system: 1, target_component: 1 };
+    let cancel = pad.stations[CREW].encode(&MavMessage::COMMAND_CANCEL(cancel));
+    pad.sent.clear();
+    pad.endpoint.on_frame(0, &cancel, &pad.vehicle);
+    pad.run(0.3);
+    assert_eq!(pad.answers(), [MavResult::MAV_RESULT_CANCELLED as u8]);
+    assert!(!pad.vehicle.computer().pad_check().is_running());
 }
 
 #[test]
