@@ -229,11 +229,11 @@ impl LinkStats {
 #[derive(Debug, Clone, Default)]
 pub struct ContentAge {
     /// The newest time on the vehicle's clock, us, and the first one that was heard.
-    newest_us: Option<(i64, i64)>,
-    /// The least upper bound of each of the last minutes, us, with the minute.
-    at_most_us: VecDeque<(u64, i64)>,
-    /// The greatest lower bound of each of the last minutes.
-    at_least_us: VecDeque<(u64, i64)>,
+    heard_us: Option<(i64, i64)>,
+    /// The least upper bound of the difference in each of the last minutes, us, with the minute.
+    upper: VecDeque<(u64, i64)>,
+    /// The greatest lower bound in the same way.
+    lower: VecDeque<(u64, i64)>,
 }
 
 /// So many minutes are remembered. In ten minutes two quartz clocks drift apart by some 60 ms.
@@ -260,16 +260,16 @@ impl ContentAge {
     /// Takes the time on the vehicle's clock that a message carries.
     pub fn hear(&mut self, clock: Duration, now: Duration) {
         let (clock_us, offset_us) = (us(clock), us(now) - us(clock));
-        if self.newest_us.is_some_and(|(newest_us, _)| clock_us + ANEW_US < newest_us) {
+        if self.heard_us.is_some_and(|(newest_us, _)| clock_us + ANEW_US < newest_us) {
             *self = Self::default();
         }
-        let (newest_us, first_us) = self.newest_us.unwrap_or((clock_us, clock_us));
-        self.newest_us = Some((newest_us.max(clock_us), first_us));
+        let (newest_us, first_us) = self.heard_us.unwrap_or((clock_us, clock_us));
+        self.heard_us = Some((newest_us.max(clock_us), first_us));
         // It arrived before it could have been sent: the vehicle's clock runs faster than was thought.
         if self.at_least_us().is_some_and(|least_us| offset_us < least_us) {
-            self.at_least_us.clear();
+            self.lower.clear();
         }
-        keep(&mut self.at_most_us, offset_us, i64::min, now);
+        keep(&mut self.upper, offset_us, i64::min, now);
     }
 
     /// Takes the answer to a TIMESYNC: the time on the vehicle's clock, and when the question left.
@@ -277,22 +277,22 @@ impl ContentAge {
         let least_us = us(asked_at) - us(clock);
         // The vehicle's clock has lost time.
         if self.at_most_us().is_some_and(|most_us| most_us < least_us) {
-            self.at_most_us.clear();
+            self.upper.clear();
         }
-        keep(&mut self.at_least_us, least_us, i64::max, now);
+        keep(&mut self.lower, least_us, i64::max, now);
     }
 
     fn at_most_us(&self) -> Option<i64> {
-        self.at_most_us.iter().map(|(_, bound_us)| *bound_us).min()
+        self.upper.iter().map(|(_, bound_us)| *bound_us).min()
     }
 
     fn at_least_us(&self) -> Option<i64> {
-        self.at_least_us.iter().map(|(_, bound_us)| *bound_us).max()
+        self.lower.iter().map(|(_, bound_us)| *bound_us).max()
     }
 
     /// Returns the age of the newest content; `None` while no clock of the vehicle is seen to run.
     pub fn age(&self, now: Duration) -> Option<Duration> {
-        let (newest_us, _) = self.newest_us.filter(|(newest_us, first_us)| newest_us > first_us)?;
+        let (newest_us, _) = self.heard_us.filter(|(newest_us, first_us)| newest_us > first_us)?;
         let offset_us = self.at_least_us().or(self.at_most_us())?;
         Some(Duration::from_micros(u64::try_from(us(now) - newest_us - offset_us).unwrap_or(0)))
     }
@@ -314,7 +314,7 @@ mod tests {
 
     /// Messages every 100 ms that take `delay` of their time of sending to arrive; a question every 5 s, which takes 30 ms,
     /// and its answer as long as everything else. Returns the worst error of the age, ms, from a time on.
-    fn worst_error_ms(delay: impl Fn(u64) -> u64, asks: bool, from_ms: u64) -> i64 {
+    fn worst_error_ms(delay: impl Fn(u64) -> u64, asks: bool, from_ms: u64) -> u64 {
         // The vehicle has run for 1,000 s when the station starts.
         let clock = |now: u64| ms(1_000_000 + now);
         let mut content = ContentAge::default();
@@ -328,16 +328,15 @@ mod tests {
         arrivals.sort_unstable();
         let (mut worst, mut newest) = (0, 0);
         for (at, sent, asked) in arrivals.into_iter().filter(|(at, ..)| *at < 60_000) {
-            match asked {
-                Some(asked) => content.answered(clock(sent), ms(asked), ms(at)),
-                None => {
-                    newest = sent;
-                    content.hear(clock(sent), ms(at));
-                }
+            if let Some(asked) = asked {
+                content.answered(clock(sent), ms(asked), ms(at));
+            } else {
+                newest = sent;
+                content.hear(clock(sent), ms(at));
             }
             if at >= from_ms {
-                let told = content.age(ms(at)).unwrap().as_millis() as i64;
-                worst = worst.max((told - (at - newest) as i64).abs());
+                let told = content.age(ms(at)).unwrap().as_millis() as u64;
+                worst = worst.max(told.abs_diff(at - newest));
             }
         }
         worst

@@ -20,6 +20,9 @@ use super::writer::{LogHeader, LogWriteError, LogWriter};
 
 const QUEUE_RECORDS: usize = 8192;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
+/// What asks to be synced soon is synced at most this often: each time ends a chunk, of which the writer keeps an entry for the
+/// index at the end.
+const SYNC_APART: Duration = Duration::from_millis(100);
 
 /// Why recording could not start or did not end well.
 #[derive(Debug, thiserror::Error)]
@@ -228,6 +231,7 @@ fn write_until_finished(
     marked_bytes: &AtomicU64,
 ) -> Result<(), LogWriteError> {
     let mut flush_due: Option<Instant> = None;
+    let mut synced_at: Option<Instant> = None;
     loop {
         let order = match flush_due {
             None => inbox.recv().map_err(|_closed| RecvTimeoutError::Disconnected),
@@ -246,7 +250,12 @@ fn write_until_finished(
                     flush_due = None;
                 }
             }
+            Ok(Order::SyncSoon) if synced_at.is_some_and(|at| at.elapsed() < SYNC_APART) => {
+                let due = synced_at.unwrap_or_else(Instant::now) + SYNC_APART;
+                flush_due = Some(flush_due.map_or(due, |at| at.min(due)));
+            }
             Ok(Order::SyncSoon) | Err(RecvTimeoutError::Timeout) => {
+                synced_at = Some(Instant::now());
                 hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                 flush_due = None;
             }
