@@ -289,3 +289,50 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     let output = vehicle.wait().output;
     assert!(!output.contains("ABORT"), "{output}");
 }
+
+/// The one that armed and started is killed in the countdown; the other one's heartbeats, under the same id, do not stand in
+/// for it.
+#[test]
+fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_alive() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/vehicles/profiles/paper-calibrated.toml");
+    let profile = std::fs::read_to_string(of).unwrap();
+    let countdown = profile.lines().find(|line| line.starts_with("countdown_s")).unwrap();
+    // The second station joins within it, however busy the machine is.
+    std::fs::write(folder.path().join("slow.toml"), profile.replace(countdown, "countdown_s = 300.0"))
+        .unwrap();
+    let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
+    let mut vehicle = Running::start(command.args(["--stay", "--profile", "slow.toml"]));
+    let link = vehicle.udp_link();
+    let station =
+        || Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
+    let mut one = station();
+    one.wait_for("GO: every arming check passes");
+    one.type_until(b"0AARM\r", "armed, says HEARTBEAT");
+    one.type_until(b"0SSTART\r", "hold until T-2");
+    one.wait_for("armed here");
+    let mut other = station();
+    let never_here =
+        |window: &e2e::Window| assert!(!window.shows("armed here"), "{}", window.rows().join("\n"));
+    for (screen, is_other) in [(&one, false), (&other, true)] {
+        screen.wait_until("that there are two", |window| {
+            if is_other {
+                never_here(window);
+            }
+            window.shows("another station uses our id 255/190").then_some(())
+        });
+    }
+    other.type_until(b"0AARM\r", "cannot arm: another station uses our id 255/190");
+    one.signal(Signal::SIGKILL);
+    other.wait_until("the hold", |window| {
+        never_here(window);
+        window.shows("HOLD: the vehicle did not hear its station for 2 s").then_some(())
+    });
+    other.type_bytes(b"\x18\r");
+    other.wait_until("the abort", |window| {
+        never_here(window);
+        window.shows("observed yes").then_some(())
+    });
+    vehicle.signal(Signal::SIGTERM);
+    assert!(!vehicle.wait().output.contains("LAND_ARMED"));
+}
