@@ -60,6 +60,12 @@ enum Command {
     /// (the set of dispersions with the wind of the day).
     #[command(after_help = cli::card::EXAMPLE)]
     Card(cli::card::CardArguments),
+    /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.
+    ///
+    /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
+    /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
+    #[command(after_help = "Example: onboard-sim hazard --profile mk2 --winds 0,3,6 --svg hazard.svg")]
+    Hazard(cli::hazard::HazardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     #[command(after_help = "Example: onboard-sim paper --figures figures")]
     Paper(cli::paper::PaperArguments),
@@ -120,6 +126,7 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Motors(arguments) => cli::motors::run(&arguments),
         Command::Card(arguments) => cli::card::run(&arguments),
+        Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Paper(arguments) => cli::paper::run(&arguments),
         Command::World(arguments) => cli::world::run(arguments),
         Command::Computer(arguments) => cli::computer::run(arguments),

@@ -109,24 +109,32 @@ fn a_card_is_written_whole_and_its_mission_flies_the_same_flights() {
         "2",
         "--flights",
         "2",
+        "--hazard-flights",
+        "2",
     ];
     let written = run(directory.path(), &arguments);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
     let card = directory.path().join("card");
     assert_eq!(names(&card), ["card.html", "card.txt", "day.toml", "mission.toml"]);
     let text = fs::read_to_string(card.join("card.txt")).unwrap();
-    for expected in
-        ["0.850 kg", "Apogee or drop", "Lands at 2 m/s", "Lands at 5 m/s", "[ ] Weigh the vehicle"]
-    {
+    for expected in [
+        "0.850 kg",
+        "Apogee or drop",
+        "Lands at 2 m/s in real",
+        "Lands at 5 m/s in real",
+        "[ ] Nobody within at least ",
+        "[ ] Weigh the vehicle",
+    ] {
         assert!(text.contains(expected), "{expected} in\n{text}");
     }
     assert!(stdout(&written).starts_with(&text));
+    assert!(!text.contains("kinder"), "{text}");
     let html = fs::read_to_string(card.join("card.html")).unwrap();
     assert!(html.contains("<td class=\"v\">0.850 kg</td>") && html.ends_with("</html>\n"));
 
     // The campaign on the written files lands as many of the same flights.
-    let landed = text.lines().find(|line| line.contains("Lands at 2 m/s")).unwrap();
-    let count = landed.split_whitespace().nth(4).unwrap();
+    let landed = text.lines().find(|line| line.contains("Lands at 2 m/s in real")).unwrap();
+    let count = landed.split_whitespace().nth(6).unwrap();
     let flown = run(
         directory.path(),
         &[
@@ -181,8 +189,42 @@ fn what_cannot_land_gets_no_card_but_the_bound_and_the_nearest() {
 #[test]
 fn the_help_has_an_example() {
     let directory = tempfile::tempdir().unwrap();
+    let hazard = stdout(&run(directory.path(), &["hazard", "--help"]));
+    assert!(hazard.contains("[default: real]") && hazard.contains("Example: onboard-sim hazard"), "{hazard}");
     for command in ["motors", "card"] {
         let help = stdout(&run(directory.path(), &[command, "--help"]));
         assert!(help.contains(&format!("Example: onboard-sim {command} --mission mini-f10")), "{help}");
+        assert!(help.contains("[default: real]"), "{help}");
     }
+}
+
+/// What a person acts on says its set, and a set that may be kinder than `real` says that.
+#[test]
+fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
+    let directory = tempfile::tempdir().unwrap();
+    let few = ["hazard", "--profile", "vlr", "--winds", "0,4", "--survey", "1", "--flights", "2"];
+    let hazard = |more: &[&str]| run(directory.path(), &[&few, more].concat());
+    let written = hazard(&["--csv", "hazard.csv", "--svg", "hazard.svg"]);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let text = stdout(&written);
+    for expected in [
+        "vlr from drone",
+        "Set `real`, seed 1",
+        "0 m/s",
+        "4 m/s: nobody within ",
+        "at least: too few flights",
+        "ballistic",
+        "model rocket",
+        "NAR Model Rocket Safety Code",
+    ] {
+        assert!(text.contains(expected), "{expected} in\n{text}");
+    }
+    let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
+    assert!(csv.starts_with("wind_m_s,way,flight,x_m,y_m,landed\n0,\"as planned\",0,"), "{csv}");
+    let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();
+    assert!(svg.contains("vlr: where it comes down") && svg.contains("NAR 9 m"), "{svg}");
+    let again = hazard(&["--csv", "hazard.csv"]);
+    assert!(stderr(&again).contains("hazard.csv exists already; --force"), "{}", stderr(&again));
+    let kind = stdout(&hazard(&["--dispersion", "field"]));
+    assert!(kind.contains("Set `field`, which may be kinder than `real`, seed 1"), "{kind}");
 }

@@ -1,6 +1,7 @@
 //! Simulates thousands of flights on several threads and summarises how they end.
 //!
 //! * [`attainable`]: whether a clairvoyant could have landed a flight.
+//! * [`hazard`]: where a flight comes down in each way that it can end.
 //! * [`order`]: everything that a campaign's results depend on.
 //! * [`tally`]: flies one flight of a campaign and collects the values of its row.
 //! * [`row`]: one flight as a row of a table.
@@ -17,6 +18,7 @@
 //! run on any number of threads with the same results.
 
 pub mod attainable;
+pub mod hazard;
 pub mod order;
 pub mod picture;
 pub mod results;

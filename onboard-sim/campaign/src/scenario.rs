@@ -116,6 +116,7 @@ pub const EXPECTATIONS: &[Expectation] = &[
     ),
     expectation("early-burnout:2@0", Expected::Degrade, "the vehicle falls the rest of the way"),
     expectation("reboot:0.2@descent+3", Expected::Land, "the restart keeps the phase and the last estimate"),
+    expectation("parachute-fails@0", Expected::Land, "a landing does not need the parachute"),
     expectation("abort@descent+1", Expected::Parachute, "there is room for the parachute"),
 ];
 

@@ -24,6 +24,8 @@ pub struct Weather {
 /// The outcome of some flights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
+    /// Name of the set of dispersions.
+    pub set: String,
     /// Landed within the limits of the legs.
     pub legs: Share,
     /// Landed inside the landing paper's Table 2.
@@ -87,7 +89,8 @@ pub fn fly(
     let rows = fly_rows(&tasks, jobs, done)?;
     // Without flights there are no chunks.
     let mut of_each = rows.chunks(flights.max(1) as usize);
-    Ok(recipes.iter().map(|_| Flown::of(of_each.next().unwrap_or_default())).collect())
+    let flown = |recipe: &&Recipe| Flown::of(&recipe.dispersion_name, of_each.next().unwrap_or_default());
+    Ok(recipes.iter().map(flown).collect())
 }
 
 /// The rows of some flights, in their order.
@@ -103,8 +106,8 @@ pub(crate) fn fly_rows(
 }
 
 impl Flown {
-    /// What rows come to.
-    pub(crate) fn of(rows: &[Row]) -> Self {
+    /// What rows of a set of dispersions come to.
+    pub(crate) fn of(set: &str, rows: &[Row]) -> Self {
         let of = rows.len() as u64;
         let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
         let mut failures: Vec<(String, u64)> = Vec::new();
@@ -118,6 +121,7 @@ impl Flown {
         // Among equally frequent ones the first flown.
         let failure = failures.into_iter().reduce(|most, next| if next.1 > most.1 { next } else { most });
         Self {
+            set: set.to_owned(),
             legs: Share::new(count(|row| row.legs), of),
             strict: Share::new(count(|row| row.strict), of),
             failure,

@@ -71,10 +71,9 @@ fn bar(rank: usize, landing: &Landing, [x, y]: [Scale; 2], out: &mut String) -> 
         choice.mass.loaded_kg,
         choice.start_height_m
     )?;
-    let rate = landing
-        .flown
-        .as_ref()
-        .map_or_else(String::new, |flown| format!(", {:.0} % land", 100.0 * flown.legs.share));
+    let rate = landing.flown.as_ref().map_or_else(String::new, |flown| {
+        format!(", {} of {} land in {}", flown.legs.count, flown.legs.of, escaped(&flown.set))
+    });
     let base_px = middle_px + 4.0;
     writeln!(out, r#"<text x="{:.1}" y="{base_px:.1}" text-anchor="end">{rank}</text>"#, x.from_px - 6.0)?;
     writeln!(

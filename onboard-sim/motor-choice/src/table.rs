@@ -75,9 +75,10 @@ fn rate(flown: &Flown) -> String {
     let legs = flown.legs;
     let others = flown.failure.as_ref().map_or_else(String::new, |(reason, _)| format!("; mostly {reason}"));
     format!(
-        "{} of {}: {:.0} % ({:.0} to {:.0}){others}",
+        "{} of {} in {}: {:.0} % ({:.0} to {:.0}){others}",
         legs.count,
         legs.of,
+        flown.set,
         100.0 * legs.share,
         100.0 * legs.low,
         100.0 * legs.high
@@ -133,7 +134,7 @@ fn kind_of(ranked: &Ranked) -> Option<&'static str> {
 }
 
 /// The columns of the CSV.
-const COLUMNS: [&str; 25] = [
+const COLUMNS: [&str; 26] = [
     "rank",
     "manufacturer",
     "motor",
@@ -159,6 +160,7 @@ const COLUMNS: [&str; 25] = [
     "landed_legs",
     "legs_low",
     "legs_high",
+    "flown_in_set",
 ];
 
 /// Every motor as CSV.
@@ -174,14 +176,14 @@ pub fn write_csv(ranking: &[Ranked], out: &mut impl std::io::Write) -> std::io::
     table.flush()
 }
 
-fn record(rank: usize, ranked: &Ranked) -> [String; 25] {
+fn record(rank: usize, ranked: &Ranked) -> [String; 26] {
     let number = |value: f64| format!("{value}");
     let (candidate, reason) = match ranked {
         Ranked::Lands(landing) => (Some(&landing.candidate), String::new()),
         Ranked::Refused(candidate, refusal) => (Some(candidate), refusal.to_string()),
         Ranked::Unusable(unusable) => (None, unusable.reason.clone()),
     };
-    let mut cells: [String; 25] = Default::default();
+    let mut cells: [String; 26] = Default::default();
     if let Some(candidate) = candidate {
         let curve = &candidate.curve;
         curve.manufacturer().clone_into(&mut cells[1]);
@@ -221,10 +223,11 @@ fn record(rank: usize, ranked: &Ranked) -> [String; 25] {
     for (cell, value) in cells[9..].iter_mut().zip(numbers) {
         *cell = format!("{value:.4}");
     }
-    if let Some(Flown { legs, .. }) = flown {
+    if let Some(Flown { set, legs, .. }) = flown {
         cells[21] = legs.of.to_string();
         cells[22] = legs.count.to_string();
         [cells[23], cells[24]] = [number(legs.low), number(legs.high)];
+        cells[25].clone_from(set);
     }
     cells
 }

@@ -105,6 +105,14 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("real-harsh", include_str!("dispersions/real-harsh.toml")),
 ];
 
+/// The set behind every number that a person acts on, if no other is asked for: the one with an error in everything.
+pub const DEFAULT: &str = "real";
+
+/// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one and twice its errors.
+pub fn may_be_kinder(name: &str) -> bool {
+    !["real", "real-harsh"].contains(&name)
+}
+
 /// Why a set cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DispersionError {

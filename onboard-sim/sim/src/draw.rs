@@ -202,20 +202,20 @@ pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
 }
 
 /// Random numbers on `libm`, the same on every machine.
-struct Chance {
+pub struct Chance {
     random: ChaCha12Rng,
 }
 
 impl Chance {
     /// The numbers of flight `number` from a generator of this seed.
-    fn of(seed: u64, number: u64) -> Self {
+    pub fn of(seed: u64, number: u64) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         random.set_stream(number);
         Self { random }
     }
 
     /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 

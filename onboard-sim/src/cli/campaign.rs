@@ -35,7 +35,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
-    #[arg(long, default_value = "field", value_name = "NAME|FILE")]
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Sensors deliver and servos get what the messages of hardware in the loop can carry.
     #[arg(long)]

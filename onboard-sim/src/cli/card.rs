@@ -45,6 +45,9 @@ pub(crate) struct CardArguments {
     /// Flights in this wind. By default as many as a few seconds allow, 12 to 60.
     #[arg(long, value_name = "N")]
     flights: Option<u64>,
+    /// Flights of the way of ending that comes down farthest from the pad. Below 368 its interval has no upper end.
+    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=FLIGHTS_MAX))]
+    hazard_flights: u64,
     /// Folder of the card.
     #[arg(long, default_value = "card", value_name = "DIR")]
     out: PathBuf,
@@ -96,10 +99,12 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         ballast_station_m: choices.ballast_station_m(mission)?,
         start: choices.start(mission)?,
         tube_m: choices.tube_m(mission)?,
+        set: &set.dispersion_name,
         today: &today,
         windier: &windier,
         steady: &steady.collect::<anyhow::Result<Vec<_>>>()?,
         flights: arguments.flights,
+        hazard_flights: arguments.hazard_flights,
         jobs: choices.jobs(),
     };
     let card = Card::new(&order, &|done, of| show(done, of, "flights"))?;

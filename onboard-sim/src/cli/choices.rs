@@ -42,7 +42,7 @@ pub(super) struct Choices {
     #[arg(long, value_name = "M", conflicts_with = "height")]
     highest: Option<f64>,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
-    #[arg(long, default_value = "field", value_name = "NAME|FILE")]
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]

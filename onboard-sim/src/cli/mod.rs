@@ -6,6 +6,7 @@ mod choices;
 pub(crate) mod computer;
 mod cost;
 pub(crate) mod fly;
+pub(crate) mod hazard;
 pub(crate) mod landability;
 pub(crate) mod manual;
 pub(crate) mod motors;

@@ -4,6 +4,7 @@
 mod cells;
 mod legend;
 mod lines;
+mod places;
 
 use plotters::backend::SVGBackend;
 use plotters::coord::Shift;
@@ -12,6 +13,7 @@ use plotters::style::{RGBColor, WHITE};
 
 pub use cells::{CellAxis, Cells, cells_svg};
 pub use lines::{Line, Panel, lines_svg};
+pub use places::{Places, places_svg};
 
 /// A figure cannot be drawn: its axes are not finite, or too small for their labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -34,6 +34,8 @@ pub enum Fault {
     },
     /// The booster stays on the vehicle.
     SeparationFails,
+    /// The charge of the parachute does not burn: the parachute stays in.
+    ParachuteFails,
     /// Both gimbal axes are stuck.
     GimbalStuck,
     /// The servo of the pitch axis runs to an angle and stays there.

@@ -154,6 +154,7 @@ impl Motor {
             | Fault::AscentSelfLights
             | Fault::AscentWeak { .. }
             | Fault::SeparationFails
+            | Fault::ParachuteFails
             | Fault::GimbalStuck
             | Fault::GimbalJams { .. }
             | Fault::GimbalSlow { .. }

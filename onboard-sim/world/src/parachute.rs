@@ -10,16 +10,24 @@ pub(crate) struct Parachute {
     data: ParachuteData,
     commanded_s: Option<f64>,
     travelled_m: f64,
+    fails: bool,
 }
 
 impl Parachute {
     pub(crate) fn new(data: &ParachuteData) -> Self {
-        Self { data: *data, commanded_s: None, travelled_m: 0.0 }
+        Self { data: *data, commanded_s: None, travelled_m: 0.0, fails: false }
     }
 
     /// Ejects the parachute; only the first command counts.
     pub(crate) fn eject(&mut self, time_s: f64) {
-        self.commanded_s.get_or_insert(time_s);
+        if !self.fails {
+            self.commanded_s.get_or_insert(time_s);
+        }
+    }
+
+    /// From now on no command ejects it.
+    pub(crate) fn break_down(&mut self) {
+        self.fails = true;
     }
 
     pub(crate) fn ejected(&self) -> bool {
@@ -72,5 +80,10 @@ mod tests {
             }
             assert!((parachute.open_share() - expected).abs() < 1e-9, "{step}: {}", parachute.open_share());
         }
+        let mut broken = Parachute::new(&data);
+        broken.break_down();
+        broken.eject(0.0);
+        broken.step(100.0, 50.0);
+        assert!(broken.drag_area_m2().abs() < 1e-15 && !broken.ejected());
     }
 }

@@ -22,7 +22,7 @@ pub(super) struct Ask {
     #[arg(long, value_name = "NAME|FILE")]
     mission: Option<String>,
     /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
-    #[arg(long, default_value = "field", value_name = "NAME|FILE")]
+    #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
     prior: String,
     /// Simulated flights of the day; with fewer the interval gets wider.
     #[arg(long, default_value_t = 1000, value_name = "N")]

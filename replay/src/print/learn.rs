@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use sim::dispersion::{DEFAULT, may_be_kinder};
+
 use super::{counted, shown};
 use crate::learn::Learnt;
 
@@ -42,11 +44,12 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
     let found = &learnt.prediction;
     writeln!(
         output,
-        "rate      {:.1} %, 95 % interval {:.1} to {:.1} %, from {}",
+        "rate      {:.1} %, 95 % interval {:.1} to {:.1} %, from {} in {}",
         100.0 * found.rate,
         100.0 * found.low,
         100.0 * found.high,
-        counted(learnt.flights as u64, "simulated flight")
+        counted(learnt.flights as u64, "simulated flight"),
+        shown(set)
     )?;
     writeln!(
         output,
@@ -55,5 +58,9 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
         100.0 * learnt.limit,
         100.0 * learnt.risk
     )?;
-    writeln!(output, "{}", if learnt.go { "GO" } else { "NO-GO" })
+    match (learnt.go, may_be_kinder(set)) {
+        (false, _) => writeln!(output, "NO-GO"),
+        (true, false) => writeln!(output, "GO"),
+        (true, true) => writeln!(output, "GO in {} only, which may be kinder than {DEFAULT}", shown(set)),
+    }
 }

@@ -66,6 +66,14 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     assert!(code < 2, "{stderr}");
     assert!(stdout.ends_with(if code == 0 { "\nGO\n" } else { "\nNO-GO\n" }), "{stdout}");
     assert!(stdout.contains("risk ") && stdout.contains("95 % interval"), "{stdout}");
+    // A careful club's day, and not the kindest, unless it is asked for.
+    assert!(stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real\n"), "{stdout}");
+    let asked = [LANDED.log.to_str().unwrap(), "--prior", "field", "--limit", "0.01"];
+    let (code, stdout, stderr) = learn(&asked);
+    assert!(
+        code == 0 && stdout.ends_with("\nGO in field only, which may be kinder than real\n"),
+        "{stdout}{stderr}"
+    );
 }
 
 #[test]

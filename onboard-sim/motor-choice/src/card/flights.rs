@@ -1,8 +1,10 @@
 //! The flights of a card: in the wind of the day, in more wind, and of the certified vehicle in steady wind.
 
+use campaign::hazard::{self, Flights, HazardError, Radius, Rule, Way};
+use flight::vehicle::profile::StartPoint;
 use sim::recipe::Recipe;
 
-use super::Order;
+use super::{CardError, Order};
 use crate::flown::{Flown, FlyError, Weather, fly_rows};
 
 /// A mean wind and the flights in it.
@@ -38,6 +40,52 @@ impl Winds {
     }
 }
 
+/// How near people may stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hazard {
+    /// Mean wind of the flights: the strongest up to which the card allows to fly, or more, m/s.
+    pub wind_m_s: f64,
+    /// Flights of every way in which a flight can end.
+    pub survey: u64,
+    /// The way that reaches farthest, with its own flights.
+    pub way: Way,
+    pub radius: Radius,
+    pub rule: Rule,
+}
+
+/// Flights of each way, by which the one that reaches farthest is known.
+const SURVEY: u64 = 6;
+
+/// Where the card's mission comes down, from its pad if it has a booster. Every way is flown a few times, and the way that reaches
+/// farthest as often as its interval needs.
+pub(super) fn fly_the_hazard(
+    order: &Order<'_>,
+    recipe: &Recipe,
+    limit_m_s: f64,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Hazard, CardError> {
+    let day = if limit_m_s > order.today.wind_m_s { order.windier } else { order.today };
+    let mut recipe = in_weather(recipe, &day.weather);
+    if recipe.mission.launch.is_some() && recipe.mission.start.at == StartPoint::Apogee {
+        recipe = recipe.starting_at(StartPoint::Pad).map_err(HazardError::Recipe)?;
+    }
+    let rule = Rule::of(&recipe.mission);
+    let flights = Flights { survey: SURVEY.min(order.hazard_flights), of_widest: order.hazard_flights };
+    let impacts =
+        hazard::study(&recipe, flights, order.jobs, &|done, of| progress(done as usize, of as usize))?;
+    let (way, radius) = hazard::widest(&impacts).ok_or(HazardError::NoFlight)?;
+    Ok(Hazard { wind_m_s: day.wind_m_s, survey: flights.survey, way, radius, rule })
+}
+
+fn in_weather(recipe: &Recipe, weather: &Weather) -> Recipe {
+    Recipe {
+        dispersion: weather.dispersion,
+        dispersion_name: weather.dispersion_name.clone(),
+        dispersion_toml: weather.dispersion_toml.clone(),
+        ..recipe.clone()
+    }
+}
+
 /// Flights from which the cost of one is learnt.
 const FIRST: u64 = 4;
 /// Fewest and most flights in the wind of the day.
@@ -53,20 +101,14 @@ pub(super) fn fly_in_winds(
     recipe: &Recipe,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Winds, FlyError> {
-    let in_weather = |weather: &Weather| Recipe {
-        dispersion: weather.dispersion,
-        dispersion_name: weather.dispersion_name.clone(),
-        dispersion_toml: weather.dispersion_toml.clone(),
-        ..recipe.clone()
-    };
     let first = order.flights.unwrap_or(FIRST).min(FIRST);
     let mut today = fly_rows(&numbered(recipe, 0..first), order.jobs, &|_| {})?;
     let flights = order.flights.unwrap_or_else(|| {
         let each = today.iter().map(|row| row.solver_iterations).sum::<u64>() / FIRST + BESIDE;
         (BUDGET / each).clamp(FLIGHTS[0], FLIGHTS[1])
     });
-    let windier = in_weather(&order.windier.weather);
-    let steady: Vec<Recipe> = order.steady.iter().map(|(_, weather)| in_weather(weather)).collect();
+    let windier = in_weather(recipe, &order.windier.weather);
+    let steady: Vec<Recipe> = order.steady.iter().map(|(_, weather)| in_weather(recipe, weather)).collect();
     // All at once, so that no thread waits for the last flight of a wind.
     let mut tasks = numbered(recipe, first..flights);
     let from_windier = tasks.len();
@@ -79,9 +121,9 @@ pub(super) fn fly_in_winds(
     let landed = rows[from_steady..].iter().take_while(|row| row.legs).count();
     Ok(Winds {
         today_m_s: order.today.wind_m_s,
-        today: Flown::of(&today),
+        today: Flown::of(order.set, &today),
         windier_m_s: order.windier.wind_m_s,
-        windier: Flown::of(&rows[from_windier..from_steady]),
+        windier: Flown::of(order.set, &rows[from_windier..from_steady]),
         steady_m_s: landed.checked_sub(1).map(|last| order.steady[last].0),
         steady_tried_m_s: order.steady.last().map_or(0.0, |(wind_m_s, _)| *wind_m_s),
     })

@@ -8,10 +8,11 @@ mod page;
 mod refusal;
 mod sheet;
 
-pub use flights::{Day, Winds};
+pub use flights::{Day, Hazard, Winds};
 pub use refusal::NoLanding;
 
 use campaign::attainable::{self, Window as Clairvoyant};
+use campaign::hazard::HazardError;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use sim::dispersion::Dispersion;
@@ -41,6 +42,8 @@ pub struct Order<'a> {
     pub start: StartHeight,
     /// Widest motor that fits, m; that of the mission's own motor if not given.
     pub tube_m: Option<f64>,
+    /// Name of the set of dispersions.
+    pub set: &'a str,
     /// The wind of the day.
     pub today: &'a Day,
     /// More wind.
@@ -49,6 +52,8 @@ pub struct Order<'a> {
     pub steady: &'a [(f64, Weather)],
     /// Flights in the wind of the day; as many as a few seconds allow if not given.
     pub flights: Option<u64>,
+    /// Flights of the way of ending that reaches farthest.
+    pub hazard_flights: u64,
     /// Threads.
     pub jobs: usize,
 }
@@ -61,7 +66,9 @@ pub struct Card {
     pub mission_toml: String,
     landing: Landing,
     frame: Frame,
+    set: String,
     winds: Winds,
+    hazard: Hazard,
     /// Command heights of the feet from which a controller that knows everything would land.
     clairvoyant: Option<Clairvoyant>,
     seed: u64,
@@ -91,6 +98,8 @@ pub enum CardError {
     Text(#[from] RankError),
     #[error(transparent)]
     Fly(#[from] FlyError),
+    #[error("where it comes down")]
+    Hazard(#[from] HazardError),
     /// A thread could not be started.
     #[error("a thread could not be started")]
     Thread(#[from] std::io::Error),
@@ -123,13 +132,16 @@ impl Card {
                 reason: reason.to_owned(),
             });
         }
+        let hazard = flights::fly_the_hazard(order, &recipe, winds.limit_m_s(), progress)?;
         let clairvoyant = certified_window(&recipe.mission);
         Ok(Self {
             mission: recipe.mission,
             mission_toml,
             landing,
             frame,
+            set: order.set.to_owned(),
             winds,
+            hazard,
             clairvoyant,
             seed: order.today.weather.seed,
         })

@@ -1,8 +1,13 @@
 //! What stands on a card. Text and HTML show the same sheet.
 
 use flight::vehicle::atmosphere::Air;
+use flight::vehicle::profile::StartPoint;
+
+use campaign::hazard::{Rule, keep_out_m};
+use sim::dispersion::may_be_kinder;
 
 use super::Card;
+use super::flights::Hazard;
 use crate::flown::Flown;
 
 /// A card's content.
@@ -52,12 +57,14 @@ impl Card {
         Sheet {
             title: format!("Landing card: {}", self.mission.name),
             subtitle: format!(
-                "{}, {:.3} kg, {} m/s of wind. Simulated, not flown.",
+                "{}, {:.3} kg, {} m/s of wind, set {}{}. Simulated, not flown.",
                 self.landing.candidate.name(),
                 choice.mass.loaded_kg,
-                self.winds.today_m_s
+                self.winds.today_m_s,
+                self.set,
+                if may_be_kinder(&self.set) { " (which may be kinder than real)" } else { "" }
             ),
-            sections: vec![self.vehicle(), self.heights(), self.wind(), self.margins()],
+            sections: vec![self.vehicle(), self.heights(), self.wind(), self.people(), self.margins()],
             checks: self.checks(),
             notes: vec![
                 format!(
@@ -77,6 +84,7 @@ impl Card {
                      --flights {} --out flights",
                     self.seed, self.winds.today.legs.of
                 ),
+                format!("Distances of people: {}. The fence of the mission ({:.0} m) only decides whether the landing motor may light.", Rule::SOURCE, self.mission.gate.fence_radius_m),
                 "A rate is the share of simulated flights that landed within the limits of the legs, with Wilson's 95 % \
                  interval. More flights make it narrower; only flights make it true."
                     .to_owned(),
@@ -170,12 +178,12 @@ impl Card {
             title: "Wind and expected rate",
             rows: vec![
                 row(
-                    &format!("Lands at {} m/s", winds.today_m_s),
+                    &format!("Lands at {} m/s in {}", winds.today_m_s, self.set),
                     rate(&winds.today),
                     most_frequent(&winds.today),
                 ),
                 row(
-                    &format!("Lands at {} m/s", winds.windier_m_s),
+                    &format!("Lands at {} m/s in {}", winds.windier_m_s, self.set),
                     rate(&winds.windier),
                     most_frequent(&winds.windier),
                 ),
@@ -187,10 +195,63 @@ impl Card {
                 row(
                     "Do not fly above",
                     format!("{} m/s", winds.limit_m_s()),
-                    "mean wind 10 m above the ground; above it fewer flights land, or none was flown",
+                    format!(
+                        "mean wind 10 m above the ground; above it fewer of the {} and {} flights in {} land, or none was flown",
+                        winds.today.legs.of, winds.windier.legs.of, self.set
+                    ),
                 ),
             ],
         }
+    }
+
+    fn people(&self) -> Section {
+        let Hazard { wind_m_s, survey, way, radius, rule } = &self.hazard;
+        let high = radius.high_m.map_or_else(|| "no upper end".to_owned(), |high_m| format!("{high_m:.0}"));
+        let from_apogee = self.mission.launch.is_none() && self.mission.start.at == StartPoint::Apogee;
+        let not_in_it = if from_apogee { "; the way up to apogee is not in it" } else { "" };
+        Section {
+            title: "Where people stand",
+            rows: vec![
+                row(
+                    "Nobody within",
+                    self.keep_out(),
+                    format!("of the pad: the largest of the three below, rounded up{not_in_it}"),
+                ),
+                row(
+                    &format!("99 % down within, {wind_m_s} m/s"),
+                    format!("{:.0} m ({:.0} to {high})", radius.holds_m, radius.low_m),
+                    format!(
+                        "{} flights of {}, seed {}: {}, the way of ending that reached farthest",
+                        radius.flights,
+                        self.set,
+                        self.seed,
+                        way.name()
+                    ),
+                ),
+                row(
+                    "Farthest flight",
+                    format!("{:.0} m", radius.farthest_m),
+                    format!(
+                        "of these; of each other way {survey} were flown: `onboard-sim hazard` flies more"
+                    ),
+                ),
+                row(
+                    "Rule of NAR",
+                    format!("{:.0} m ({:.0} ft)", libm::ceil(rule.distance_m()), rule.feet),
+                    format!(
+                        "{:.0} N s, {}",
+                        rule.impulse_n_s,
+                        if rule.complex { "complex" } else { "one motor" }
+                    ),
+                ),
+            ],
+        }
+    }
+
+    /// The distance of people, in words.
+    fn keep_out(&self) -> String {
+        let at_least = if self.hazard.radius.high_m.is_none() { "at least " } else { "" };
+        format!("{at_least}{:.0} m", keep_out_m(&self.hazard.radius, &self.hazard.rule))
     }
 
     fn margins(&self) -> Section {
@@ -249,7 +310,7 @@ impl Card {
                 "Measure the wind for ten minutes: mean below {} m/s.",
                 self.winds.limit_m_s()
             ),
-            format!("Nobody within {:.0} m of the pad, the fence of the mission.", mission.gate.fence_radius_m),
+            format!("Nobody within {} of the pad, up to {} m/s of wind.", self.keep_out(), self.hazard.wind_m_s),
             format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
             "After the flight: a motor that was not lit is live. Nobody approaches for 60 s; then the pin first."
                 .to_owned(),

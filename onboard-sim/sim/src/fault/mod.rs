@@ -120,6 +120,7 @@ const NAMES: &[(&str, &str, Build)] = &[
         Some(Breakage::Vehicle(Fault::AscentWeak { scale }))
     }),
     ("separation-fails", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::SeparationFails))),
+    ("parachute-fails", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::ParachuteFails))),
     ("reboot", "s", |value| value.filter(|down_s| (0.0..=10.0).contains(down_s)).map(Breakage::Reboot)),
     ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
 ];
@@ -246,6 +247,7 @@ impl fmt::Display for TimedFault {
             Breakage::Vehicle(Fault::AscentSelfLights) => write!(f, "ascent-self-lights"),
             Breakage::Vehicle(Fault::AscentWeak { scale }) => write!(f, "ascent-weak:{scale}"),
             Breakage::Vehicle(Fault::SeparationFails) => write!(f, "separation-fails"),
+            Breakage::Vehicle(Fault::ParachuteFails) => write!(f, "parachute-fails"),
             Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
             Breakage::Vehicle(Fault::GimbalJams { deg }) => write!(f, "gimbal-jams:{deg}"),
             Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
@@ -273,6 +275,7 @@ mod tests {
             "ascent-weak:0.6@boost",
             "ascent-no-light@0",
             "separation-fails@coast",
+            "parachute-fails@0",
             "late-light:0.2@0",
             "reboot:0.5@descent+4",
             "link-loss@0",

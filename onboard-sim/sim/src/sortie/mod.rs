@@ -139,6 +139,12 @@ impl Sortie {
         })
     }
 
+    /// The same flight without the rehearsal on the pad, for a vehicle that nobody will arm.
+    #[must_use]
+    pub fn without_rehearsal(self) -> Self {
+        Self { rehearsal: None, ..self }
+    }
+
     /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
         let drawn = start::falling_as(mission, drawn)?;

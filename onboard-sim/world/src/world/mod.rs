@@ -193,6 +193,7 @@ impl World {
                     stack.break_down(fault);
                 }
             }
+            Fault::ParachuteFails => self.parachute.break_down(),
             Fault::NoLight
             | Fault::LateLight { .. }
             | Fault::WeakMotor { .. }

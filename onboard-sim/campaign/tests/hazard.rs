@@ -1,0 +1,79 @@
+//! Where flights come down that do not end on the pad.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use campaign::hazard::{Flights, Impact, Radius, Way, fly, study, widest};
+use flight::vehicle::profile::StartPoint;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+
+fn recipe(mission: &str, start: StartPoint) -> Recipe {
+    Recipe { seed: 31, ..Recipe::built_in(mission, "real").unwrap() }.starting_at(start).unwrap()
+}
+
+/// The fence of mk2 is 120 m. What the card once said of people outside of it was not true.
+#[test]
+fn a_flight_from_the_pad_that_ends_otherwise_comes_down_beyond_the_fence() {
+    let recipe = recipe("mk2", StartPoint::Pad);
+    let ways = Way::of(&recipe.mission);
+    let flights: Vec<Vec<Impact>> = (0..3).map(|number| fly(&recipe, &ways, number).unwrap()).collect();
+    for impacts in &flights {
+        assert_eq!(
+            impacts.iter().map(|impact| impact.way).collect::<Vec<_>>(),
+            ways,
+            "every way, in its order"
+        );
+        assert!(impacts.iter().all(|impact| impact.place_m.is_some()), "{impacts:?}");
+        let landed = impacts.iter().filter(|impact| impact.landed);
+        let may_land = [Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust];
+        assert!(landed.clone().all(|impact| may_land.contains(&impact.way)), "{impacts:?}");
+    }
+    let farthest_m = |way: Way| {
+        let of_way = flights.iter().flatten().filter(|impact| impact.way == way);
+        of_way.map(Impact::distance_m).fold(0.0, f64::max)
+    };
+    for way in [Way::AbortInAscent, Way::NoSeparation, Way::Uncommanded] {
+        assert!(farthest_m(way) > 120.0, "{way:?} {} m", farthest_m(way));
+    }
+    assert!(farthest_m(Way::AsPlanned) < 120.0);
+}
+
+/// The study holds the fins and moves the world alone once the parachute is out. A flight with its computer to the end
+/// comes down at the same place, to the bit; and an abort in the boost where one in the coast does.
+#[test]
+fn under_the_parachute_the_computer_changes_nothing() {
+    let recipe = recipe("mk2", StartPoint::Pad);
+    let flown = |fault: &str| {
+        let faults = vec![fault.parse().unwrap()];
+        let mut flight = Sortie::new(&Recipe { faults, ..recipe.clone() }, 1).unwrap();
+        while flight.world().rest().is_none() {
+            flight.step();
+        }
+        let place_m = flight.world().state().position_m;
+        Some([place_m.x, place_m.y])
+    };
+    let found = fly(&recipe, &[Way::AbortInAscent, Way::NoSeparation], 1).unwrap();
+    let [aborted, stays_on] = [0, 1].map(|place: usize| found[place].place_m);
+    assert_eq!([aborted, aborted], [flown("abort@boost+0.5"), flown("abort@coast+2")]);
+    assert_eq!(stays_on, flown("separation-fails@0"));
+}
+
+#[test]
+fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
+    let recipe = recipe("mk2", StartPoint::Apogee);
+    let flown = |jobs| study(&recipe, Flights { survey: 1, of_widest: 3 }, jobs, &|_, _| {}).unwrap();
+    let alone = flown(1);
+    assert_eq!(alone, flown(2));
+    // A parachute drifts with the wind; what falls without one does not.
+    let (way, radius) = widest(&alone).unwrap();
+    assert_eq!((way, radius.flights), (Way::ParachuteFromApogee, 3));
+    let falls = Radius::of_way(&alone, Way::Ballistic).unwrap();
+    assert!(falls.flights == 1 && falls.farthest_m < radius.farthest_m, "{falls:?}");
+}
+
+#[test]
+fn without_a_booster_nothing_of_one_is_asked() {
+    let apogee = Way::of(&recipe("mk2", StartPoint::Apogee).mission);
+    assert!(!apogee.contains(&Way::AbortInAscent) && apogee.contains(&Way::ParachuteFromApogee));
+    let drone = Way::of(&recipe("vlr", StartPoint::Drone).mission);
+    assert!(!drone.contains(&Way::ParachuteFromApogee) && drone.contains(&Way::Ballistic));
+}

@@ -1,0 +1,249 @@
+//! `onboard-sim hazard`: how near people may stand.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, widest};
+use clap::Args;
+use flight::vehicle::profile::StartPoint;
+use onboard_sim::figure::{Places, places_svg};
+use sim::dispersion::{self, Dispersion, may_be_kinder};
+use sim::recipe::Recipe;
+
+use super::campaign::{mission_text, text_of};
+use super::choices::show;
+use super::fly::{WIND_MAX_M_S, with_wind};
+use super::output::{refuse_loss, write_file};
+
+/// Flights of each kind that the picture shows.
+const SHOWN: u64 = 30;
+
+#[derive(Args)]
+pub(crate) struct HazardArguments {
+    /// Built-in mission or TOML file.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    profile: String,
+    /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
+    #[arg(long, value_name = "START")]
+    start: Option<StartPoint>,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
+    dispersion: String,
+    /// Mean winds 10 m above the ground, m/s.
+    #[arg(long, value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    winds: Vec<f64>,
+    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of the interval.
+    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    flights: u64,
+    /// Flights in each wind of every way, by which the ways are known that come down farthest.
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    survey: u64,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Flights at the same time; the results do not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Write where each flight came down (CSV).
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the places and the radii as a picture (SVG).
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
+    for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
+        refuse_loss(path, arguments.force)?;
+    }
+    for wind_m_s in &arguments.winds {
+        anyhow::ensure!(
+            (0.0..=WIND_MAX_M_S).contains(wind_m_s),
+            "--winds {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
+        );
+    }
+    let recipes = recipes(arguments)?;
+    let mission = &recipes[0].mission;
+    let ways = Way::of(mission);
+    let jobs = arguments.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let flights = Flights { survey: arguments.survey, of_widest: arguments.flights };
+    let winds = recipes.len() as u64;
+    let mut impacts = Vec::with_capacity(recipes.len());
+    for (before, recipe) in (0..winds).zip(&recipes) {
+        let told = |done, of| show((before * of + done) as usize, (winds * of) as usize, "flights");
+        impacts.push(hazard::study(recipe, flights, jobs, &told)?);
+    }
+    let rule = Rule::of(mission);
+    let study =
+        Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
+    std::io::stdout().lock().write_all(study.text(&rule, mission.gate.fence_radius_m).as_bytes())?;
+    if let Some(path) = &arguments.csv {
+        write_file(path, arguments.force, |out| out.write_all(study.csv().as_bytes()))?;
+    }
+    if let Some(path) = &arguments.svg {
+        let svg = study.svg(&rule)?;
+        write_file(path, arguments.force, |out| out.write_all(svg.as_bytes()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The mission in each wind.
+fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
+    let own = vehicles::mission::from_toml(&mission_text(&arguments.profile, None)?, &arguments.profile)?;
+    let start = arguments.start.or_else(|| own.launch.is_some().then_some(StartPoint::Pad));
+    let mission_toml = mission_text(&arguments.profile, start)?;
+    let set = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+    // A set that cannot be read is refused by its own name.
+    Dispersion::from_toml(&set, &arguments.dispersion)?;
+    let in_wind = |wind_m_s: &f64| {
+        let name = format!("{} with {wind_m_s} m/s of wind", arguments.dispersion);
+        let set = with_wind(&set, *wind_m_s);
+        let recipe = Recipe::from_texts((&arguments.profile, &mission_toml), (&name, &set))?;
+        Ok(Recipe { seed: arguments.seed, ..recipe })
+    };
+    arguments.winds.iter().map(in_wind).collect()
+}
+
+/// The flights with what was asked.
+struct Study<'a> {
+    arguments: &'a HazardArguments,
+    mission: &'a str,
+    start: StartPoint,
+    ways: &'a [Way],
+    /// In each wind.
+    impacts: &'a [Vec<Impact>],
+}
+
+impl Study<'_> {
+    fn radii(&self, way: Way) -> Vec<Option<Radius>> {
+        self.impacts.iter().map(|impacts| Radius::of_way(impacts, way)).collect()
+    }
+
+    fn text(&self, rule: &Rule, fence_m: f64) -> String {
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let _ = self.write_text(rule, fence_m, &mut out);
+        out
+    }
+
+    fn write_text(&self, rule: &Rule, fence_m: f64, out: &mut String) -> std::fmt::Result {
+        let HazardArguments { dispersion, seed, winds, .. } = self.arguments;
+        let start = match self.start {
+            StartPoint::Apogee => "apogee; how it got there is not in it",
+            other => other.name(),
+        };
+        writeln!(
+            out,
+            "{} from {start}: where it comes down, m from the pad. Simulated, not flown.",
+            self.mission
+        )?;
+        writeln!(
+            out,
+            "Set `{dispersion}`{}, seed {seed}; mean wind 10 m above the ground. A cell: the radius that holds 99 % of the flights,\n\
+             (its 95 % interval by order statistics; ?: too few flights for an upper end), the farthest; number of flights.\n",
+            if may_be_kinder(dispersion) { ", which may be kinder than `real`" } else { "" }
+        )?;
+        write!(out, "{:<26}", "")?;
+        winds.iter().try_for_each(|wind_m_s| write!(out, "{:<29}", format!("{wind_m_s} m/s")))?;
+        writeln!(out)?;
+        for way in self.ways {
+            write!(out, "{:<26}", way.name())?;
+            self.radii(*way).iter().try_for_each(|radius| write!(out, "{:<29}", cell(radius.as_ref())))?;
+            writeln!(out)?;
+        }
+        let landed = |impacts: &Vec<Impact>| {
+            let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+            let (of, landed) =
+                planned.fold((0, 0), |(of, landed), impact| (of + 1, landed + u64::from(impact.landed)));
+            format!("{landed} of {of}")
+        };
+        write!(out, "\n{:<26}", "landed, as planned")?;
+        self.impacts.iter().try_for_each(|impacts| write!(out, "{:<29}", landed(impacts)))?;
+        writeln!(out, "\n\nRule   {rule}\n       ({})", Rule::SOURCE)?;
+        writeln!(
+            out,
+            "Fence  {fence_m:.0} m: the vehicle lights its landing motor only inside; it holds nothing else back"
+        )?;
+        for (wind_m_s, impacts) in winds.iter().zip(self.impacts) {
+            if let Some((way, radius)) = widest(impacts) {
+                let apart = keep_out_m(&radius, rule);
+                let open =
+                    if radius.high_m.is_none() { " at least: too few flights for an upper end;" } else { "" };
+                writeln!(out, "{wind_m_s:>4} m/s: nobody within {apart:.0} m;{open} widest: {}", way.name())?;
+            }
+        }
+        if self.start == StartPoint::Pad {
+            writeln!(
+                out,
+                "\nNot in it: a launcher that tips, a motor that bursts, a stack that is not stable, pieces; the booster under its own \
+                 parachute\n(the mission has no data of it: with the vehicle's sink it drifts as the vehicle does)."
+            )?;
+        }
+        Ok(())
+    }
+
+    fn csv(&self) -> String {
+        let mut out = "wind_m_s,way,flight,x_m,y_m,landed\n".to_owned();
+        for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
+            for impact in impacts {
+                let place =
+                    impact.place_m.map_or([String::new(), String::new()], |m| m.map(|m| format!("{m:.2}")));
+                let [x_m, y_m] = place;
+                let (way, number, landed) = (impact.way.name(), impact.number, impact.landed);
+                // Writing to a String cannot fail.
+                let _ = writeln!(out, "{wind_m_s},\"{way}\",{number},{x_m},{y_m},{landed}");
+            }
+        }
+        out
+    }
+
+    fn svg(&self, rule: &Rule) -> anyhow::Result<String> {
+        let kinds: [(&str, &[Way]); 4] = [
+            (
+                "as planned, or aborted low",
+                &[Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust, Way::NoLight],
+            ),
+            ("ballistic", &[Way::Ballistic, Way::BallisticWithBooster]),
+            (
+                "under the parachute",
+                &[
+                    Way::AbortInAscent,
+                    Way::ParachuteFromApogee,
+                    Way::AbortInDescent,
+                    Way::NoSeparation,
+                    Way::Uncommanded,
+                ],
+            ),
+            ("spent booster", &[Way::Booster]),
+        ];
+        let kinds = kinds.map(|(name, ways)| {
+            let impacts = self.impacts.iter().flatten();
+            let shown = impacts.filter(|impact| ways.contains(&impact.way) && impact.number < SHOWN);
+            (name, shown.filter_map(|impact| impact.place_m).collect::<Vec<_>>())
+        });
+        let mut circles = vec![(format!("NAR {:.0} m", rule.distance_m()), rule.distance_m())];
+        for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
+            if let Some((_, radius)) = widest(impacts) {
+                let outside_m = radius.outside_m();
+                circles.push((format!("{wind_m_s} m/s {outside_m:.0} m"), outside_m));
+            }
+        }
+        let title = format!("{}: where it comes down, every way, all winds", self.mission);
+        Ok(places_svg(&title, &Places { kinds: &kinds, circles: &circles })?)
+    }
+}
+
+fn cell(radius: Option<&Radius>) -> String {
+    radius.map_or_else(String::new, |radius| {
+        let high = radius.high_m.map_or_else(|| "?".to_owned(), |high_m| format!("{high_m:.0}"));
+        format!(
+            "{:.0} ({:.0} to {high}) {:.0}; {}",
+            radius.holds_m, radius.low_m, radius.farthest_m, radius.flights
+        )
+    })
+}
