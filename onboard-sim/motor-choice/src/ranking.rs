@@ -48,7 +48,7 @@ pub struct Landing {
     pub candidate: Candidate,
     pub choice: Choice,
     /// Its flights, if it is among the best.
-    pub flown: Option<Flown>,
+    pub flown: Option<Box<Flown>>,
 }
 
 /// How far the ranking is.
@@ -135,7 +135,7 @@ fn fly_the_best(
         progress(Progress::Flights(done, of));
     })?;
     for (landing, flown) in landings.iter_mut().zip(flown) {
-        landing.flown = Some(flown);
+        landing.flown = Some(Box::new(flown));
     }
     let rate = |landing: &Landing| landing.flown.as_ref().map_or(-1.0, |flown| flown.legs.share);
     landings[..best].sort_by(|one, two| rate(two).total_cmp(&rate(one)));

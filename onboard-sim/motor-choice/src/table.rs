@@ -41,7 +41,7 @@ fn write_text(ranking: &[Ranked], all: bool, out: &mut String) -> fmt::Result {
             format!("{:.0} to {:.0}", window.heights.low_m, window.heights.high_m),
             format!("{:.3} to {:.3}", window.impulse_scales[0], window.impulse_scales[1]),
             window.scatter,
-            landing.flown.as_ref().map_or_else(|| "not flown".to_owned(), rate)
+            landing.flown.as_deref().map_or_else(|| "not flown".to_owned(), rate)
         )?;
     }
     let others = ranking.len() - landings.len();
@@ -223,7 +223,7 @@ fn record(rank: usize, ranked: &Ranked) -> [String; 26] {
     for (cell, value) in cells[9..].iter_mut().zip(numbers) {
         *cell = format!("{value:.4}");
     }
-    if let Some(Flown { set, legs, .. }) = flown {
+    if let Some(Flown { set, legs, .. }) = flown.as_deref() {
         cells[21] = legs.of.to_string();
         cells[22] = legs.count.to_string();
         [cells[23], cells[24]] = [number(legs.low), number(legs.high)];
