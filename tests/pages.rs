@@ -249,3 +249,31 @@ fn what_the_pages_say_of_landing_rates_agrees_with_the_measured_ones() {
         assert_eq!(sentence.matches(" %").count(), 2, "another figure in: {sentence}");
     }
 }
+
+/// The text of all sources.
+fn sources_below(folder: &Path, found: &mut String) {
+    for entry in fs::read_dir(folder).expect("a folder of the workspace") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        if path.is_dir() && !name.starts_with('.') && name != "target" {
+            sources_below(&path, found);
+        } else if path.extension().is_some_and(|end| end == "rs") {
+            found.push_str(&fs::read_to_string(&path).expect("a source"));
+        }
+    }
+}
+
+/// A promise to the range safety officer is held by a test, which its page names in backticks.
+#[test]
+fn every_test_that_the_safety_page_names_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let page = fs::read_to_string(root.join("SAFETY.md")).expect("the page");
+    let mut sources = String::new();
+    sources_below(&root, &mut sources);
+    let is_name = |word: &&str| word.matches('_').count() > 2 && !word.contains([' ', '.', '/']);
+    let named: Vec<&str> = page.split('`').skip(1).step_by(2).filter(is_name).collect();
+    assert!(named.len() > 25, "only {named:?}");
+    let missing: Vec<&&str> =
+        named.iter().filter(|name| !sources.contains(&format!("fn {name}("))).collect();
+    assert!(missing.is_empty(), "no such tests: {missing:?}");
+}
