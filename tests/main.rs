@@ -11,6 +11,7 @@ mod hold;
 mod hostile;
 mod links;
 mod logs;
+mod meant;
 mod outside_clients;
 mod pad_check;
 mod pages;

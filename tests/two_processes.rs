@@ -84,7 +84,7 @@ impl HeartbeatSender {
             .spawn(move || {
                 let mut encoder = Encoder::new(GROUND);
                 while !ends.load(Ordering::Relaxed)
-                    && radio.write_all(heartbeat_frame(&mut encoder).as_bytes()).is_ok()
+                    && radio.write_all(heartbeat_frame(&mut encoder, 0).as_bytes()).is_ok()
                 {
                     std::thread::sleep(Duration::from_millis(100));
                 }

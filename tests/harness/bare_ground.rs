@@ -34,6 +34,8 @@ pub struct BareGround {
     framer: Framer,
     encoder: Encoder,
     beats_at: Instant,
+    /// Told in its heartbeats; 0 for none, as other people's ground stations have.
+    pub session: u32,
     /// The texts that the vehicle has sent.
     pub texts: Vec<String>,
 }
@@ -54,6 +56,7 @@ impl BareGround {
             framer: Framer::new(),
             encoder: Encoder::new(GROUND),
             beats_at: now(),
+            session: 0,
             texts: Vec::new(),
         }
     }
@@ -106,7 +109,7 @@ impl BareGround {
         }
         self.beats_at = now() + HEARTBEAT_INTERVAL;
         let Some(vehicle) = self.vehicle else { return };
-        let frame = heartbeat_frame(&mut self.encoder);
+        let frame = heartbeat_frame(&mut self.encoder, self.session);
         // If the vehicle has ended, the wait for it fails and reports that.
         let _ = self.socket.send_to(frame.as_bytes(), vehicle);
     }
@@ -154,14 +157,35 @@ impl BareGround {
 
     pub fn send_command(&mut self, command: MavCmd, param1: f32) {
         let frame = command_frame(&mut self.encoder, command, param1);
+        self.send(&frame);
+    }
+
+    /// A ground station that speaks to the vehicle at this address before it has heard it.
+    pub fn to(vehicle: SocketAddr) -> Self {
+        Self { vehicle: Some(vehicle), ..Self::new() }
+    }
+
+    /// Sends this command, and waits for the answer as [`BareGround::command`] does.
+    pub fn command_with(&mut self, command: COMMAND_LONG_DATA) -> u8 {
+        let number = command.command as u16;
+        let frame = self.encoder.encode(&MavMessage::COMMAND_LONG(command));
+        self.send(&frame);
+        self.wait_for("an answer", |frame, _| {
+            CommandAnswer::from_frame(frame).filter(|answer| answer.command == number)
+        })
+        .result
+    }
+
+    fn send(&mut self, frame: &Frame) {
         let vehicle = self.vehicle.expect("a vehicle that has been heard");
         self.socket.send_to(frame.as_bytes(), vehicle).expect("sent");
     }
 }
 
-/// The heartbeat of a ground station.
-pub fn heartbeat_frame(encoder: &mut Encoder) -> Frame {
+/// The heartbeat of a ground station; session 0 for none.
+pub fn heartbeat_frame(encoder: &mut Encoder, session: u32) -> Frame {
     encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        custom_mode: session,
         mavtype: MavType::MAV_TYPE_GCS,
         autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
         mavlink_version: 3,
