@@ -273,7 +273,6 @@ fn every_test_that_the_safety_page_names_exists() {
     let is_name = |word: &&str| word.matches('_').count() > 2 && !word.contains([' ', '.', '/']);
     let named: Vec<&str> = page.split('`').skip(1).step_by(2).filter(is_name).collect();
     assert!(named.len() > 25, "only {named:?}");
-    let missing: Vec<&&str> =
-        named.iter().filter(|name| !sources.contains(&format!("fn {name}("))).collect();
+    let missing: Vec<&&str> = named.iter().filter(|name| !sources.contains(&format!("fn {name}("))).collect();
     assert!(missing.is_empty(), "no such tests: {missing:?}");
 }
