@@ -121,21 +121,21 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
     agreed((ann, b"0AARM\r", "RANGE SAFETY Ann asks to arm"), (bob, b"0ACONFIRM\r", " ARMED "));
     launch.ann.wait_for(" ARMED ");
-    // The start is shared in the same way; whoever confirms must tap.
+    // The start is shared in the same way. Ann is in command, so Bob must tap.
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
     agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
-    launch.bob.wait_for("no tap of RANGE SAFETY Ann for 2 s");
+    launch.ann.wait_for("no tap of FLIGHT Bob for 2 s");
     launch.ann.wait_for("start anew");
     assert!(shows(&launch.ann, " ARMED "), "a hold does not disarm");
     // Again, with taps until the release.
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
     agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
     let released = (0..60).any(|_| {
-        launch.ann.type_bytes(b"T");
+        launch.bob.type_bytes(b"T");
         let flies = |window: &e2e::Window| window.shows("POWERED").then_some(());
-        launch.bob.wait_within(TAP_EVERY, flies).is_some()
+        launch.ann.wait_within(TAP_EVERY, flies).is_some()
     });
-    assert!(released, "{}", launch.bob.window().rows().join("\n"));
+    assert!(released, "{}", launch.ann.window().rows().join("\n"));
     launch.ann.wait_for("LANDED");
     launch.bob.wait_for("LANDED");
 }

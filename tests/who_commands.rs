@@ -50,7 +50,7 @@ impl Beating {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(("127.0.0.1", port)).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(50))).unwrap();
-        std::thread::spawn(move || {
+        let beats = move || {
             let (mut encoder, mut framer, mut datagram) = (Encoder::new(VEHICLE), Framer::new(), [0; 2048]);
             while goes_on.load(Ordering::Relaxed) {
                 let _ = socket.send(encoder.encode(&MavMessage::HEARTBEAT(beat.clone())).as_bytes());
@@ -69,7 +69,8 @@ impl Beating {
                     }
                 }
             }
-        });
+        };
+        std::thread::Builder::new().name("foreign vehicle".to_owned()).spawn(beats).unwrap();
         Self { commands, runs }
     }
 

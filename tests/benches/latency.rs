@@ -16,6 +16,7 @@ use ground::app::wire::Wire;
 use ground::model::{Model, Settings};
 use ground::update::{Action, Msg, update};
 use protocol::dialect::MavMessage;
+use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use sim::plane::DeadlinePolicy;
 use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
@@ -79,8 +80,7 @@ fn boot_ms_of(message: &MavMessage) -> Option<u32> {
 async fn receive(listening: LinkAddress, vehicle: Option<LinkAddress>) -> Result<Vec<Duration>, Failure> {
     let clock = Clock::start();
     let mut wire =
-        Wire::open(protocol::identity::GROUND, vec![listening], None, clock, None, LogTime::Run(clock))
-            .await?;
+        Wire::open((GROUND, VEHICLE), vec![listening], None, clock, None, LogTime::Run(clock)).await?;
     let ticks = Ticks::default();
     // Over UDP the vehicle sends to the port that the system chose.
     let bound = wire.endpoints().next().map(ToString::to_string).unwrap_or_default();
@@ -101,7 +101,7 @@ async fn receive(listening: LinkAddress, vehicle: Option<LinkAddress>) -> Result
             };
             for action in update(&mut model, msg, clock.now()) {
                 if let Action::Send(message) = action {
-                    wire.send(&message);
+                    wire.send(&message, 0);
                 }
             }
             let known_at = now();

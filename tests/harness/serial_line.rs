@@ -101,6 +101,17 @@ fn raw_terminal() -> (File, OwnedFd) {
     (File::from(pair.master), pair.slave)
 }
 
+/// Waits until a port takes bytes. A port that nobody reads is full after some thousand; returns `false` if the line is cut then.
+fn takes_bytes(port: &File, cut: &AtomicBool) -> bool {
+    while !cut.load(Ordering::Relaxed) {
+        let mut ready = [PollFd::new(port.as_fd(), PollFlags::POLLOUT)];
+        if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) > 0 {
+            return true;
+        }
+    }
+    false
+}
+
 fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut: &AtomicBool) {
     let byte_time = Duration::from_secs(10) / baud;
     let mut buffer = [0; 32];
@@ -115,7 +126,7 @@ fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut:
         // The line is busy for as long as its speed requires for these bytes.
         free_at = free_at.max(now()) + byte_time * count as u32;
         std::thread::sleep(free_at.saturating_duration_since(now()));
-        if to.write_all(&buffer[..count]).is_err() {
+        if !takes_bytes(&to, cut) || to.write_all(&buffer[..count]).is_err() {
             return;
         }
         carried.fetch_add(count as u64, Ordering::Relaxed);

@@ -14,6 +14,8 @@ use crate::model::{AutoStep, Model, words};
 
 /// How long the vehicle may take to become ready, from its first heartbeat.
 const READY_WITHIN: Duration = Duration::from_secs(10);
+/// The same while another station uses our ids: one that ran before under the same ids is in the way for up to 15 s.
+const FREE_WITHIN: Duration = Duration::from_secs(20);
 pub(super) fn step(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.state(now).carries() {
         return;
@@ -61,14 +63,15 @@ fn refuse(model: &mut Model, now: Duration) {
 fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
     let why_not = why_not_ready(model, not_before, now);
     let waited = model.link.first_heartbeat_at.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    let within = if model.link.shares_our_id(now) { FREE_WITHIN } else { READY_WITHIN };
     match why_not {
         None => {
             model.info(now, "automatic mode: the checks pass; arming");
             model.auto_step = AutoStep::WaitForArmed;
             commands::submit(model, CommandKind::Arm, Seat::automatic(), now);
         }
-        Some(why) if waited >= READY_WITHIN => {
-            let seconds = READY_WITHIN.as_secs();
+        Some(why) if waited >= within => {
+            let seconds = within.as_secs();
             model.warn(now, format!("automatic mode: gave up {seconds} s after first contact: {why}"));
             model.auto_step = AutoStep::Done;
             model.outcome.refusal = Some((format!("ARM not sent: {why}"), now));

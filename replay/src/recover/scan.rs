@@ -113,7 +113,7 @@ impl Records {
     pub(super) fn contents(&mut self) -> Result<Contents, LogError> {
         let mut contents = Contents::default();
         let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&mcap::MAGIC);
+        hasher.update(mcap::MAGIC);
         let mut at = mcap::MAGIC.len() as u64;
         while at < self.size {
             let end_of_head = at + HEAD_BYTES as u64;
@@ -245,9 +245,12 @@ impl Records {
     /// The next byte from here on at which a chunk or the end mark of the data seems to begin.
     fn next_chunk(&mut self, from_byte: u64) -> Result<Option<u64>, LogError> {
         let mut start = from_byte;
+        // One buffer for all windows: a hole in a file may have gigabytes.
+        let mut buffer = vec![0; WINDOW_BYTES];
         loop {
-            let window = self.read(start, WINDOW_BYTES as u64)?;
-            let found = memchr::memchr2_iter(op::CHUNK, op::DATA_END, &window)
+            let filled = self.fill(start, &mut buffer)?;
+            let window = &buffer[..filled];
+            let found = memchr::memchr2_iter(op::CHUNK, op::DATA_END, window)
                 .find(|place| may_begin(&window[*place..], self.size - start - *place as u64));
             if let Some(place) = found {
                 return Ok(Some(start + place as u64));
@@ -257,6 +260,19 @@ impl Records {
             }
             start += (WINDOW_BYTES - OVERLAP_BYTES) as u64;
         }
+    }
+
+    /// Fills a buffer from here on; returns how many bytes there were.
+    fn fill(&mut self, from: u64, buffer: &mut [u8]) -> Result<usize, LogError> {
+        let mut filled = 0;
+        self.input.seek(SeekFrom::Start(from)).map_err(|source| self.failed(source))?;
+        while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+            match self.input.read(rest).map_err(|source| self.failed(source))? {
+                0 => break,
+                count => filled += count,
+            }
+        }
+        Ok(filled)
     }
 
     /// Type and length of the record that begins here; `None` if the file ends before.

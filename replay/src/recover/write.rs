@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
-use protocol::log::reader::{parse_record, records_of_chunk};
+use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 
 use super::scan::Told;
@@ -76,7 +76,7 @@ impl<'a> Rescue<'a> {
         let kept = if opcode == op::CHUNK {
             self.chunks += 1;
             // It was read before without an error; a file that has changed since then is lost here.
-            records_of_chunk(body, |record| self.keep_record(record)).map_err(|error| error.into_mcap())
+            records_of_chunk(body, |record| self.keep_record(record)).map_err(RecordError::into_mcap)
         } else {
             parse_record(opcode, body).and_then(|record| self.keep_record(record))
         };

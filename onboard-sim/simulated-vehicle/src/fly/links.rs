@@ -7,7 +7,7 @@ use protocol::command::CommandRequest;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA};
 use protocol::frame::Frame;
-use protocol::hub::{Hub, News};
+use protocol::hub::{Hub, HubLink, News};
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
@@ -199,7 +199,7 @@ impl Links {
 
     /// Number of frames dropped because their link had no room.
     pub(super) fn dropped(&self) -> u64 {
-        let of_lines: u64 = self.hub.links().iter().map(|link| link.dropped()).sum();
+        let of_lines: u64 = self.hub.links().iter().map(HubLink::dropped).sum();
         of_lines + self.open.iter().map(|link| link.sender.dropped()).sum::<u64>()
     }
 
