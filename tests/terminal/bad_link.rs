@@ -39,7 +39,7 @@ fn with_heavy_loss_arming_works_and_the_abort_arrives() {
     // A latched abort makes the vehicle refuse the next arming, with the reason.
     rig.proxy.impair(Impairment::default());
     rig.terminal.wait_for("NO  abort latch");
-    rig.type_until(b"AARM\r", "ARM REFUSED by the vehicle");
+    rig.type_until(b"AARM\r", "acknowledged REFUSED (denied)");
     rig.terminal.wait_until("the refusal, its check and the value found", |window| {
         let events = window.rows().concat();
         (events.contains("abort latch") && events.contains("latched")).then_some(())

@@ -109,7 +109,8 @@ fn different_verdicts_fail_unless_they_are_tolerated() {
         "{:?}",
         found.failures
     );
-    let tolerated = Tolerances::from_toml("verdict = false\nsamples_missing = 0.2", "t.toml").unwrap();
+    // So are those of the countdown, which is not flown again.
+    let tolerated = Tolerances::from_toml("verdict = false\nsamples_missing = 0.25", "t.toml").unwrap();
     let found = compare(&a, &b, Align::Ignition, &tolerated).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
 }

@@ -26,12 +26,12 @@ fn without_changes_the_commands_are_the_recorded_ones() {
 #[test]
 fn a_timed_change_holds_from_its_time_on() {
     let recording = DISPERSED.recording();
-    let report = evaluate(&recording, &settings(&["nmpc.weights.w=120@8.0"])).unwrap();
+    let report = evaluate(&recording, &settings(&["nmpc.weights.w=120@13.0"])).unwrap();
     let differs = |time_s: f64| {
         report.ticks.iter().any(|tick| tick.time_s >= time_s && tick.recorded != tick.evaluated)
     };
-    assert!(report.ticks.iter().all(|tick| tick.time_s >= 7.999 || tick.recorded == tick.evaluated));
-    assert!(differs(8.0), "a weight of the cost changes the cost at least");
+    assert!(report.ticks.iter().all(|tick| tick.time_s >= 12.999 || tick.recorded == tick.evaluated));
+    assert!(differs(13.0), "a weight of the cost changes the cost at least");
     // From the beginning the evaluation differs.
     let whole = evaluate(&recording, &settings(&["nmpc.weights.w=120"])).unwrap();
     assert!(whole.commands_different > report.commands_different);
@@ -54,9 +54,9 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
         let recorded = recording.verdict.clone().unwrap();
         let starts = [
             StartAt::Landing,
-            StartAt::Tick(9),
-            StartAt::Tick(40),
-            StartAt::Time(8.05),
+            StartAt::Tick(14),
+            StartAt::Tick(45),
+            StartAt::Time(13.05),
             StartAt::Phase(Phase::Powered),
         ];
         for start in starts {
@@ -123,7 +123,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
     for (name, options) in [
         ("same.mcap", ReflyOptions::default()),
         ("weights.mcap", with(&["nmpc.weights.w=120", "nmpc.weights.q=60"])),
-        ("timed.mcap", with(&["nmpc.weights.w=120@8.0", "nmpc.weights.q=60"])),
+        ("timed.mcap", with(&["nmpc.weights.w=120@13.0", "nmpc.weights.q=60"])),
         ("late.mcap", ReflyOptions { start: StartAt::Tick(30), ..ReflyOptions::default() }),
     ] {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
