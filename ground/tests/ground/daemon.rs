@@ -103,7 +103,10 @@ impl Screen {
             self.stream.read_exact(&mut bytes).unwrap_or_else(|error| panic!("{what}: {error}"));
             let (told, at) = decode_to_screen(&bytes).expect("what a station tells");
             match told {
-                ToScreen::Hello(hello) => assert!(hello.log_path.ends_with("flight.mcap")),
+                ToScreen::Hello(hello) => {
+                    assert!(hello.log_path.ends_with("flight.mcap"));
+                    self.model.settings.session = hello.session;
+                }
                 ToScreen::Live => self.live = true,
                 ToScreen::Msg(msg) => {
                     self.now = at;
