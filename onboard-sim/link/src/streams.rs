@@ -162,9 +162,9 @@ pub const FROM_APOGEE: [Standard; 29] = [
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
     // Without its extensions, which are zero from apogee on. On the way up there is no plan to be sent.
     standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(57),
-    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 4.0),
-    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 2.5),
-    standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
+    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 3.0),
+    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
+    standard::<TD_FINS_DATA>("RATE_FINS", 1.0),
     standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
     standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
