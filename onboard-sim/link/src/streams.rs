@@ -164,7 +164,7 @@ pub const FROM_APOGEE: [Standard; 29] = [
     standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(57),
     standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 3.0),
     standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
-    standard::<TD_FINS_DATA>("RATE_FINS", 1.0),
+    standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
     standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
     standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
