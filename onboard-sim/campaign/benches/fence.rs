@@ -50,8 +50,8 @@ fn fly(name: &str, recipe: &Recipe, flights: u64) {
     let flown = in_parallel(&numbers, threads, |number| decisions(recipe, *number), &|_| {}).unwrap();
     let landed = flown.iter().filter(|(_, landed)| *landed).count();
     let all = flown.iter().fold(Sha256::new(), |all, (hash, _)| all.chain_update(hash)).finalize();
-    let digits: String = all[..8].iter().map(|byte| format!("{byte:02x}")).collect();
-    println!("{name:40} {landed:4} of {flights:4}  {digits}");
+    let digits = all.first_chunk().map_or(0, |bytes| u64::from_be_bytes(*bytes));
+    println!("{name:40} {landed:4} of {flights:4}  {digits:016x}");
 }
 
 /// The hash of one flight, and whether it landed by its legs.

@@ -19,25 +19,25 @@ const BAUDS: [u32; 3] = [4_800, 9_600, 57_600];
 struct Way {
     bytes_s: f64,
     free_at_s: f64,
-    on_its_way: VecDeque<(f64, Vec<u8>)>,
+    flying: VecDeque<(f64, Vec<u8>)>,
     carried: usize,
 }
 
 impl Way {
     fn of(baud: u32) -> Self {
         let bytes_s = f64::from(baud) / 10.0;
-        Self { bytes_s, free_at_s: 0.0, on_its_way: VecDeque::new(), carried: 0 }
+        Self { bytes_s, free_at_s: 0.0, flying: VecDeque::new(), carried: 0 }
     }
 
     fn give(&mut self, bytes: Vec<u8>, now_s: f64) {
         self.free_at_s = self.free_at_s.max(now_s) + bytes.len() as f64 / self.bytes_s;
         self.carried += bytes.len();
-        self.on_its_way.push_back((self.free_at_s, bytes));
+        self.flying.push_back((self.free_at_s, bytes));
     }
 
     fn arrived(&mut self, now_s: f64) -> Vec<u8> {
-        let count = self.on_its_way.iter().take_while(|(at_s, _)| *at_s <= now_s).count();
-        self.on_its_way.drain(..count).flat_map(|(_, bytes)| bytes).collect()
+        let count = self.flying.iter().take_while(|(at_s, _)| *at_s <= now_s).count();
+        self.flying.drain(..count).flat_map(|(_, bytes)| bytes).collect()
     }
 }
 
@@ -252,7 +252,7 @@ fn a_radio_without_room_in_its_buffer_gets_a_quarter_and_all_of_it_again_later()
     }
     let sent = (0..10).flat_map(|_| report(&mut wire, 5)).collect::<Vec<_>>();
     let slowed = bytes_s(&sent, 10.0);
-    assert!(slowed <= 510.0 && slowed >= 300.0, "{slowed} B/s of 2000");
+    assert!((300.0..=510.0).contains(&slowed), "{slowed} B/s of 2000");
     assert!(count(&sent, HEARTBEAT_DATA::ID) >= 9 && count(&sent, TD_FLIGHT_STATUS_DATA::ID) >= 9);
     for _ in 0..15 {
         report(&mut wire, 95);
