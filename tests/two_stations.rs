@@ -14,7 +14,8 @@ const TAP_EVERY: Duration = Duration::from_secs(1);
 /// How long a person waits for the answer to what was typed, before typing it again.
 const ANSWERED: Duration = Duration::from_secs(3);
 
-const CREW: &str = r#"
+/// Two people of different roles.
+pub(crate) const CREW: &str = r#"
 mode = "two-person"
 [[operator]]
 name = "Ann"

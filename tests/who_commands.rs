@@ -17,6 +17,8 @@ use protocol::dialect::{
 use protocol::frame::{Encoder, Framer};
 use protocol::identity::VEHICLE;
 
+use crate::two_stations::CREW;
+
 const SIZE: (u16, u16) = (100, 30);
 
 /// `ground` with settings and a runtime folder of the test's own.
@@ -177,20 +179,6 @@ fn a_copter_is_not_armed_and_an_abort_of_it_asks_first() {
     screen.wait_until("the abort at the copter", |_| copter.was_sent(ABORT).then_some(()));
     assert!(!copter.was_sent(ARM) && !copter.was_sent(START));
 }
-
-const CREW: &str = r#"
-mode = "two-person"
-[[operator]]
-name = "Ann"
-role = "range-safety"
-link = 1
-key = "ann.key"
-[[operator]]
-name = "Bob"
-role = "flight"
-link = 2
-key = "bob.key"
-"#;
 
 /// Bob's own station asks, and Bob at a screen of Ann's station cannot confirm; Ann can.
 #[test]
