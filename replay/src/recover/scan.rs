@@ -121,12 +121,13 @@ impl Records {
                 contents.lose(at, self.size - at, None, "ends inside a record");
                 break;
             };
-            let fits = opcode != 0 && length <= self.size - end_of_head;
-            if !fits || contents.good.len() >= GOOD_MAX {
+            if contents.good.len() >= GOOD_MAX {
+                contents.lose(at, self.size - at, None, "more records than any log has");
+                break;
+            }
+            if opcode == 0 || length > self.size - end_of_head {
                 let reason = if opcode == 0 {
                     "no record begins here"
-                } else if fits {
-                    "more records than any log has"
                 } else {
                     "a record that is longer than the rest of the file"
                 };

@@ -76,8 +76,8 @@ impl VehicleEndpoint {
             let why = format!("{others} more under the ids {station} in the last {SAME_IDS_FOR_S} s");
             return refused(not_now, why);
         }
-        if *asked == Asked::Arm { why_other_mission(request, vehicle) } else { None }
-            .and_then(|why| refused(denied, why))
+        let other_mission = (*asked == Asked::Arm).then(|| why_other_mission(request, vehicle)).flatten();
+        other_mission.and_then(|why| refused(denied, why))
     }
 }
 
