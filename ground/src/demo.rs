@@ -11,13 +11,12 @@ use std::time::Duration;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
-use simulated_vehicle::fly::DeadlinePolicy;
-use simulated_vehicle::fly::{self, FlyOptions, LoadedFlight, OnTheWire};
+use simulated_vehicle::fly;
+use simulated_vehicle::fly::{DeadlinePolicy, FlyOptions, LoadedFlight, OnTheWire};
+pub use simulated_vehicle::fly::{LogClock, Speed};
 use tokio::sync::{oneshot, watch};
 
 use crate::cli::Demonstration;
-
-pub use simulated_vehicle::fly::{LogClock, Speed};
 
 /// How long to wait for the end of the simulator.
 const STOP_WITHIN: Duration = Duration::from_secs(3);

@@ -1,6 +1,6 @@
 //! The exit codes and how a run is given one.
 
-use crate::model::flight_so_far::FlightSoFar;
+use crate::model::FlightSoFar;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,21 +11,18 @@
 //! 6. [`replay`]: plays a recorded flight through the same `update` on the same screens.
 //! 7. [`demo`]: runs the embedded simulator for the demonstration.
 //! 8. [`cli`] reads the command line, [`config`] the settings file; [`key`] names the keys that have a
-//!    meaning, and [`exit`] decides the exit code. [`checklist_file`] reads a checklist and its signatures,
-//!    [`place_file`] the last place of a lost vehicle.
+//!    meaning, and [`exit`] decides the exit code.
 //!
 //! Imports go one way: `app` -> `update` -> `model`, and `app` -> `view` -> `model`.
 
 pub mod app;
 pub mod attach;
-pub mod checklist_file;
 pub mod cli;
 pub mod config;
 pub mod demo;
 pub mod exit;
 pub mod key;
 pub mod model;
-pub mod place_file;
 pub mod replay;
 pub mod update;
 pub mod view;

@@ -13,25 +13,22 @@ use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::again::Again;
-use super::clock::Clock;
+use super::clock::{Clock, Signals};
 use super::output::Output;
+use super::replaying::Again;
 use super::server::read_one;
-use super::signals::Signals;
 use super::stations;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
-use crate::attach::message::{Hello, ToScreen, ToStation, VERSION};
-use crate::attach::socket;
+use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
 use crate::config::Config;
-use crate::exit::{self, Exit};
-use crate::model::action::{Action, Request};
-use crate::model::bindings::Bindings;
-use crate::model::callouts::Talk;
+use crate::exit;
+use crate::exit::Exit;
+use crate::model::act::Bindings;
+use crate::model::alarm::Talk;
 use crate::model::command::CommandKind;
-use crate::model::events::Speaker;
-use crate::model::seat::Seat;
-use crate::model::two_person::KeyOwner;
-use crate::model::{Model, Role, Settings};
+use crate::model::crew::{KeyOwner, Seat};
+use crate::model::log::Speaker;
+use crate::model::{Action, Model, Request, Role, Settings};
 use crate::update::{Msg, update};
 
 /// The period of the screen's own ticks: dialogs and chords expire even while the station sends nothing.

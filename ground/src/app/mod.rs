@@ -1,59 +1,52 @@
 //! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
 
-mod again;
-pub mod alarm_command;
 pub mod attached;
-mod book;
-mod checklist;
 pub mod clock;
-mod download;
-mod key_ring;
-pub mod lines;
-pub mod log;
-mod operator;
-mod output;
-pub mod pace;
-mod places;
-pub mod print;
+pub mod download;
+pub mod files;
+pub mod output;
+pub mod programs;
 pub mod replaying;
-mod report;
 pub mod screen;
 pub mod server;
-pub mod signals;
-mod station;
+pub mod station;
 pub mod stations;
-mod terminal_writer;
-pub mod voice;
-mod watchers;
 pub mod wire;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use clap::CommandFactory as _;
+use protocol::book::BookKey;
+use protocol::crew_file::CrewFile;
+use protocol::dialect::TdRole;
+use protocol::key_file::KeyFile;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
+use protocol::signing::Signing;
 use protocol::transport::LinkAddress;
 use simulated_vehicle::fly::load_flight;
 
-use crate::cli::{Cli, Command, LogChoice, Seconds};
-use crate::config::Config;
+use crate::attach::OPERATOR_MAX;
+use crate::cli::{Cli, Command, ConfigCommand, LogChoice, Seconds};
+use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
-use crate::exit::{self, Exit};
-use crate::model::seat::Seat;
+use crate::exit;
+use crate::exit::Exit;
+use crate::model::crew::{KeyOwner, Seat};
 use crate::model::{Model, Role, Settings};
 use crate::update::update;
-use again::Again;
 use attached::Viewer;
 use clock::{Clock, LogTime};
-use key_ring::KeyRing;
-use log::LogGuard;
+use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log};
 use output::Output;
-use server::{Server, hello};
+use replaying::Again;
+use server::{Server, Watchers, hello};
 use station::Station;
-use watchers::Watchers;
 use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
@@ -64,9 +57,9 @@ const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
 /// A socket, a file or the terminal failed, or the profile is wrong.
 pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     match &cli.command {
-        Some(Command::Config { command }) => return print::config(cli, command),
-        Some(Command::Completions { shell }) => return print::completions(*shell),
-        Some(Command::Man) => return print::manual(),
+        Some(Command::Config { command }) => return print_config(cli, command),
+        Some(Command::Completions { shell }) => return print_completions(*shell),
+        Some(Command::Man) => return print_manual(),
         _ => {}
     }
     let config = Config::load(cli.config.as_deref())?.overridden_by(cli);
@@ -76,7 +69,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let socket = cli.socket.as_deref();
-    let operator = operator::operator(cli.operator.as_deref());
+    let operator = operator(cli.operator.as_deref());
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     runtime.block_on(async {
@@ -94,7 +87,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
                 };
                 attached::session(socket, &viewer, config, interactive).await
             }
-            (Some(Command::Download { name, to }), _) => download::alone::run(cli, name.as_deref(), to).await,
+            (Some(Command::Download { name, to }), _) => {
+                download::run_download(cli, name.as_deref(), to).await
+            }
             (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
             (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
             (_, None) => session(cli, config, interactive, operator).await,
@@ -118,7 +113,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     };
     let tlog = cli.tlog.as_ref();
     let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
-    let recorder = log::open(cli.log.as_ref(), tlog, &header)?;
+    let recorder = open_log(cli.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let (mut station, mut model, mut wire) =
         match start(cli, config, interactive, operator, (clock, demo_options, recorder)).await {
@@ -136,7 +131,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
-    lines::closing(&model, interactive, log_path.as_ref(), clock.now());
+    output::closing(&model, interactive, log_path.as_ref(), clock.now());
     log_path.context("the log")?;
     Ok(exit::decide(&model.outcome, interactive))
 }
@@ -157,7 +152,7 @@ async fn start(
     }
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(cli)?;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
-    let checklist = cli.checklist.as_deref().map(|path| checklist::open(path, start_unix_s)).transpose()?;
+    let checklist = cli.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
     let mission = cli.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
@@ -210,7 +205,7 @@ async fn start(
             model.warn(clock.now(), text);
         }
     }
-    if let Some(place) = places::newest(recorder_folder(recorder.as_ref()), start_unix_s) {
+    if let Some(place) = newest_place(recorder_folder(recorder.as_ref()), start_unix_s) {
         model.place = Some(place);
         model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
     }
@@ -228,7 +223,7 @@ async fn start(
         clock,
         log_time,
         recorder,
-        log_space: log::SpaceWatch::default(),
+        log_space: SpaceWatch::default(),
         demo,
         output,
         socket: cli.socket.clone(),
@@ -323,4 +318,147 @@ fn start_demo(
     };
     Demo::start(options, LinkAddress::UdpOut(address.clone()), recorder, log_clock)
         .context("starting the simulator")
+}
+
+// The commands that only print: settings, completions, the manual page.
+
+/// Checks the settings, or prints an example of them.
+///
+/// # Errors
+/// The settings are wrong; the error says where, and what would be accepted.
+pub fn print_config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
+    match command {
+        ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
+        ConfigCommand::Check { file } => {
+            let named = file.as_ref().or(cli.config.as_ref());
+            let config = Config::load(named.map(PathBuf::as_path))?;
+            let file = named.cloned().or_else(usual_path);
+            let said = match file {
+                Some(path) if path.exists() => format!("{}: valid", path.display()),
+                Some(path) => format!("{}: no such file; these are the defaults", path.display()),
+                None => "no settings file; these are the defaults".to_owned(),
+            };
+            print(format!("{said}\n\n{}", config.table()).as_bytes())?;
+        }
+    }
+    Ok(Exit::Landed)
+}
+
+/// A shell's completions, from the same definition as the command line itself.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn print_completions(shell: clap_complete::Shell) -> anyhow::Result<Exit> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "ground", &mut script);
+    print(&script)?;
+    Ok(Exit::Landed)
+}
+
+/// The manual page, from the same definition as the command line itself.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn print_manual() -> anyhow::Result<Exit> {
+    let mut page = Vec::new();
+    clap_mangen::Man::new(Cli::command()).render(&mut page).context("writing the manual page")?;
+    print(&page)?;
+    Ok(Exit::Landed)
+}
+
+fn print(bytes: &[u8]) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(bytes).and_then(|()| out.flush()).context("writing to standard output")
+}
+
+// Finds the name of the person at this screen.
+
+/// The given name, otherwise the user and the terminal or host, as in `anna on pts/3` or `anna from 192.168.1.7`.
+pub(super) fn operator(named: Option<&str>) -> String {
+    let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let words = named.map_or_else(
+        || {
+            let user = variable("USER").or_else(|| variable("LOGNAME"));
+            let client = variable("SSH_CLIENT").or_else(|| variable("SSH_CONNECTION"));
+            let terminal = std::fs::read_link("/proc/self/fd/0").ok();
+            let terminal = terminal.and_then(|path| path.to_str().map(str::to_owned));
+            described(user.as_deref(), client.as_deref(), terminal.as_deref())
+        },
+        str::to_owned,
+    );
+    protocol::text::printable(words.as_bytes()).chars().take(OPERATOR_MAX).collect()
+}
+
+/// `client` is the value of SSH_CLIENT (address, port, port); `terminal` is a path.
+fn described(user: Option<&str>, client: Option<&str>, terminal: Option<&str>) -> String {
+    let user = user.unwrap_or("somebody");
+    let address = client.and_then(|client| client.split_whitespace().next());
+    let terminal = terminal.and_then(|path| path.strip_prefix("/dev/")).filter(|name| *name != "null");
+    match (address, terminal) {
+        (Some(address), _) => format!("{user} from {address}"),
+        (None, Some(terminal)) => format!("{user} on {terminal}"),
+        (None, None) => user.to_owned(),
+    }
+}
+
+// The keys of a station: the one that all share, and that of the operator who sits here.
+
+/// A key file with its timestamps, what it signs and checks, and whose it is.
+pub(super) struct KeyRing {
+    pub(super) key: Option<(KeyFile, Signing)>,
+    pub(super) owner: Option<KeyOwner>,
+    /// Signs the station's book; `None` without a key.
+    pub(super) book_key: Option<BookKey>,
+    /// The people of the crew by name, with their roles; empty without a crew.
+    pub(super) roles: Vec<(String, TdRole)>,
+}
+
+impl KeyRing {
+    /// Reads the keys. An operator's frames have timestamps of their own, beside their key.
+    ///
+    /// # Errors
+    /// A file cannot be read, others can read it, or the crew has nobody of this name.
+    pub(super) fn open(cli: &Cli) -> anyhow::Result<Self> {
+        let Some(shared) = cli.key.as_deref() else {
+            anyhow::ensure!(
+                cli.crew.is_none(),
+                "--crew needs --key, the key that vehicle and stations share"
+            );
+            return Ok(Self { key: None, owner: None, book_key: None, roles: Vec::new() });
+        };
+        let crew = cli.crew.as_deref().map(CrewFile::open).transpose()?;
+        let people = crew.iter().flat_map(|crew| &crew.members);
+        let roles = people.map(|member| (member.name.clone(), member.role)).collect();
+        let member = match (&crew, cli.operator.as_deref()) {
+            (Some(crew), Some(name)) => Some(crew.member(name)?),
+            _ => None,
+        };
+        let Some((member, (number, path))) = member.and_then(|member| Some((member, member.key.as_ref()?)))
+        else {
+            let book_key = Some(BookKey::of(&KeyFile::read_key(shared)?));
+            return Ok(Self { key: Some(KeyFile::open(shared, "ground")?), owner: None, book_key, roles });
+        };
+        let (file, signing) =
+            KeyFile::open(path, "ground").with_context(|| format!("the timestamps of {}", member.name))?;
+        let signing = signing.as_operator(*number, KeyFile::read_key(shared)?);
+        let book_key = Some(BookKey::of(&KeyFile::read_key(path)?));
+        let owner = KeyOwner { number: *number, name: member.name.clone() };
+        Ok(Self { key: Some((file, signing)), owner: Some(owner), book_key, roles })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operator_is_a_user_and_where_from() {
+        assert_eq!(described(Some("anna"), None, Some("/dev/pts/3")), "anna on pts/3");
+        assert_eq!(
+            described(Some("anna"), Some("10.0.0.7 5022 22"), Some("/dev/pts/3")),
+            "anna from 10.0.0.7"
+        );
+        assert_eq!(described(None, None, Some("pipe:[7]")), "somebody");
+        assert_eq!(operator(Some("Anna \u{1b}[2J")).chars().filter(|c| c.is_control()).count(), 0);
+    }
 }

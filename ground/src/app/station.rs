@@ -11,27 +11,20 @@ use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::again::Again;
-use super::book::StationBook;
-use super::checklist::SignatureFile;
-use super::clock::{Clock, LogTime};
+use super::clock::{Clock, LogTime, Signals};
 use super::download::{Downloading, Word};
-use super::lines::Lines;
-use super::log::SpaceWatch;
-use super::output::Output;
-use super::server::{Server, ServerEvent, hello};
-use super::signals::Signals;
-use super::watchers::Watchers;
+use super::files::{SignatureFile, SpaceWatch, StationBook};
+use super::output::{Lines, Output};
+use super::replaying::Again;
+use super::server::{Server, ServerEvent, Watchers, hello};
 use super::wire::Wire;
-use super::{alarm_command, places, report, screen, stations};
-use crate::attach::message::{ToScreen, ToStation};
+use super::{files, programs, screen, stations};
+use crate::attach::{ToScreen, ToStation};
 use crate::demo::Demo;
-use crate::model::action::BookLine;
 use crate::model::checklist::ChecklistEntry;
+use crate::model::crew::{Seat, role_name};
 use crate::model::place::LastPlace;
-use crate::model::seat::Seat;
-use crate::model::two_person::role_name;
-use crate::model::{LogHealth, Model, Settings};
+use crate::model::{BookLine, LogHealth, Model, Settings};
 use crate::update::{Action, Msg, Request, update};
 
 /// How often the vehicle is told the end of the closed book, because a frame may be lost.
@@ -63,7 +56,7 @@ pub(super) struct Station {
     /// The flight just flown, again on the station's own screen.
     pub(super) again: Again,
     /// The report that is being written.
-    pub(super) report: Option<report::Writing>,
+    pub(super) report: Option<programs::Writing>,
     /// The vehicle's own log, while it is fetched.
     pub(super) download: Option<Downloading>,
     /// Who did what; `None` without a log.
@@ -249,7 +242,7 @@ impl Station {
 
     fn tell_alarm(&mut self, words: &str) {
         let Some(command) = &self.alarm_command else { return };
-        if let Err(error) = alarm_command::run(command, words) {
+        if let Err(error) = programs::run_alarm_command(command, words) {
             // Reported once, because it would fail again.
             let text = format!("the alarm command cannot be started: {error}");
             self.alarm_command = None;
@@ -393,7 +386,7 @@ impl Station {
 
     fn write_report(&mut self, model: &mut Model, now: Duration) {
         let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
-        match log.map(|log| report::begin(&log)) {
+        match log.map(|log| programs::begin_report(&log)) {
             Some(Ok(writing)) => self.report = Some(writing),
             Some(Err(why)) => model.warn(now, format!("no report: {why}")),
             None => {}
@@ -447,7 +440,7 @@ impl Station {
         let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
             return;
         };
-        if let Err(error) = places::write(folder, place)
+        if let Err(error) = files::write_place(folder, place)
             && !std::mem::replace(&mut self.place_failed, true)
         {
             model.warn(now, format!("the last place is not kept: {error:#}"));

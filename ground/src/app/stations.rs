@@ -1,7 +1,8 @@
 //! Finds, lists and stops this user's stations.
 
 use std::fmt::Write as _;
-use std::io::{self, ErrorKind, Write as _};
+use std::io;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,10 +12,9 @@ use tokio::io::AsyncWriteExt as _;
 
 use super::server::read_one;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
-use crate::attach::message::{StationStatus, ToScreen, ToStation, VERSION};
-use crate::attach::socket;
+use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
 use crate::exit::Exit;
-use crate::model::seat::Seat;
+use crate::model::crew::Seat;
 use crate::model::{Model, words};
 
 /// How long a station may take to answer.

@@ -14,7 +14,7 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::clock::{Clock, LogTime};
-use crate::model::boot::GONE_AFTER;
+use crate::model::identity::GONE_AFTER;
 use crate::model::link::LinkReport;
 use crate::update::Msg;
 

@@ -5,5 +5,97 @@
 //! decides and acts. Killing a screen therefore loses nothing, and the station keeps repeating an abort.
 
 pub mod codec;
-pub mod message;
 pub mod socket;
+
+use crate::model::Request;
+use crate::update::Msg;
+
+// What a station and its screens say to each other.
+
+/// The version of the encoding. A screen of another version is refused with an explanation.
+pub const VERSION: u32 = 9;
+/// The longest name of an operator, in characters.
+pub(crate) const OPERATOR_MAX: usize = 40;
+
+/// What the station is; the first message to a screen.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Hello {
+    pub version: u32,
+    /// The number that the station has given to this screen.
+    pub screen: u32,
+    /// Whether the automatic mode is on.
+    pub auto: bool,
+    /// Whether the vehicle is simulated in the station's process.
+    pub demonstration: bool,
+    /// The capacity of the link, bytes per second; 0 if no bound is known.
+    pub link_capacity_bytes_s: u32,
+    /// System ids of the station and of its vehicle.
+    pub system_ids: [u8; 2],
+    /// The session of the station.
+    pub session: u32,
+    pub link_name: String,
+    /// Empty without a log.
+    pub log_path: String,
+    /// Empty without a telemetry log.
+    pub tlog_path: String,
+    /// The number and the owner of the operator's key that the station signs with; 0 without one.
+    pub key_number: u8,
+    pub key_owner: String,
+    /// The hash of the mission that the station knows.
+    pub mission: Option<[u8; 8]>,
+}
+
+/// What a station sends to its screens.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ToScreen {
+    Hello(Hello),
+    /// The end of the history; everything after it is live.
+    Live,
+    /// A message that the station has taken into its model.
+    Msg(Msg),
+    Status(StationStatus),
+    /// The answer to a request to stop.
+    Stopping {
+        /// Whether the station stops.
+        stops: bool,
+        /// The reason, or where the log is.
+        words: String,
+    },
+}
+
+/// The status of a station, for `ground status` and for finding it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct StationStatus {
+    pub pid: u32,
+    pub link: String,
+    /// Whether the vehicle is simulated in the station's process.
+    pub demonstration: bool,
+    pub vehicle: String,
+    /// The phase of the vehicle, in words.
+    pub phase: String,
+    /// Whether the vehicle is armed, in flight or being aborted.
+    pub at_risk: bool,
+    /// Empty without a log.
+    pub log: String,
+    /// The screens with their operators.
+    pub screens: String,
+}
+
+/// What a screen, or a command without a screen, sends to a station.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ToStation {
+    /// The first message of a screen; with `watch` it is the only one.
+    Hello { watch: bool, operator: String },
+    /// Asks for the status; the only message.
+    Status,
+    /// Asks the station to stop; the only message.
+    Stop {
+        /// Stop even while the vehicle is armed or in flight.
+        force: bool,
+        operator: String,
+    },
+    /// A request of the crew.
+    Request(Request),
+    /// A key was pressed; for the log.
+    Key(String),
+}

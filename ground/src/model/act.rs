@@ -1,13 +1,18 @@
-//! Everything that one key does, with its name in the settings, its usual key and its words.
+//! Everything that one key does, with its name in the settings, its usual key and its words; which key the crew has
+//! chosen for it; and the palette, which lists it all.
 //!
 //! The abort is not among them: its keys cannot be changed. What commands the vehicle only opens a dialog.
 
+use std::collections::BTreeMap;
+use std::str::FromStr;
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
+use serde::Deserialize;
 
 use super::page::Page;
-use super::{Model, Role, permits};
+use super::quantity::Quantity;
+use super::{Model, Role, command, quantity};
 use crate::key::Key;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,18 +172,18 @@ impl Act {
     /// Whether the key would do something now.
     pub fn works(self, model: &Model, now: Duration) -> bool {
         let commands = model.settings.role.why_not_command().is_none();
-        let acts = permits::why_not_here(model).is_none();
+        let acts = command::why_not_here(model).is_none();
         match self {
-            Self::Arm => acts && permits::why_not_arm(model, now).is_none(),
-            Self::Start => acts && permits::why_not_start(model, now).is_none(),
+            Self::Arm => acts && command::why_not_arm(model, now).is_none(),
+            Self::Start => acts && command::why_not_start(model, now).is_none(),
             Self::Disarm => acts && model.vehicle.armed().is_some_and(|armed| armed.value),
             Self::HoldCountdown => {
                 commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
             }
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
-            Self::TakeCommand => acts && permits::why_not_take(model, now).is_none(),
-            Self::RangeTest => commands && permits::why_not_check(model, now).is_none(),
-            Self::Check | Self::CheckStill => acts && permits::why_not_check(model, now).is_none(),
+            Self::TakeCommand => acts && command::why_not_take(model, now).is_none(),
+            Self::RangeTest => commands && command::why_not_check(model, now).is_none(),
+            Self::Check | Self::CheckStill => acts && command::why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
@@ -239,6 +244,241 @@ impl Act {
                     | Self::NextTheme
                     | Self::Redraw
             ),
+        }
+    }
+}
+
+// Which key does what. The crew may choose other keys in the settings.
+//
+// Ctrl-X, Enter and Esc are not here and cannot be taken: the abort, the confirmations and the way out always keep
+// their keys. An action that opens a ladder keeps a capital letter, so that no slip of a finger opens it.
+
+/// The keys of all actions, in the order of [`DEFINITIONS`].
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "BTreeMap<String, String>")]
+pub struct Bindings([Key; DEFINITIONS.len()]);
+
+impl Default for Bindings {
+    fn default() -> Self {
+        Self(DEFINITIONS.map(|definition| definition.usual))
+    }
+}
+
+/// Why keys cannot be chosen so.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BindingError {
+    #[error("`{given}` is no action; give one of {}", names())]
+    UnknownAction { given: String },
+    #[error("{action}: `{given}` cannot be chosen; give one printable ASCII character or Space")]
+    UnknownKey { action: &'static str, given: String },
+    #[error("{action}: `{given}` is no capital letter, and {action} needs one")]
+    NotCapital { action: &'static str, given: String },
+    #[error("{first} and {second} have the same key `{key}`; give each its own")]
+    Twice { first: &'static str, second: &'static str, key: String },
+    #[error("`{given}` is no list of keys; give ACTION=KEY,ACTION=KEY, as in theme=w,path=m")]
+    NoList { given: String },
+}
+
+fn names() -> String {
+    DEFINITIONS.map(|definition| definition.name).join(", ")
+}
+
+impl Bindings {
+    /// The action of a key. A letter also counts with Shift, unless its capital letter has an action of its own.
+    pub fn act(&self, key: Key) -> Option<Act> {
+        self.exactly(key).or_else(|| match key {
+            Key::Char(letter) if letter.is_ascii_uppercase() => {
+                self.exactly(Key::Char(letter.to_ascii_lowercase()))
+            }
+            Key::F1 => Some(Act::Show(crate::model::page::Page::Help)),
+            Key::CtrlC => Some(Act::Quit),
+            Key::Escape => Some(Act::Follow),
+            _ => None,
+        })
+    }
+
+    fn exactly(&self, key: Key) -> Option<Act> {
+        let place = self.0.iter().position(|bound| *bound == key)?;
+        Some(DEFINITIONS[place].act)
+    }
+
+    /// The key of an action.
+    pub fn key(&self, act: Act) -> Key {
+        let place = DEFINITIONS.iter().position(|definition| definition.act == act);
+        self.0[place.unwrap_or(0)]
+    }
+
+    /// The name of the key of an action.
+    pub fn name(&self, act: Act) -> String {
+        self.key(act).name()
+    }
+
+    /// The action that this small letter would have opened as a capital letter.
+    pub fn meant_as_capital(&self, letter: char) -> Option<Act> {
+        self.exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_ladder())
+    }
+
+    fn chosen<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> Result<Self, BindingError> {
+        let mut bindings = Self::default();
+        for (name, given) in pairs {
+            let place = DEFINITIONS.iter().position(|definition| definition.name == name);
+            let place = place.ok_or_else(|| BindingError::UnknownAction { given: name.to_owned() })?;
+            bindings.0[place] = key_for(&DEFINITIONS[place], given)?;
+        }
+        for (place, key) in bindings.0.iter().enumerate() {
+            if let Some(other) = bindings.0[..place].iter().position(|bound| bound == key) {
+                let (first, second) = (DEFINITIONS[other].name, DEFINITIONS[place].name);
+                return Err(BindingError::Twice { first, second, key: key.name() });
+            }
+        }
+        Ok(bindings)
+    }
+}
+
+fn key_for(definition: &Definition, given: &str) -> Result<Key, BindingError> {
+    let action = definition.name;
+    let mut letters = given.chars();
+    let letter = match (given, letters.next(), letters.next()) {
+        ("Space", ..) => ' ',
+        (_, Some(letter), None) if letter.is_ascii_graphic() => letter,
+        _ => return Err(BindingError::UnknownKey { action, given: given.to_owned() }),
+    };
+    if definition.act.opens_ladder() && !letter.is_ascii_uppercase() {
+        return Err(BindingError::NotCapital { action, given: given.to_owned() });
+    }
+    Ok(Key::Char(letter))
+}
+
+impl TryFrom<BTreeMap<String, String>> for Bindings {
+    type Error = BindingError;
+
+    fn try_from(given: BTreeMap<String, String>) -> Result<Self, BindingError> {
+        Self::chosen(given.iter().map(|(name, key)| (name.as_str(), key.as_str())))
+    }
+}
+
+impl FromStr for Bindings {
+    type Err = BindingError;
+
+    fn from_str(given: &str) -> Result<Self, BindingError> {
+        let pairs: Option<Vec<(&str, &str)>> = given.split(',').map(|pair| pair.split_once('=')).collect();
+        let pairs = pairs.ok_or_else(|| BindingError::NoList { given: given.to_owned() })?;
+        Self::chosen(pairs.into_iter())
+    }
+}
+
+// The palette: every action with its key, and every number to plot or to pin; found by a part of its words.
+
+/// How to abort.
+pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X (or Ctrl-X twice)";
+
+/// What an entry of the palette does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Does {
+    /// The same as its key.
+    Act(Act),
+    /// Only says which keys abort.
+    TellAbort,
+    Plot(&'static Quantity),
+    Pin(&'static Quantity),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaletteEntry {
+    pub words: String,
+    /// Empty without a key.
+    pub key: String,
+    pub does: Does,
+}
+
+/// The entries whose words contain every typed word.
+pub fn palette_entries(model: &Model, typed: &str) -> Vec<PaletteEntry> {
+    let typed = typed.to_lowercase();
+    let fits =
+        |entry: &PaletteEntry| typed.split_whitespace().all(|word| entry.words.to_lowercase().contains(word));
+    every_entry(model).filter(fits).collect()
+}
+
+fn every_entry(model: &Model) -> impl Iterator<Item = PaletteEntry> {
+    let abort =
+        PaletteEntry { words: ABORT_WORDS.to_owned(), key: "Ctrl-X".to_owned(), does: Does::TellAbort };
+    let acts = DEFINITIONS.iter().map(|definition| PaletteEntry {
+        words: definition.words.to_owned(),
+        key: model.settings.keys.name(definition.act),
+        does: Does::Act(definition.act),
+    });
+    let plots = quantity::ALL.iter().map(|quantity| PaletteEntry {
+        words: format!("plot {}", quantity.name),
+        key: String::new(),
+        does: Does::Plot(quantity),
+    });
+    let pins = quantity::ALL.iter().map(|quantity| {
+        let verb = if model.pages.pinned.contains(&quantity) { "unpin" } else { "pin" };
+        PaletteEntry {
+            words: format!("{verb} {}", quantity.name),
+            key: String::new(),
+            does: Does::Pin(quantity),
+        }
+    });
+    std::iter::once(abort).chain(acts).chain(plots).chain(pins)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::page::Page;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_usual_keys_are_each_used_once() {
+        let usual = Bindings::default();
+        for definition in &DEFINITIONS {
+            assert_eq!(usual.act(definition.usual), Some(definition.act), "{}", definition.name);
+        }
+        assert_eq!(Bindings::chosen(std::iter::empty()), Ok(usual));
+    }
+
+    #[test]
+    fn a_wrong_choice_is_refused_with_what_would_do() {
+        let refused = |given: &str| given.parse::<Bindings>().unwrap_err().to_string();
+        assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
+        assert!(refused("theme=Enter").contains("one printable ASCII character"));
+        assert!(refused("theme=").contains("theme: ``"));
+        assert!(refused("arm=a").contains("no capital letter"));
+        assert!(refused("theme=p").contains("path and theme have the same key `p`"));
+        assert!(refused("theme").contains("ACTION=KEY"));
+    }
+
+    #[test]
+    fn shift_counts_unless_the_capital_letter_has_its_own_action() {
+        let keys: Bindings = "theme=a,hold=J".parse().unwrap();
+        assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
+        assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
+        assert_eq!(keys.act(Key::Char('P')), Some(Act::Show(Page::Path)));
+        assert_eq!(keys.act(Key::Char('j')), None);
+        assert_eq!(keys.meant_as_capital('d'), Some(Act::Disarm));
+        assert_eq!(keys.meant_as_capital('h'), Some(Act::HoldCountdown));
+        assert_eq!(keys.meant_as_capital('j'), None, "it opens no ladder");
+    }
+
+    proptest! {
+        /// Whatever is chosen, the keys of the abort, of confirmations and of the way out keep their meaning.
+        #[test]
+        fn no_choice_takes_a_key_of_the_abort(
+            pairs in prop::collection::vec((0..DEFINITIONS.len(), "[ -~]|Enter|Ctrl-X|Esc|Space"), 0..6),
+        ) {
+            let list: Vec<(&str, &str)> =
+                pairs.iter().map(|(place, key)| (DEFINITIONS[*place].name, key.as_str())).collect();
+            if let Ok(keys) = Bindings::chosen(list.into_iter()) {
+                prop_assert_eq!(keys.act(Key::CtrlX), None);
+                prop_assert_eq!(keys.act(Key::Enter), None);
+                prop_assert_eq!(keys.act(Key::Escape), Some(Act::Follow));
+                for act in [Act::Arm, Act::Start, Act::Disarm] {
+                    let key = keys.key(act);
+                    prop_assert!(matches!(key, Key::Char(letter) if letter.is_ascii_uppercase()), "{key:?}");
+                    prop_assert_eq!(keys.act(key), Some(act));
+                }
+            }
         }
     }
 }

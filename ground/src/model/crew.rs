@@ -1,8 +1,12 @@
-//! The crew: who sits at the screens that can command.
+//! The crew: who sits at the screens that can command, and the two people who arm and start together.
 
+use std::fmt;
 use std::time::Duration;
 
-use super::seat::Seat;
+use protocol::dialect::{TdAct, TdRole};
+
+use super::Model;
+use super::command::why_not_seat;
 
 /// How long a countdown may continue without a commanding screen.
 pub const UNATTENDED_MAX: Duration = Duration::from_secs(2);
@@ -55,5 +59,148 @@ impl Crew {
         }
         let seats: Vec<String> = self.seats.iter().map(Seat::to_string).collect();
         format!("at the controls: {}", seats.join("; "))
+    }
+}
+
+// A seat: a screen of the station and the operator who sits at it.
+
+/// An operator at a screen. The station numbers its screens from 1.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Seat {
+    /// The screen's number; 0 for none.
+    pub screen: u32,
+    /// The operator, as in `anna on pts/3`; empty if unknown.
+    pub operator: String,
+}
+
+impl Seat {
+    pub fn new(screen: u32, operator: impl Into<String>) -> Self {
+        Self { screen, operator: operator.into() }
+    }
+
+    /// The automatic mode, which has no screen.
+    pub fn automatic() -> Self {
+        Self::new(0, "automatic mode")
+    }
+
+    /// For the end of a text, as in ` (screen 2, anna on pts/3)`; empty if nothing is known.
+    pub fn in_brackets(&self) -> String {
+        let words = self.to_string();
+        if words.is_empty() { words } else { format!(" ({words})") }
+    }
+}
+
+impl fmt::Display for Seat {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.screen, self.operator.as_str()) {
+            (0, operator) => out.write_str(operator),
+            (screen, "") => write!(out, "screen {screen}"),
+            (screen, operator) => write!(out, "screen {screen}, {operator}"),
+        }
+    }
+}
+
+// Two people who arm and start together, as the vehicle tells it: who asks, who has to confirm or to tap, who commands.
+
+/// An ask or a tap is shown for this long after the vehicle was last heard of it.
+const TOLD_FOR: Duration = Duration::from_secs(3);
+
+/// The operator whose key signs what a station sends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyOwner {
+    /// The number of the key, 1 to 15.
+    pub number: u8,
+    pub name: String,
+}
+
+/// An ask that waits for its confirmation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ask {
+    pub act: TdAct,
+    pub number: u16,
+    /// The number of the key of whoever asks.
+    pub by: u8,
+    pub left: Duration,
+}
+
+impl Ask {
+    /// As in `asks to arm`.
+    pub fn act_name(&self) -> &'static str {
+        if self.act == TdAct::TD_ACT_START { "start" } else { "arm" }
+    }
+}
+
+pub fn role_name(role: TdRole) -> &'static str {
+    match role {
+        TdRole::TD_ROLE_OBSERVER => "OBSERVER",
+        TdRole::TD_ROLE_RANGE_SAFETY => "RANGE SAFETY",
+        TdRole::TD_ROLE_FLIGHT => "FLIGHT",
+        TdRole::TD_ROLE_PAD => "PAD",
+    }
+}
+
+impl Model {
+    /// How many people an arming and a start take; `None` without operators.
+    pub fn people(&self) -> Option<u8> {
+        self.vehicle.crew.as_ref().map(|crew| crew.value.people)
+    }
+
+    /// The number of the key that this station signs with; 0 without an operator's key.
+    pub fn key_number(&self) -> u8 {
+        self.settings.key_owner.as_ref().map_or(0, |owner| owner.number)
+    }
+
+    /// The number of the key of who sits at this screen; 0 for anybody but its owner.
+    pub fn own_number(&self) -> u8 {
+        let is_owner = why_not_seat(self, &self.settings.seat).is_none();
+        if is_owner || self.settings.seat.screen == 0 { self.key_number() } else { 0 }
+    }
+
+    /// The role of an operator, as the vehicle tells it.
+    pub fn role_of(&self, number: u8) -> Option<TdRole> {
+        self.vehicle.operators.get(&number).map(|(role, _)| *role)
+    }
+
+    /// An operator by role and name.
+    pub fn operator(&self, number: u8) -> String {
+        match self.vehicle.operators.get(&number) {
+            Some((role, name)) => format!("{} {name}", role_name(*role)),
+            None => format!("operator {number}"),
+        }
+    }
+
+    /// The ask that waits.
+    pub fn ask(&self, now: Duration) -> Option<Ask> {
+        let crew = self.vehicle.crew.as_ref().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+        let left = Duration::from_millis(crew.value.ask_left_ms.into()).saturating_sub(crew.age(now));
+        let waits = crew.value.act != TdAct::TD_ACT_NONE && !left.is_zero();
+        waits.then_some(Ask {
+            act: crew.value.act,
+            number: crew.value.ask_number,
+            by: crew.value.asked_by,
+            left,
+        })
+    }
+
+    /// The ask that our operator may confirm.
+    pub fn ask_to_confirm(&self, now: Duration) -> Option<Ask> {
+        let own = self.key_number();
+        let differs = |ask: &Ask| {
+            ask.by != own && self.role_of(own).is_some() && self.role_of(own) != self.role_of(ask.by)
+        };
+        self.ask(now).filter(|_| own > 0).filter(differs)
+    }
+
+    /// Who has to tap, and how long is left.
+    pub fn tapping(&self, now: Duration) -> Option<(u8, Duration)> {
+        let crew = self.vehicle.crew.as_ref().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+        let counting = self.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+        let left = Duration::from_millis(crew.value.tap_left_ms.into()).saturating_sub(crew.age(now));
+        (crew.value.tapped_by > 0 && counting).then_some((crew.value.tapped_by, left))
+    }
+
+    /// The operator who commands, by the number of their key; `None` if nobody has armed it.
+    pub fn commanded_by(&self) -> Option<u8> {
+        self.vehicle.crew.as_ref().map(|crew| crew.value.commanded_by).filter(|number| *number > 0)
     }
 }

@@ -1,8 +1,9 @@
-//! The dialog that takes the keys: typing the word that arms, starts or quits, or confirming a disarm.
+//! What stands between a key and its effect: the dialog that takes the keys (typing a word, or confirming), the abort
+//! chord, and whether the keys were typed by hand.
 
 use std::time::Duration;
 
-use super::two_person::Ask;
+use super::crew::Ask;
 use crate::key::Key;
 
 /// How long the crew has to type the word that arms.
@@ -315,5 +316,284 @@ impl RestOfWord {
     /// Whether the crew may still be typing the word.
     pub fn waits(&self, now: Duration) -> bool {
         now <= self.until
+    }
+}
+
+// The abort chord: Ctrl-X then Enter, or Ctrl-X twice, distinguished from a held Ctrl-X.
+//
+// Enter completes the chord at once on every terminal. A second Ctrl-X is harder to recognise. Many terminals send a
+// held key as the same bytes over and over: once at the press, again after the keyboard's delay (250 ms or more),
+// then every 20 to 100 ms. The first repeat looks like a second press; the repeats after it do not. So a second
+// Ctrl-X counts only if no further one follows within [`REPEATS_WITHIN`], and a held key is one press. On a terminal
+// that reports repeats, the second Ctrl-X counts at once.
+
+/// How long the second key may take, from the first press or from the end of its hold.
+pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
+/// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100 ms, fingers are
+/// slower. A second press also waits this long to show that it is no repeat.
+pub const REPEATS_WITHIN: Duration = Duration::from_millis(120);
+
+/// The state of the chord.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AbortChord {
+    #[default]
+    Open,
+    /// Pressed once and perhaps still held; the time of the last Ctrl-X.
+    Once(Duration),
+    /// Pressed a second time, at this time. It counts unless a repeat follows.
+    Twice(Duration),
+}
+
+impl AbortChord {
+    /// Whether the first key was pressed and its time limit has not expired.
+    pub fn is_begun(self, now: Duration) -> bool {
+        match self {
+            Self::Open => false,
+            Self::Once(at) => now.saturating_sub(at) <= ABORT_TIME_LIMIT,
+            Self::Twice(_) => true,
+        }
+    }
+
+    /// When a second press counts.
+    pub fn acts_at(self) -> Option<Duration> {
+        match self {
+            Self::Twice(at) => Some(at + REPEATS_WITHIN),
+            Self::Open | Self::Once(_) => None,
+        }
+    }
+
+    pub fn press(&mut self, now: Duration) {
+        *self = match *self {
+            Self::Once(at) if now.saturating_sub(at) >= REPEATS_WITHIN && self.is_begun(now) => {
+                Self::Twice(now)
+            }
+            // The ground was too busy to act in time, so nobody knows when this key was pressed.
+            Self::Twice(at) if now.saturating_sub(at) >= REPEATS_WITHIN => Self::Twice(now),
+            // The first press, or a repeat of a held key.
+            Self::Open | Self::Once(_) | Self::Twice(_) => Self::Once(now),
+        };
+    }
+
+    /// A key that cannot be a repeat of the first was pressed: Enter, or Ctrl-X on a terminal that reports repeats.
+    /// Returns whether it completes the chord, which then starts over.
+    pub fn confirm(&mut self, now: Duration) -> bool {
+        let complete = self.is_begun(now);
+        if complete {
+            *self = Self::Open;
+        }
+        complete
+    }
+
+    /// Another key was pressed, so Ctrl-X is no longer held. Returns whether the chord is complete; then it starts
+    /// over. A chord that has only begun stays begun until its time limit.
+    pub fn end(&mut self) -> bool {
+        let complete = matches!(self, Self::Twice(_));
+        if complete {
+            *self = Self::Open;
+        }
+        complete
+    }
+
+    /// Lets time pass. Returns whether the chord is complete; then it starts over.
+    pub fn pass(&mut self, now: Duration) -> bool {
+        if self.acts_at().is_some_and(|at| now >= at) {
+            return self.end();
+        }
+        if !self.is_begun(now) {
+            *self = Self::Open;
+        }
+        false
+    }
+}
+
+// Tells from their timing whether keys were typed, repeated by a held key, or arrived faster than a hand types.
+//
+// Keys that arrive too fast may be a paste, but also typed keys that a slow connection delivered in bunches. So they
+// only show and prepare; what they complete is asked again ([`Dialog::Again`]). The keys of the abort
+// count in every case.
+
+/// Different keys closer together than this were not typed by hand. Two fingers are about 40 ms apart; pasted text
+/// arrives at 1 ms a letter on a serial console at 9,600 baud, 8 ms at 1,200 baud, and at once everywhere else.
+pub const FINGERS_APART: Duration = Duration::from_millis(25);
+/// After a key that has no meaning among keys that arrive too fast, the others are dropped until none has arrived for
+/// this long. A connection may pause within a paste, and a hand is no faster.
+const RUN_ENDS: Duration = REPEATS_WITHIN;
+/// Dropped keys are reported at most this often.
+const REPORTED_EVERY: Duration = Duration::from_secs(2);
+
+/// How a key arrived.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeyOrigin {
+    /// Typed by hand.
+    Typed,
+    /// A repeat: the key is held down.
+    Repeat,
+    /// In one read with other keys, or sooner after another key than a hand can type.
+    TooFast,
+    /// In a run of keys that is dropped.
+    Dropped,
+}
+
+/// The last key and when it arrived.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct KeyTiming {
+    /// The key is `None` after a paste.
+    last: Option<(Option<Key>, Duration)>,
+    /// The rest of this run of keys is dropped.
+    drops: bool,
+    /// A key of the open dialog was not typed by hand.
+    pub hurried: bool,
+    reported_at: Option<Duration>,
+}
+
+impl KeyTiming {
+    /// How this key arrived; `together` if one read of the terminal brought several.
+    pub fn origin(&mut self, key: Key, together: bool, now: Duration) -> KeyOrigin {
+        let before = self.last.replace((Some(key), now)).map(|(last, at)| (last, now.saturating_sub(at)));
+        self.drops &= before.is_some_and(|(_, ago)| ago < RUN_ENDS);
+        match before {
+            _ if self.drops => KeyOrigin::Dropped,
+            Some((Some(last), ago)) if last == key && ago < REPEATS_WITHIN => KeyOrigin::Repeat,
+            Some((_, ago)) if ago < FINGERS_APART => KeyOrigin::TooFast,
+            _ if together => KeyOrigin::TooFast,
+            _ => KeyOrigin::Typed,
+        }
+    }
+
+    /// The keys of this run are no input for this program: the rest of them is dropped.
+    pub fn drop_run(&mut self) {
+        self.drops = true;
+    }
+
+    /// Something was pasted; keys shortly after it were not typed by hand either.
+    pub fn pasted(&mut self, now: Duration) {
+        self.last = Some((None, now));
+    }
+
+    /// A key was dropped. Returns whether to report it.
+    pub fn reports_drop(&mut self, now: Duration) -> bool {
+        let reports = self.reported_at.is_none_or(|at| now.saturating_sub(at) >= REPORTED_EVERY);
+        if reports {
+            self.reported_at = Some(now);
+        }
+        reports
+    }
+}
+
+#[cfg(test)]
+mod chord_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Presses Ctrl-X at these times and lets time pass every 10 ms. Returns how often the chord was completed.
+    fn aborts(presses_ms: &[u64]) -> usize {
+        let mut chord = AbortChord::default();
+        let end = presses_ms.last().copied().unwrap_or(0) + 3_000;
+        let mut count = 0;
+        for now in 0..end {
+            if presses_ms.contains(&now) {
+                chord.press(Duration::from_millis(now));
+            }
+            if now % 10 == 0 {
+                count += usize::from(chord.pass(Duration::from_millis(now)));
+            }
+        }
+        count
+    }
+
+    fn held(delay_ms: u64, period_ms: u64, repeats: u64) -> Vec<u64> {
+        std::iter::once(0).chain((0..repeats).map(|k| delay_ms + k * period_ms)).collect()
+    }
+
+    #[test]
+    fn a_held_key_never_aborts() {
+        for delay_ms in [250, 400, 500, 600, 1_000] {
+            assert_eq!(aborts(&held(delay_ms, 33, 200)), 0, "first repeat after {delay_ms} ms");
+        }
+    }
+
+    #[test]
+    fn two_presses_abort_once_whether_fast_or_slow() {
+        for pause_ms in [120, 150, 200, 350, 600, 1_000, 1_500, 2_000] {
+            assert_eq!(aborts(&[0, pause_ms]), 1, "{pause_ms} ms between");
+        }
+        assert_eq!(aborts(&[0, 2_100]), 0);
+        assert_eq!(aborts(&[0, 20]), 0, "a contact that bounces");
+    }
+
+    #[test]
+    fn a_held_key_is_one_press_and_the_next_press_aborts() {
+        let mut presses = held(500, 33, 30);
+        let released = presses.last().copied().unwrap();
+        presses.push(released + 400);
+        assert_eq!(aborts(&presses), 1);
+    }
+
+    #[test]
+    fn enter_completes_the_chord_only_after_ctrl_x_and_in_time() {
+        let at = Duration::from_millis;
+        let mut chord = AbortChord::default();
+        assert!(!chord.confirm(at(0)));
+        chord.press(at(0));
+        assert!(chord.confirm(at(1)));
+        assert!(!chord.confirm(at(2)), "once");
+        chord.press(at(10));
+        assert!(!chord.confirm(at(2_011)), "too late");
+        for repeat in held(500, 33, 30) {
+            chord.press(at(5_000 + repeat));
+        }
+        assert!(chord.confirm(at(7_000)), "a hold is a first press");
+    }
+
+    #[test]
+    fn many_quick_presses_abort() {
+        assert!(aborts(&[0, 140, 280, 420, 560]) >= 1);
+        assert!(aborts(&[0, 100, 200, 300, 600]) >= 1, "too fast to tell from a hold, until the last");
+    }
+
+    proptest! {
+        #[test]
+        fn a_held_key_never_aborts_at_any_repeat_rate(
+            delay_ms in 150_u64..1_900,
+            gaps in prop::collection::vec(15_u64..119, 2..200),
+        ) {
+            let mut presses = vec![0, delay_ms];
+            for gap in gaps {
+                presses.push(presses.last().copied().unwrap_or(0) + gap);
+            }
+            prop_assert_eq!(aborts(&presses), 0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod key_timing_tests {
+    use super::*;
+
+    #[test]
+    fn typed_repeated_and_pasted_keys_are_distinguished() {
+        let at = Duration::from_millis;
+        let mut timing = KeyTiming::default();
+        let mut touch = |key, now| timing.origin(Key::Char(key), false, at(now));
+        assert_eq!(touch('A', 0), KeyOrigin::Typed);
+        assert_eq!(touch('R', 40), KeyOrigin::Typed);
+        assert_eq!(touch('M', 48), KeyOrigin::TooFast);
+        // Held: the keyboard's delay first, then a repeat every 33 ms.
+        assert_eq!(touch('q', 1_000), KeyOrigin::Typed);
+        assert_eq!(touch('q', 1_500), KeyOrigin::Typed);
+        assert_eq!(touch('q', 1_533), KeyOrigin::Repeat);
+        assert_eq!(timing.origin(Key::Char('S'), true, at(9_000)), KeyOrigin::TooFast);
+        assert_eq!(timing.origin(Key::Char('S'), true, at(9_000)), KeyOrigin::Repeat);
+    }
+
+    #[test]
+    fn a_dropped_run_ends_with_a_pause() {
+        let at = Duration::from_millis;
+        let mut timing = KeyTiming::default();
+        timing.origin(Key::Char('e'), true, at(0));
+        timing.drop_run();
+        assert_eq!(timing.origin(Key::Char('A'), true, at(0)), KeyOrigin::Dropped);
+        assert_eq!(timing.origin(Key::Char('A'), false, at(100)), KeyOrigin::Dropped);
+        assert_eq!(timing.origin(Key::Char('A'), false, at(250)), KeyOrigin::Typed);
     }
 }

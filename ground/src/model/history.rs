@@ -1,11 +1,13 @@
-//! The history of the flight for the review page: when each phase began, and the greatest values.
+//! The past of the flight: its timeline and greatest values, every quantity over time, and states to look back at.
 
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use super::trace::Trace;
-use super::vehicle::Vehicle;
+use super::Model;
+use super::motion::{FlownPath, every_second};
+use super::quantity::{ALL, COUNT, Quantity};
+use super::vehicle::{Vehicle, is_flight};
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
 const TIMELINE_MAX: usize = 64;
@@ -82,5 +84,136 @@ impl History {
 fn raise(greatest: &mut Option<f64>, value: f64) {
     if value.is_finite() {
         *greatest = Some(greatest.map_or(value, |known| known.max(value)));
+    }
+}
+
+// Every quantity over time, in a bounded number of rows: the recent past in full, the distant past in steps.
+
+/// The most rows. When they are full, every second one is dropped.
+const ROWS_MAX: usize = 1_200;
+/// How often a row is added in flight, and otherwise.
+const FLIGHT_STEP: Duration = Duration::from_millis(200);
+const CALM_STEP: Duration = Duration::from_secs(1);
+
+/// The values of one moment, in the order of [`ALL`]; NaN where a value was unknown or stale.
+type Row = [f32; COUNT];
+
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    rows: Vec<(Duration, Row)>,
+}
+
+impl Trace {
+    /// When the next row is due.
+    fn due_at(&self, in_flight: bool) -> Duration {
+        let step = if in_flight { FLIGHT_STEP } else { CALM_STEP };
+        self.rows.last().map_or(Duration::ZERO, |(at, _)| *at + step)
+    }
+
+    /// The known values of a quantity from a time to another, oldest first.
+    pub fn values(
+        &self,
+        quantity: &Quantity,
+        from: Duration,
+        to: Duration,
+    ) -> impl Iterator<Item = (Duration, f64)> {
+        let place = quantity.place();
+        let inside = self.rows.iter().filter(move |(at, _)| (from..=to).contains(at));
+        inside.map(move |(at, row)| (*at, f64::from(row[place]))).filter(|(_, value)| value.is_finite())
+    }
+
+    fn push(&mut self, at: Duration, row: Row) {
+        if self.rows.len() >= ROWS_MAX {
+            every_second(&mut self.rows);
+        }
+        self.rows.push((at, row));
+    }
+}
+
+/// Adds a row with the present values, if one is due.
+pub(crate) fn note_trace(model: &mut Model, now: Duration) {
+    let in_flight = model.vehicle.phase().is_some_and(|phase| is_flight(phase.value));
+    if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
+        return;
+    }
+    let row = std::array::from_fn(|place| {
+        let value = ALL[place].read(model, now).filter(|sample| !sample.is_stale(now));
+        value.map_or(f32::NAN, |sample| sample.value as f32)
+    });
+    model.history.trace.push(now, row);
+}
+
+// Past states of the vehicle, so that the crew can look back during a flight.
+
+/// The most states; when they are full, every second one is dropped.
+const STATES_KEPT: usize = 400;
+/// How often a state is kept.
+const RECALL_STEP: Duration = Duration::from_millis(500);
+/// A look back ends by itself after this time without a key.
+pub const LOOKS_FOR: Duration = Duration::from_secs(10);
+
+/// The states since the countdown, oldest first, without their paths.
+#[derive(Debug, Clone, Default)]
+pub struct Recall {
+    states: Vec<(Duration, Vehicle)>,
+}
+
+/// The crew looks at this moment of the past.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LookBack {
+    pub at: Duration,
+    /// Then the screen is live again.
+    pub until: Duration,
+}
+
+impl Recall {
+    /// Keeps a state, if one is due.
+    pub(crate) fn note(&mut self, vehicle: &Vehicle, now: Duration) {
+        if self.states.last().is_some_and(|(at, _)| now < *at + RECALL_STEP) {
+            return;
+        }
+        if self.states.len() >= STATES_KEPT {
+            every_second(&mut self.states);
+        }
+        let lean = Vehicle { flown: FlownPath::default(), burn: FlownPath::default(), ..vehicle.clone() };
+        self.states.push((now, lean));
+    }
+
+    /// The last state at or before a time, or the first, with its time and the path flown until then.
+    pub fn at(&self, at: Duration, present: &Vehicle) -> Option<(Duration, Vehicle)> {
+        let after = self.states.partition_point(|(time, _)| *time <= at);
+        let (time, state) = self.states.get(after.saturating_sub(1))?;
+        let (flown, burn) = (present.flown.until(*time), present.burn.until(*time));
+        Some((*time, Vehicle { flown, burn, ..state.clone() }))
+    }
+
+    /// When the first state was kept.
+    pub fn begin(&self) -> Option<Duration> {
+        self.states.first().map(|(at, _)| *at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_trace_stays_bounded_and_keeps_the_recent_past_in_full() {
+        let mut trace = Trace::default();
+        let height = Quantity::named("height").unwrap();
+        for second in 0..20_000_u32 {
+            let mut row = [f32::NAN; COUNT];
+            row[height.place()] = second as f32;
+            trace.push(Duration::from_secs(second.into()), row);
+        }
+        assert!(trace.rows.len() <= ROWS_MAX);
+        let last = |seconds: u64| {
+            let (from, to) = (Duration::from_secs(19_999 - seconds), Duration::from_secs(19_999));
+            trace.values(height, from, to).map(|(_, value)| value).collect::<Vec<_>>()
+        };
+        assert_eq!(last(2), [19_997.0, 19_998.0, 19_999.0]);
+        assert!(trace.values(height, Duration::ZERO, Duration::from_mins(250)).count() > 1);
+        let tilt = Quantity::named("tilt").unwrap();
+        assert_eq!(trace.values(tilt, Duration::ZERO, Duration::MAX).count(), 0, "NaN is no value");
     }
 }

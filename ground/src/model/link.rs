@@ -1,16 +1,16 @@
-//! The link to the vehicle: what it carries, what was rejected, and when the vehicle was heard.
+//! The link to the vehicle in both directions: what it carries, what was rejected, when the vehicle was heard, and
+//! whether it hears us.
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, RADIO_STATUS_DATA};
+use protocol::dialect::{MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
 use protocol::frame::FramerCounters;
 use protocol::identity::Address;
 use protocol::link_stats::{ContentAge, LinkFigures, LinkStats, SourceFigures};
 use protocol::signing::SigningCounters;
 
-use super::boot::time_boot_ms;
-use super::link_state::LinkState;
-use super::uplink::Uplink;
+use super::identity::time_boot_ms;
+use super::{Model, Role};
 
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
@@ -153,4 +153,208 @@ impl Link {
     pub fn loss(&self, now: Duration) -> Option<f64> {
         self.state(now).carries().then(|| self.stats.figures(now).loss)
     }
+}
+
+// Whether one direction of the link works, by the age of the last frame that arrived on it.
+
+/// After this long without a frame a direction of the link is doubtful: one and a half heartbeat periods.
+pub const AMBER_AFTER: Duration = Duration::from_millis(1_500);
+/// After longer than this without a frame a direction of the link is lost: three heartbeat periods.
+pub const RED_AFTER: Duration = Duration::from_secs(3);
+
+/// The state of one direction of the link, with the age of its last frame. Reports of a radio about itself do not
+/// count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkState {
+    NeverHeard,
+    Alive(Duration),
+    Doubtful(Duration),
+    Lost(Duration),
+}
+
+impl LinkState {
+    /// The state that follows from the time of the last frame.
+    pub fn of(last_at: Option<Duration>, now: Duration) -> Self {
+        let Some(at) = last_at else { return Self::NeverHeard };
+        let age = now.saturating_sub(at);
+        if age > RED_AFTER {
+            Self::Lost(age)
+        } else if age >= AMBER_AFTER {
+            Self::Doubtful(age)
+        } else {
+            Self::Alive(age)
+        }
+    }
+
+    /// Whether a command can be expected to arrive.
+    pub fn carries(self) -> bool {
+        matches!(self, Self::Alive(_) | Self::Doubtful(_))
+    }
+}
+
+// Whether the vehicle hears this station. Hearing the vehicle does not prove it.
+
+/// How long a proof of the uplink is valid: the vehicle must have heard the station that arms it within this time.
+pub const PROVEN_WITHIN: Duration = Duration::from_secs(2);
+
+/// The last frame that the vehicle refused.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Refused {
+    pub why: TdFrameRefusal,
+    /// The sender, as given in the frame.
+    pub source: Address,
+    /// When it arrived at the vehicle.
+    pub at: Duration,
+    /// How many frames were refused since the vehicle's boot.
+    pub count: u16,
+}
+
+/// What the vehicle reports about its uplink, and what its answers prove.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Uplink {
+    /// When the vehicle last reported about this station.
+    told_at: Option<Duration>,
+    /// When it last accepted a frame of this station, as it reports.
+    accepted_at: Option<Duration>,
+    /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle that does not report its uplink.
+    answered_at: Option<Duration>,
+    /// Whether this station armed the vehicle.
+    pub armed_by_us: bool,
+    /// The station that armed the vehicle, if it is another. It may have our address.
+    pub armed_by_other: Option<Address>,
+    /// The session of that station.
+    other_session: u32,
+    /// Whether this vehicle tells the sessions of its stations.
+    pub(crate) tells_sessions: bool,
+    /// The last refused frame.
+    pub refused: Option<Refused>,
+}
+
+impl Uplink {
+    /// Takes a report about this station, or about no station because the vehicle has accepted nothing yet.
+    pub(crate) fn hear(&mut self, told: &TD_UPLINK_DATA, now: Duration) {
+        let ago = |age_ms: u16| {
+            (age_ms != u16::MAX).then(|| now.saturating_sub(Duration::from_millis(age_ms.into())))
+        };
+        self.told_at = Some(now);
+        self.accepted_at = ago(told.accepted_age_ms);
+        self.armed_by_us = told.commands == 1;
+        if self.armed_by_us {
+            self.armed_by_other = None;
+        }
+        self.refused = ago(told.refused_age_ms).map(|at| Refused {
+            why: told.refusal,
+            source: Address { system_id: told.refused_system, component_id: told.refused_component },
+            at,
+            count: told.refused_count,
+        });
+    }
+
+    /// Takes a report about another station.
+    pub(crate) fn overhear(&mut self, told: &TD_UPLINK_DATA) {
+        let station = Address { system_id: told.target_system, component_id: told.target_component };
+        if told.commands == 1 {
+            (self.armed_by_other, self.other_session) = (Some(station), told.session);
+        } else if self.armed_by_other == Some(station) && self.other_session == told.session {
+            self.armed_by_other = None;
+        }
+    }
+
+    /// A TIMESYNC that was sent at this time was answered.
+    pub(crate) fn answered(&mut self, asked_at: Duration) {
+        self.answered_at = self.answered_at.max(Some(asked_at));
+    }
+
+    /// Whether the vehicle reports its uplink at all.
+    pub fn is_told(&self) -> bool {
+        self.told_at.is_some()
+    }
+
+    /// The state of the uplink: whether the vehicle hears this station.
+    pub fn state(&self, now: Duration) -> LinkState {
+        LinkState::of(if self.is_told() { self.accepted_at } else { self.answered_at }, now)
+    }
+
+    /// Whether it is proven that the vehicle hears this station.
+    pub fn is_proven(&self, now: Duration) -> bool {
+        match self.state(now) {
+            LinkState::Alive(age) | LinkState::Doubtful(age) => age <= PROVEN_WITHIN,
+            LinkState::NeverHeard | LinkState::Lost(_) => false,
+        }
+    }
+
+    /// Why the vehicle does not hear this station, as far as it reports.
+    pub fn why_unheard(&self) -> String {
+        let Some(refused) = self.refused else { return "it reports no frame".to_owned() };
+        let Address { system_id, component_id } = refused.source;
+        format!("it refuses frames of {system_id}/{component_id}: {}", refusal(refused.why))
+    }
+}
+
+pub fn refusal(why: TdFrameRefusal) -> &'static str {
+    match why {
+        TdFrameRefusal::TD_FRAME_REFUSAL_NONE => "no reason reported",
+        TdFrameRefusal::TD_FRAME_REFUSAL_UNSIGNED => "not signed, is the key missing here?",
+        TdFrameRefusal::TD_FRAME_REFUSAL_WRONG_KEY => "signed with another key",
+        TdFrameRefusal::TD_FRAME_REFUSAL_REPLAYED => "replay of a used time stamp",
+        TdFrameRefusal::TD_FRAME_REFUSAL_TOO_OLD => "stamp too old, is the clock here slow?",
+        TdFrameRefusal::TD_FRAME_REFUSAL_TOO_NEW => "stamp too far ahead, is the clock here fast?",
+    }
+}
+
+// What to say while the vehicle has never been heard, and while frames are refused for their signature.
+
+/// A vehicle that is switched on sends a HEARTBEAT every second.
+pub const HINTS_AFTER: Duration = Duration::from_secs(5);
+/// Refused frames raise an alarm for this long after the last of them.
+const REFUSED_SHOWN: Duration = Duration::from_secs(5);
+
+/// What to check, the most likely first; `None` once the vehicle was heard, and in the first seconds.
+pub fn unheard_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
+    let live = model.settings.role != Role::Replaying && model.link.station_silence(now).is_none();
+    if !live || now < HINTS_AFTER || model.link.state(now) != LinkState::NeverHeard {
+        return None;
+    }
+    let id = model.settings.vehicle.system_id;
+    let link = &model.settings.link_name;
+    let framing = &model.link.framing;
+    let mut hints = vec![format!("Nothing heard from system {id} for {} s on {link}.", now.as_secs())];
+    hints.extend(model.link.trouble.as_ref().map(|why| format!("The link does not work: {why}.")));
+    hints.extend(refused_frames(model, now));
+    let others: Vec<String> = model.link.strangers.iter().map(|other| other.system_id.to_string()).collect();
+    if !others.is_empty() {
+        hints.push(format!("Heard instead: system {}. Choose it with --vehicle.", others.join(", ")));
+    } else if framing.frames == 0 && framing.garbage_bytes > 0 {
+        hints.push("Bytes come, but no MAVLink: is the baud rate right?".to_owned());
+    }
+    hints.push(what_the_link_does(link));
+    hints.push("Is the vehicle switched on, and its antenna fitted?".to_owned());
+    Some(hints)
+}
+
+/// What the station does on its link, and so what the other end has to do.
+fn what_the_link_does(link: &str) -> String {
+    let (kind, rest) = link.split_once(':').unwrap_or((link, ""));
+    match kind {
+        "udpin" => format!("It listens on {rest}: does the vehicle send to that port here?"),
+        "udpout" => format!("It sends to {rest}: does the vehicle listen there?"),
+        "tcpin" => format!("It waits on {rest}: does the vehicle connect to it?"),
+        "tcpout" => format!("It connects to {rest}: does the vehicle serve there?"),
+        _ => "Are port and baud rate those of the radio, and both radios paired?".to_owned(),
+    }
+}
+
+/// How many frames were refused for their signature, while that goes on and the vehicle is not heard.
+pub fn refused_frames(model: &Model, now: Duration) -> Option<String> {
+    let goes_on = now.saturating_sub(model.link.refused_at?) < REFUSED_SHOWN;
+    let counts: SigningCounters =
+        model.link.signing.filter(|_| goes_on && !model.link.state(now).carries())?;
+    let why = if counts.wrong >= counts.unsigned.max(counts.too_old) {
+        "is --key the vehicle's key?"
+    } else if counts.unsigned >= counts.too_old {
+        "they are not signed: the vehicle has no key"
+    } else {
+        "their time is too old: see the clocks"
+    };
+    Some(format!("{} frames REFUSED, wrong signature: {why}", counts.rejected()))
 }

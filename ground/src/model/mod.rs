@@ -3,91 +3,53 @@
 //! Every received value carries the time of its reception. The model decides nothing, and it imports neither `update`
 //! nor `view`.
 
-pub mod abort_too_late;
 pub mod act;
-pub mod action;
 pub mod alarm;
-mod auto_step;
-pub mod bindings;
-pub mod book;
-pub mod boot;
-pub mod callouts;
 pub mod checklist;
-pub mod chord;
 pub mod command;
 pub mod crew;
 pub mod dead_reckoning;
 pub mod dialog;
-pub mod ending;
-pub mod events;
-pub mod flight_so_far;
-pub mod flown_path;
-pub mod foreign;
 pub mod history;
-pub mod key_timing;
-pub mod latch;
+pub mod identity;
 pub mod link;
-pub mod link_state;
+pub mod log;
 pub mod motion;
-pub mod motor;
 pub mod pad_check;
 pub mod page;
-pub mod palette;
-pub mod parameters;
-pub mod permits;
 pub mod place;
 pub mod quantity;
-pub mod range_test;
-pub mod recall;
-pub mod seat;
-pub mod station_log;
+pub mod safety;
 pub mod telemetry;
-pub mod touchdown;
-pub mod trace;
-pub mod trend;
-pub mod two_person;
-pub mod unheard;
-pub mod uplink;
 pub mod vehicle;
 pub mod words;
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use protocol::dialect::{TdPhase, TdRole};
+use protocol::dialect::{MavMessage, TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::log::record::{EventLevel, Record};
+use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1::OperatorAction;
 use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
 
-use action::{Action, BookLine};
-use alarm::{Alarm, Alarms};
-pub(crate) use auto_step::AutoStep;
-use bindings::Bindings;
-use book::BookState;
-use callouts::{Called, Talk};
-use checklist::Checklist;
-use chord::AbortChord;
-use command::Commands;
-use crew::Crew;
-use dialog::{Dialog, RestOfWord};
-use events::{Events, Speaker};
-use flight_so_far::FlightSoFar;
-use history::History;
-use key_timing::KeyTiming;
+use act::Bindings;
+use alarm::{Alarm, AlarmKind, Alarms, Called, Talk};
+use checklist::{Checklist, ChecklistEntry};
+pub(crate) use command::AutoStep;
+use command::{CommandKind, Commands};
+use crew::{Crew, KeyOwner, Seat};
+use dialog::{AbortChord, Dialog, KeyTiming, RestOfWord};
+use history::{History, LookBack, Recall};
 use link::Link;
-use motor::Danger;
+pub use log::LogHealth;
+use log::{BookState, Events, LogFault, Speaker};
+use pad_check::RangeTest;
 use page::{Page, Pages};
-use parameters::Parameters;
 use place::{Degrees, LastPlace};
-use range_test::RangeTest;
-use recall::{LookBack, Recall};
-use seat::Seat;
-use station_log::LogFault;
-pub use station_log::LogHealth;
-use two_person::KeyOwner;
-use vehicle::Vehicle;
+use safety::Danger;
+use vehicle::{Parameters, Vehicle};
 
 /// The settings of a run, which do not change during it.
 #[derive(Debug, Clone)]
@@ -426,4 +388,108 @@ impl Model {
     pub(crate) fn warn(&mut self, now: Duration, text: impl Into<String>) {
         self.say(now, Speaker::Ground, EventLevel::Warning, text);
     }
+}
+
+// What the model asks of the run loop: messages to send, records to write, requests to the station.
+
+/// What a screen in another process asks its station to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// The crew has completed every step of this command: send it.
+    Command(CommandKind),
+    /// The crew has seen this alarm.
+    Acknowledge(AlarmKind),
+    /// Ask the vehicle for its parameters.
+    Parameters,
+    /// Write the report of the flight.
+    Report,
+    /// Fetch the vehicle's own log.
+    Download,
+    /// Begin the radio range test.
+    RangeTest,
+    /// Arm and start although the station's log is unfit.
+    WithoutLog,
+    /// The crew has signed or voided this step of the checklist, counted from zero.
+    Sign { step: u8, void: bool },
+}
+
+/// A line of the book: who did what. The run loop adds the time and the chain.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BookLine {
+    /// As in `key`, `commanded`, `signed`.
+    pub kind: String,
+    /// Who did it; empty for the station or the vehicle itself.
+    pub who: String,
+    pub text: String,
+}
+
+/// What `update` wants the run loop to do.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Send a message to the vehicle.
+    Send(Box<MavMessage>),
+    /// Write a record into the log.
+    Record(Record),
+    /// The checklist has changed: keep the change, and show it on every screen.
+    KeepChecklist(ChecklistEntry),
+    /// Tell the screens why a step of the checklist is not signed or voided.
+    RefuseSignature(String),
+    /// Keep the last place of the vehicle in the files for maps.
+    KeepPlace(Box<LastPlace>),
+    /// Show the flight just flown again, on this screen.
+    ReplayFlight,
+    /// Write the report of the flight.
+    WriteReport,
+    /// Fetch the vehicle's own log.
+    FetchLog,
+    /// Enter this into the book.
+    Enter(BookLine),
+    /// Write the log to disk now.
+    SyncLog,
+    /// Redraw the whole screen.
+    Redraw,
+    /// Change the screen's colours to the next theme.
+    NextTheme,
+    /// Ask the station, from a screen in another process.
+    Request(Request),
+    /// Tell the other screens that the crew has asked for this on the station's own screen.
+    Tell(Request),
+    /// Give the terminal back and continue without a screen.
+    LeaveScreen,
+    Bell,
+    /// Call this out with the crew's voice.
+    Say(String),
+    /// An alarm was raised: run the alarm command with its text.
+    Alarm(String),
+    Quit,
+}
+
+impl Action {
+    pub(crate) fn send(message: MavMessage) -> Self {
+        Self::Send(Box::new(message))
+    }
+
+    pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
+        let event = Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
+        Self::Record(Record::Event(event))
+    }
+}
+
+// How the flight ended, as far as the ground has seen it; the exit code follows from it.
+
+/// How the flight has gone so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FlightSoFar {
+    /// The vehicle has left the pad (or the simulation was released).
+    pub started: bool,
+    /// When the vehicle latched an abort.
+    pub aborted_at: Option<Duration>,
+    /// The last arming or start was refused: the reason and the time.
+    pub refusal: Option<(String, Duration)>,
+    /// The vehicle's verdict (whether it landed inside every limit) and its time.
+    pub verdict: Option<(bool, Duration)>,
+    /// When the vehicle reached SAFED after a flight.
+    pub safed_at: Option<Duration>,
+    /// Why the run cannot continue.
+    pub error: Option<String>,
 }

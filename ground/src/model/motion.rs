@@ -1,11 +1,14 @@
-//! Position, velocity and attitude of the vehicle: converted from north-east-down on the wire to north, east and up.
+//! Position, velocity and attitude of the vehicle, converted from north-east-down on the wire to north, east and up;
+//! their trend and the path flown.
 //!
 //! A planar vehicle flies in the plane of north and up and has no east component. Whether a vehicle [has left the
 //! plane](Motion::leaves_the_plane) decides how a screen labels the values, never how they are computed.
 
+use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
+use std::time::Duration;
 
-use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
+use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, TdPhase};
 
 /// Standard gravity, m/s2 (CGPM 1901).
 pub const GRAVITY_M_S2: f64 = 9.806_65;
@@ -155,8 +158,124 @@ impl BodySpeed {
     }
 }
 
+// The mean acceleration over the last second of telemetry, gravity included.
+
+/// Older velocities are dropped.
+const SPAN_MS: u32 = 1_000;
+/// Over a shorter time the difference of two velocities is mostly noise.
+const SPAN_MIN_MS: u32 = 300;
+/// How many samples are kept at most.
+const TREND_KEPT: usize = 64;
+
+/// The velocities of the last second under the same forces, by the vehicle's clock, so that radio delays do not look
+/// like accelerations.
+#[derive(Debug, Clone, Default)]
+pub struct Trend {
+    acting: Option<TdPhase>,
+    velocities: VecDeque<(u32, NorthEastUp)>,
+}
+
+impl Trend {
+    /// Adds a velocity. When a phase with other forces begins, older velocities are dropped.
+    pub(crate) fn note(&mut self, boot_ms: u32, motion: &Motion, phase: Option<TdPhase>) {
+        let acting = phase.map(phase_by_forces);
+        if acting != self.acting {
+            *self = Self { acting, ..Self::default() };
+        }
+        let velocity = [motion.vx_m_s, motion.vy_m_s, motion.climb_m_s];
+        let newest = self.velocities.back().map(|(at_ms, _)| *at_ms);
+        if newest.is_some_and(|newest| boot_ms <= newest) || velocity.iter().any(|part| !part.is_finite()) {
+            return;
+        }
+        let is_old = |at_ms: u32| boot_ms - at_ms > SPAN_MS;
+        while self.velocities.front().is_some_and(|(at_ms, _)| is_old(*at_ms))
+            || self.velocities.len() >= TREND_KEPT
+        {
+            self.velocities.pop_front();
+        }
+        self.velocities.push_back((boot_ms, velocity));
+    }
+
+    /// The mean acceleration; `None` while too little has been received under the present forces.
+    pub fn mean_change(&self) -> Option<Change> {
+        let ((from_ms, from), (to_ms, to)) = (self.velocities.front()?, self.velocities.back()?);
+        let span_ms = to_ms - from_ms;
+        let span_s = f64::from(span_ms) / 1_000.0;
+        (span_ms >= SPAN_MIN_MS).then(|| Change {
+            acceleration_m_s2: std::array::from_fn(|axis| (to[axis] - from[axis]) / span_s),
+            velocity_m_s: std::array::from_fn(|axis| f64::midpoint(from[axis], to[axis])),
+        })
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    pub acceleration_m_s2: NorthEastUp,
+    /// The mean velocity, m/s.
+    pub velocity_m_s: NorthEastUp,
+}
+
+/// Maps phases with the same forces to one phase: arming the motor changes no force.
+fn phase_by_forces(phase: TdPhase) -> TdPhase {
+    match phase {
+        TdPhase::TD_PHASE_LAND_ARMED | TdPhase::TD_PHASE_IGNITION => TdPhase::TD_PHASE_AERO_DESCENT,
+        other => other,
+    }
+}
+
+// The path that the vehicle flew, in a bounded number of points.
+
+const PATH_KEPT: usize = 512;
+/// A position further away than this is not believed.
+const POSITION_MAX_M: f64 = 1e5;
+
+/// A path: positions north, east and up from the pad, m.
+#[derive(Debug, Clone, Default)]
+pub struct FlownPath {
+    points: Vec<NorthEastUp>,
+    /// When each was received.
+    times: Vec<Duration>,
+}
+
+impl FlownPath {
+    /// The points, oldest first.
+    pub fn points(&self) -> &[NorthEastUp] {
+        &self.points
+    }
+
+    /// The path up to a time.
+    pub(crate) fn until(&self, at: Duration) -> Self {
+        let count = self.times.partition_point(|time| *time <= at);
+        Self { points: self.points[..count].to_vec(), times: self.times[..count].to_vec() }
+    }
+
+    /// Adds a position. When the path gets too long, every second point is dropped.
+    pub(crate) fn extend(&mut self, motion: &Motion, now: Duration) {
+        let point = [motion.x_m, motion.y_m, motion.altitude_m];
+        let is_position = point.iter().all(|value| value.abs() < POSITION_MAX_M);
+        if !is_position || self.points.last() == Some(&point) {
+            return;
+        }
+        if self.points.len() >= PATH_KEPT {
+            every_second(&mut self.points);
+            every_second(&mut self.times);
+        }
+        self.points.push(point);
+        self.times.push(now);
+    }
+}
+
+/// Drops every second element.
+pub(super) fn every_second<T>(list: &mut Vec<T>) {
+    let mut keep = false;
+    list.retain(|_| {
+        keep = !keep;
+        keep
+    });
+}
+
 #[cfg(test)]
-mod tests {
+mod motion_tests {
     use super::*;
     use proptest::prelude::*;
 
@@ -226,5 +345,78 @@ mod tests {
             prop_assert!((whole - motion.speed_m_s()).abs() < 1e-4);
             prop_assert!((attitude.tilt_rad - libm::acos(attitude.axes[0][2].clamp(-1.0, 1.0))).abs() < 1e-3);
         }
+    }
+}
+
+#[cfg(test)]
+mod trend_tests {
+    use super::*;
+
+    fn falling(speed_m_s: f64) -> Motion {
+        Motion { vx_m_s: 1.0, vy_m_s: 0.0, ..Motion::vertical(100.0, -speed_m_s) }
+    }
+
+    fn noted(velocities: &[(u32, f64)], phase: TdPhase) -> Trend {
+        let mut trend = Trend::default();
+        for (boot_ms, speed_m_s) in velocities {
+            trend.note(*boot_ms, &falling(*speed_m_s), Some(phase));
+        }
+        trend
+    }
+
+    fn acceleration(trend: &Trend) -> Option<NorthEastUp> {
+        trend.mean_change().map(|change| change.acceleration_m_s2)
+    }
+
+    #[test]
+    fn it_is_the_change_over_the_last_second() {
+        let trend = noted(&[(0, 90.0), (1_000, 10.0), (1_500, 14.0), (2_000, 18.0)], TdPhase::TD_PHASE_COAST);
+        assert_eq!(acceleration(&trend), Some([0.0, 0.0, -8.0]));
+        assert_eq!(trend.mean_change().map(|change| change.velocity_m_s), Some([1.0, 0.0, -14.0]));
+    }
+
+    #[test]
+    fn too_short_a_time_gives_nothing_and_other_forces_start_over() {
+        let mut trend = noted(&[(1_000, 10.0), (1_200, 12.0)], TdPhase::TD_PHASE_COAST);
+        assert_eq!(acceleration(&trend), None);
+        trend.note(1_400, &falling(14.0), Some(TdPhase::TD_PHASE_COAST));
+        assert_eq!(acceleration(&trend), Some([0.0, 0.0, -10.0]));
+        trend.note(1_500, &falling(14.0), Some(TdPhase::TD_PHASE_POWERED));
+        assert_eq!(acceleration(&trend), None);
+        let mut descending = noted(&[(1_000, 10.0), (1_200, 11.0)], TdPhase::TD_PHASE_AERO_DESCENT);
+        descending.note(1_400, &falling(12.0), Some(TdPhase::TD_PHASE_LAND_ARMED));
+        assert_eq!(acceleration(&descending), Some([0.0, 0.0, -5.0]));
+    }
+
+    #[test]
+    fn late_and_non_finite_velocities_are_ignored() {
+        let mut trend = noted(&[(1_000, 10.0), (1_500, 15.0), (1_400, 99.0)], TdPhase::TD_PHASE_COAST);
+        trend.note(1_600, &falling(f64::NAN), Some(TdPhase::TD_PHASE_COAST));
+        assert_eq!(acceleration(&trend), Some([0.0, 0.0, -10.0]));
+    }
+}
+
+#[cfg(test)]
+mod flown_path_tests {
+    use super::*;
+
+    #[test]
+    fn a_long_path_keeps_its_ends_and_stays_bounded() {
+        let mut flown = FlownPath::default();
+        for k in 0..10_000_u32 {
+            let motion = Motion { x_m: f64::from(k), y_m: 0.0, ..Motion::vertical(f64::from(k), 0.0) };
+            flown.extend(&motion, Duration::from_secs(k.into()));
+            flown.extend(&motion, Duration::from_secs(k.into()));
+        }
+        flown.extend(&Motion { x_m: f64::NAN, y_m: 0.0, ..Motion::vertical(1.0, 0.0) }, Duration::MAX);
+        flown.extend(&Motion { x_m: 1e9, y_m: 0.0, ..Motion::vertical(1.0, 0.0) }, Duration::MAX);
+        let points = flown.points();
+        assert!(points.len() <= PATH_KEPT);
+        assert_eq!((points.first(), points.last()), (Some(&[0.0; 3]), Some(&[9_999.0, 0.0, 9_999.0])));
+        assert!(points.is_sorted_by(|before, after| before[0] < after[0]));
+        let half = flown.until(Duration::from_secs(5_000));
+        assert!(half.points().last().is_some_and(|point| point[0] <= 5_000.0));
+        assert!(half.points().len() < points.len());
+        assert!(flown.until(Duration::ZERO).points().len() == 1);
     }
 }

@@ -3,7 +3,8 @@
 use protocol::dialect::TdPhase;
 
 use super::alarm::AlarmKind;
-use super::quantity::{self, Quantity};
+use super::quantity;
+use super::quantity::Quantity;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {

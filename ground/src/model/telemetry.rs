@@ -6,14 +6,12 @@ use protocol::dialect::{
     HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
     TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
 };
-
 use protocol::mission::MissionHash;
 
-use super::boot::MessageBoot;
-use super::foreign::{Foreign, may_be_ours};
+use super::identity::{Foreign, MessageBoot, may_be_ours};
 use super::motion::{Attitude, Motion};
 use super::pad_check::PadCheck;
-use super::touchdown::Touchdown;
+use super::safety::Touchdown;
 use super::vehicle::{
     Battery, Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
 };

@@ -2,8 +2,9 @@
 
 use std::fmt::Debug;
 
-use super::telemetry::phase_from_number;
 use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdPhase};
+
+use super::telemetry::phase_from_number;
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {

@@ -1,17 +1,19 @@
-//! Follows each command: sent, answered or given up, observed.
+//! Follows each command: sent, answered or given up, observed. The automatic mode and the unattended countdown give
+//! their commands here too.
 
 use std::time::Duration;
 
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
-use protocol::dialect::MavResult;
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult, TdPhase};
+use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
 use super::Action;
-use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand};
-use crate::model::events::Speaker;
-use crate::model::seat::Seat;
-use crate::model::{AutoStep, Model};
+use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand, why_nothing_moves};
+use crate::model::crew::{Seat, UNATTENDED_MAX};
+use crate::model::log::Speaker;
+use crate::model::{AutoStep, Model, words};
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
 const ABORT_REPORTED_EVERY: u32 = 100;
@@ -258,4 +260,171 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         model.tell(now, Speaker::Ground, level, text);
     }
     stop_if_latched(model, now);
+}
+
+// The automatic mode, for runs without a crew: arms and starts a simulated vehicle.
+
+/// How long the vehicle may take to become ready, from its first heartbeat.
+const READY_WITHIN: Duration = Duration::from_secs(10);
+/// The same while another station uses our ids: one that ran before under the same ids is in the way for up to 15 s.
+const FREE_WITHIN: Duration = Duration::from_secs(20);
+pub(super) fn step_auto(model: &mut Model, now: Duration) {
+    if !model.settings.auto || !model.link.state(now).carries() {
+        return;
+    }
+    if model.auto_step != AutoStep::Done && is_live(model) {
+        return refuse_auto(model, now);
+    }
+    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
+    let phase = model.vehicle.phase().map(|phase| phase.value);
+    match model.auto_step {
+        AutoStep::WaitForReady { not_before } => match phase {
+            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && is_simulated(model) => start_auto(model, now),
+            // The flight has already begun, so there is nothing to start.
+            Some(phase) if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 => {
+                model.auto_step = AutoStep::Done;
+            }
+            _ => arm_if_ready(model, not_before, now),
+        },
+        AutoStep::WaitForArmed => {
+            if armed && is_simulated(model) && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
+                start_auto(model, now);
+            }
+        }
+        AutoStep::Done => {}
+    }
+}
+
+/// Whether the vehicle is known to be simulated.
+fn is_simulated(model: &Model) -> bool {
+    model.settings.demonstration || model.vehicle.is_simulated()
+}
+
+/// Whether the vehicle has reported what it is, and is not simulated.
+fn is_live(model: &Model) -> bool {
+    model.vehicle.boot.has_said_what_it_is() && !is_simulated(model)
+}
+
+fn refuse_auto(model: &mut Model, now: Duration) {
+    let why = "the vehicle is live: it does not report that it is simulated";
+    model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
+    model.auto_step = AutoStep::Done;
+    model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
+}
+
+fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
+    let why_not = why_not_ready(model, not_before, now);
+    let waited = model.link.first_heartbeat_at.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    let within = if model.link.shares_our_id(now) { FREE_WITHIN } else { READY_WITHIN };
+    match why_not {
+        None => {
+            model.info(now, "automatic mode: the checks pass; arming");
+            model.auto_step = AutoStep::WaitForArmed;
+            submit(model, CommandKind::Arm, Seat::automatic(), now);
+        }
+        Some(why) if waited >= within => {
+            let seconds = within.as_secs();
+            model.warn(now, format!("automatic mode: gave up {seconds} s after first contact: {why}"));
+            model.auto_step = AutoStep::Done;
+            model.outcome.refusal = Some((format!("ARM not sent: {why}"), now));
+        }
+        Some(_) => {}
+    }
+}
+
+fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<String> {
+    if let Some(why) = why_nothing_moves(model, now).filter(|_| model.vehicle.status.is_some()) {
+        return Some(why);
+    }
+    let Some(status) = model.vehicle.status.as_ref() else {
+        return Some("the vehicle has not reported its checks".to_owned());
+    };
+    if !is_simulated(model) {
+        return Some("the vehicle has not reported that it is simulated".to_owned());
+    }
+    let failing = words::failed_checks(status.value.checks_failed);
+    if status.is_stale(now) {
+        Some("the vehicle no longer reports its checks".to_owned())
+    } else if !failing.is_empty() {
+        Some(format!("failing checks: {}", failing.join(", ")))
+    } else if !model.link.uplink.is_proven(now) {
+        Some(format!("the uplink is not proven: {}", model.link.uplink.why_unheard()))
+    } else if status.value.phase != TdPhase::TD_PHASE_PAD_IDLE {
+        Some(format!("phase {}", words::phase(status.value.phase)))
+    } else if status.received_at < not_before {
+        Some("temporarily refused, although no check fails".to_owned())
+    } else {
+        None
+    }
+}
+
+fn start_auto(model: &mut Model, now: Duration) {
+    if let Some(why) = why_nothing_moves(model, now) {
+        model.auto_step = AutoStep::Done;
+        model.outcome.refusal = Some((format!("START not sent: {why}"), now));
+        return model.warn(now, format!("automatic mode: not started: {why}"));
+    }
+    model.info(now, "automatic mode: starting");
+    model.auto_step = AutoStep::Done;
+    if model.vehicle.countdown_s().is_none() {
+        submit(model, CommandKind::Start, Seat::automatic(), now);
+    }
+}
+
+// Holds a countdown that this station's crew started when no commanding screen is left.
+
+/// How often the hold is sent; the countdown itself shows whether it worked.
+const HOLD_EVERY: Duration = Duration::from_millis(100);
+/// Half of the tick period: ticks are not exact to the millisecond.
+const HALF_A_TICK: Duration = Duration::from_millis(50);
+
+pub(super) fn hold_if_unattended(model: &mut Model, now: Duration) {
+    let alone = !model.settings.auto && model.crew.is_gone(now);
+    if !(alone && counts_down(model) && armed_here(model)) {
+        if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_told) {
+            let why = if alone { "the countdown has ended" } else { "a commanding screen is back" };
+            model.info(now, format!("the hold is no longer sent: {why}"));
+        }
+        return;
+    }
+    let too_late = model.vehicle.is_past_hold(now);
+    if model.crew.hold_due.is_none() || (too_late && !model.crew.too_late_told) {
+        model.crew.too_late_told = too_late;
+        let nobody = format!("no commanding screen for {} s in the countdown", UNATTENDED_MAX.as_secs());
+        let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
+        let text = format!("{nobody}: {what}");
+        model.record_operator(now, "hold", &Seat::default(), &text);
+        model.tell(now, Speaker::Ground, EventLevel::Warning, text);
+    }
+    let due = model.crew.hold_due.unwrap_or(now);
+    if too_late {
+        model.crew.hold_due = Some(due);
+    } else if now + HALF_A_TICK >= due {
+        model.outbox.push(Action::send(hold_message(model.settings.vehicle)));
+        model.crew.hold_due = Some(now + HOLD_EVERY);
+    }
+}
+
+fn counts_down(model: &Model) -> bool {
+    let on_pad = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_PAD_ARMED);
+    on_pad && model.vehicle.countdown_s().is_some()
+}
+
+/// Whether this station armed the vehicle; a countdown of another station is not held. The vehicle knows it; an older one does
+/// not tell it.
+fn armed_here(model: &Model) -> bool {
+    if model.link.uplink.is_told() {
+        return model.link.uplink.armed_by_us;
+    }
+    let arm = model.commands.of(CommandKind::Arm);
+    arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())
+}
+
+fn hold_message(vehicle: Address) -> MavMessage {
+    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
+        target_system: vehicle.system_id,
+        target_component: vehicle.component_id,
+        ..COMMAND_LONG_DATA::default()
+    })
 }

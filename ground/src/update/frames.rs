@@ -9,8 +9,8 @@ use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
-use super::{Action, book, commands, pad_check, vehicle_changes};
-use crate::model::events::Speaker;
+use super::{Action, commands, pad, vehicle_changes};
+use crate::model::log::Speaker;
 use crate::model::{Model, Role, telemetry};
 
 const HEARTBEAT_ID: u32 = 0;
@@ -87,7 +87,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             return;
         }
         MavMessage::PARAM_VALUE(data) => return model.parameters.take(data),
-        MavMessage::TD_BOOK_KEPT(data) => return book::on_kept(model, data),
+        MavMessage::TD_BOOK_KEPT(data) => return vehicle_changes::on_kept(model, data),
         MavMessage::TD_UPLINK(data) => return on_uplink(model, data, now),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
@@ -99,19 +99,19 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         _ => {}
     }
     let before = vehicle_changes::Announced::of(&model.vehicle);
-    let crew_before = book::CrewTold::of(model);
+    let crew_before = vehicle_changes::CrewTold::of(model);
     let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
     if rebooted {
         vehicle_changes::on_reboot(model, now);
-        book::on_reboot(model);
+        vehicle_changes::forget_kept(model);
     }
     vehicle_changes::on_change(
         model,
         if rebooted { vehicle_changes::Announced::default() } else { before },
         now,
     );
-    book::on_change(model, &crew_before);
-    pad_check::enter(model, now);
+    vehicle_changes::enter_crew_changes(model, &crew_before);
+    pad::enter_check(model, now);
     commands::observe(model, now);
 }
 

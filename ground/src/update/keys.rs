@@ -11,26 +11,25 @@ use std::time::Duration;
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, afterwards, checklist, commands, entry, pad_check};
+use super::{Action, Request, commands, pad};
 use crate::key::Key;
-use crate::model::act::Act;
+use crate::model::act::{Act, Does};
 use crate::model::alarm::AlarmKind;
-use crate::model::command::CommandKind;
+use crate::model::command::{
+    CommandKind, is_only_the_log, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat,
+    why_not_start, why_not_take, why_nothing_moves,
+};
+use crate::model::crew::Seat;
 use crate::model::dialog::{
-    AGAIN_AFTER, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, RestOfWord, START_WORD, TAKE_WORD,
+    AGAIN_AFTER, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, FINGERS_APART, KeyOrigin, RestOfWord, START_WORD,
+    TAKE_WORD,
 };
-use crate::model::events::Speaker;
-use crate::model::key_timing::{FINGERS_APART, KeyOrigin};
+use crate::model::history::{LOOKS_FOR, LookBack};
+use crate::model::log::{LogStanding, Speaker};
 use crate::model::pad_check::{Standing, standing};
-use crate::model::page::Page;
-use crate::model::permits::{
-    is_only_the_log, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat, why_not_start,
-    why_not_take, why_nothing_moves,
-};
-use crate::model::recall::{LOOKS_FOR, LookBack};
-use crate::model::seat::Seat;
-use crate::model::station_log::LogStanding;
-use crate::model::{Model, Role, quantity};
+use crate::model::page::{Page, TextEntry};
+use crate::model::{Model, Role, act, quantity};
+use crate::update;
 
 /// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
@@ -82,7 +81,7 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     if model.pages.entry.is_some() && model.dialog == Dialog::Closed {
         if touch != KeyOrigin::Repeat {
             model.key_timing.hurried = touch != KeyOrigin::Typed;
-            entry::on_key(model, key, now);
+            on_entry_key(model, key, now);
         }
         return;
     }
@@ -216,7 +215,7 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
         Dialog::AbortForeign { .. } => ask(model, CommandKind::Abort, now),
         Dialog::Check { moves: true, .. } => ask(model, CommandKind::Check, now),
         Dialog::Check { moves: false, .. } => ask(model, CommandKind::CheckStill, now),
-        Dialog::Sign { step, void, .. } => checklist::ask(model, (*step, *void), now),
+        Dialog::Sign { step, void, .. } => pad::ask_to_sign(model, (*step, *void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Dialog::Quit { .. } => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
@@ -356,11 +355,11 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 model.pages.hold(Some(Page::Pad));
             }
         }
-        Act::ReplayFlight => afterwards::replay(model, now),
-        Act::Report => afterwards::report(model, now),
-        Act::Download => afterwards::download(model, now),
-        Act::SignStep => checklist::open_dialog(model, false, now),
-        Act::VoidStep => checklist::open_dialog(model, true, now),
+        Act::ReplayFlight => update::replay_flight(model, now),
+        Act::Report => update::write_report(model, now),
+        Act::Download => update::fetch_log(model, now),
+        Act::SignStep => pad::open_sign_dialog(model, false, now),
+        Act::VoidStep => pad::open_sign_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),
         Act::Show(page) => {
             model.pages.hold(Some(page));
@@ -375,8 +374,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             model.pages.filter.clear();
             model.pages.hold(None);
         }
-        Act::Filter => entry::open_filter(model),
-        Act::Palette => entry::open_palette(model),
+        Act::Filter => open_filter(model),
+        Act::Palette => open_palette(model),
         Act::Pin if shown == Page::Plot => model.pages.pin(model.pages.plotted),
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::AskParameters if shown == Page::Parameters && model.playing.is_none() => ask_parameters(model),
@@ -495,7 +494,7 @@ fn test_range(model: &mut Model, now: Duration) {
         return model.outbox.push(Action::Request(Request::RangeTest));
     }
     model.outbox.push(Action::Tell(Request::RangeTest));
-    pad_check::begin_range_test(model, model.settings.seat.clone(), now);
+    pad::begin_range_test(model, model.settings.seat.clone(), now);
 }
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
@@ -606,5 +605,99 @@ fn quit(model: &mut Model, now: Duration) {
         model.dialog = Dialog::quit(now);
     } else {
         model.quit_at = Some(now + FINGERS_APART);
+    }
+}
+
+// The keys while a text is typed: a filter of a list, or a part of an action's words in the palette.
+
+/// The longest text.
+const TYPED_MAX: usize = 30;
+
+/// Opens the filter of the shown list; on a page without one, of the events.
+pub(super) fn open_filter(model: &mut Model) {
+    if !model.page().has_filter() {
+        model.pages.hold(Some(Page::Messages));
+    }
+    model.pages.entry = Some(TextEntry::Filter);
+}
+
+pub(super) fn open_palette(model: &mut Model) {
+    model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
+}
+
+/// A key while a text is typed. Esc gives up; the keys of the abort never come here.
+pub(super) fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
+    match model.pages.entry.take() {
+        None => {}
+        Some(TextEntry::Filter) => on_filter_key(model, key),
+        Some(TextEntry::Palette { typed, chosen }) => on_palette_key(model, (typed, chosen), key, now),
+    }
+}
+
+fn on_filter_key(model: &mut Model, key: Key) {
+    match key {
+        Key::Enter => return,
+        Key::Escape => return model.pages.filter.clear(),
+        _ => edit(&mut model.pages.filter, key),
+    }
+    model.pages.scroll = 0;
+    model.pages.entry = Some(TextEntry::Filter);
+}
+
+fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), key: Key, now: Duration) {
+    match key {
+        Key::Escape => return,
+        Key::Enter => {
+            let entry = act::palette_entries(model, &typed).into_iter().nth(chosen);
+            return match entry.map(|entry| entry.does) {
+                Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
+                    drop_run(model, now);
+                }
+                Some(does) => perform_entry(model, does, now),
+                None => {}
+            };
+        }
+        Key::Up => chosen = chosen.saturating_sub(1),
+        Key::Down => chosen = (chosen + 1).min(act::palette_entries(model, &typed).len().saturating_sub(1)),
+        _ => {
+            edit(&mut typed, key);
+            chosen = 0;
+        }
+    }
+    model.pages.entry = Some(TextEntry::Palette { typed, chosen });
+}
+
+/// Does what an entry of the palette says. It goes the way of its key, so it never does more than the key.
+fn perform_entry(model: &mut Model, does: Does, now: Duration) {
+    match does {
+        // Enter has chosen it, and a held Enter would confirm it.
+        Does::Act(act @ (Act::Disarm | Act::HoldCountdown)) => {
+            let key = model.settings.keys.name(act);
+            let does = if act == Act::Disarm { "disarm" } else { "hold" };
+            model.info(now, format!("press {key}, then Enter: only these keys {does}"));
+        }
+        Does::Act(act @ (Act::SignStep | Act::VoidStep)) => {
+            let key = model.settings.keys.name(act);
+            model.info(now, format!("press {key}, then Enter: only these keys sign or void"));
+        }
+        Does::Act(act @ Act::Tap) => {
+            let key = model.settings.keys.name(act);
+            model.info(now, format!("press {key}: only this key taps"));
+        }
+        Does::Act(act) => perform(model, act, now),
+        Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
+        Does::Plot(quantity) => {
+            model.pages.plotted = quantity;
+            perform(model, Act::Show(Page::Plot), now);
+        }
+        Does::Pin(quantity) => model.pages.pin(quantity),
+    }
+}
+
+fn edit(text: &mut String, key: Key) {
+    match key {
+        Key::Backspace => drop(text.pop()),
+        Key::Char(letter) if text.chars().count() < TYPED_MAX => text.push(letter),
+        _ => {}
     }
 }

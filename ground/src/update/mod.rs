@@ -2,19 +2,11 @@
 //!
 //! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do: send, record, quit.
 
-mod afterwards;
 pub mod alarms;
-pub mod auto;
-mod book;
-mod callouts;
-mod checklist;
 pub mod commands;
-pub mod crew;
-mod entry;
 pub mod frames;
 pub mod keys;
-mod pad_check;
-mod place;
+pub mod pad;
 pub mod tick;
 pub mod vehicle_changes;
 
@@ -29,14 +21,12 @@ use crate::key::Key;
 use crate::model::alarm::AlarmKind;
 use crate::model::checklist::Checklist;
 use crate::model::command::CommandKind;
-use crate::model::events::Speaker;
+use crate::model::crew::Seat;
 use crate::model::link::LinkReport;
+use crate::model::log::{LogStanding, Speaker};
 use crate::model::place::LastPlace;
-use crate::model::seat::Seat;
-use crate::model::station_log::LogStanding;
+pub use crate::model::{Action, Request};
 use crate::model::{LogHealth, Model, Role};
-
-pub use crate::model::action::{Action, Request};
 
 /// A message for the model: an input of the crew, a frame, a state of the links, or a tick.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,7 +134,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
         Msg::WithoutLog(by) => keys::without_log(model, &by, now),
-        Msg::RangeTest(by) => pad_check::begin_range_test(model, by, now),
+        Msg::RangeTest(by) => pad::begin_range_test(model, by, now),
         Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
         Msg::Crew(seats) => {
             model.crew.set_seats(seats, now);
@@ -152,14 +142,14 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::Checklist(list) => model.checklist = Some(*list),
-        Msg::ReportWanted => afterwards::report(model, now),
-        Msg::Report(written) => afterwards::on_report(model, written, now),
-        Msg::DownloadWanted => afterwards::download(model, now),
-        Msg::Download(told) => afterwards::on_download(model, told, now),
+        Msg::ReportWanted => write_report(model, now),
+        Msg::Report(written) => on_report(model, written, now),
+        Msg::DownloadWanted => fetch_log(model, now),
+        Msg::Download(told) => on_download(model, told, now),
         Msg::Place(place) => model.place = Some(*place),
-        Msg::Book { head, is_signed } => book::on_head(model, head, is_signed),
-        Msg::SignAsked { step, void, by } => checklist::sign(model, (step, void), &by, now),
-        Msg::SignRefused(why) => checklist::on_refused(model, protocol::text::printable(why.as_bytes()), now),
+        Msg::Book { head, is_signed } => vehicle_changes::on_head(model, head, is_signed),
+        Msg::SignAsked { step, void, by } => pad::sign(model, (step, void), &by, now),
+        Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
@@ -215,7 +205,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     }
     vehicle_changes::watch_approach(model, now);
     alarms::watch(model, now);
-    callouts::watch(model, now);
+    alarms::call_out(model, now);
     std::mem::take(&mut model.outbox)
 }
 
@@ -270,4 +260,78 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
         _ => None,
     };
     model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
+}
+
+// After the flight: the flight again on this screen, its report, and the log that the vehicle has written itself.
+
+/// Why neither is possible now.
+fn why_nothing_flown(model: &Model) -> Option<&'static str> {
+    if model.settings.role == Role::Replaying {
+        return Some("this is a replay");
+    }
+    if model.is_at_risk() {
+        return Some("the vehicle is armed or in flight");
+    }
+    if model.settings.log_path.is_none() {
+        return Some("there is no log (--log none)");
+    }
+    (!model.outcome.started).then_some("no flight has been flown yet")
+}
+
+pub(super) fn replay_flight(model: &mut Model, now: Duration) {
+    match why_nothing_flown(model) {
+        None => model.outbox.push(Action::ReplayFlight),
+        Some(why) => model.info(now, format!("no replay: {why}")),
+    }
+}
+
+/// Has the report written, by the station.
+pub(super) fn write_report(model: &mut Model, now: Duration) {
+    match (why_nothing_flown(model), model.settings.role) {
+        (Some(why), _) => model.info(now, format!("no report: {why}")),
+        (None, Role::Attached) => model.outbox.push(Action::Request(Request::Report)),
+        (None, Role::Station) => {
+            model.info(now, "the report is being written");
+            model.outbox.push(Action::WriteReport);
+        }
+        (None, Role::Watching | Role::Replaying) => model.info(now, "no report: this screen only watches"),
+    }
+}
+
+/// The report is written, or is not.
+pub(super) fn on_report(model: &mut Model, written: Result<String, String>, now: Duration) {
+    match written {
+        Ok(path) => model.info(now, format!("the report is written: {path}")),
+        Err(why) => model.warn(now, format!("the report is not written: {why}")),
+    }
+}
+
+/// Has the vehicle's own log fetched, by the station. Whether it gives it out is the vehicle's decision; this one only
+/// spares a vehicle in flight the question.
+pub(super) fn fetch_log(model: &mut Model, now: Duration) {
+    let why = match model.settings.role {
+        Role::Replaying => Some("this is a replay"),
+        Role::Watching => Some("this screen only watches"),
+        Role::Station | Role::Attached if model.is_at_risk() => Some("the vehicle is armed or in flight"),
+        Role::Station | Role::Attached if model.vehicle.heartbeat.is_none() => {
+            Some("no vehicle has been heard")
+        }
+        Role::Station | Role::Attached => None,
+    };
+    match (why, model.settings.role) {
+        (Some(why), _) => model.info(now, format!("no download: {why}")),
+        (None, Role::Attached) => model.outbox.push(Action::Request(Request::Download)),
+        (None, _) => {
+            model.info(now, "the vehicle is asked for its log");
+            model.outbox.push(Action::FetchLog);
+        }
+    }
+}
+
+/// The log is on its way, is here, or does not come.
+pub(super) fn on_download(model: &mut Model, told: Result<String, String>, now: Duration) {
+    match told {
+        Ok(words) => model.info(now, words),
+        Err(why) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
+    }
 }

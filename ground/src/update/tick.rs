@@ -8,12 +8,12 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, auto, book, callouts, commands, crew, frames, keys, pad_check, place};
+use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
 use crate::model::dialog::Dialog;
-use crate::model::events::Speaker;
-use crate::model::link_state::LinkState;
+use crate::model::link::LinkState;
+use crate::model::log::Speaker;
 use crate::model::vehicle::{Deflection, is_on_pad};
-use crate::model::{Model, Role, trace, unheard};
+use crate::model::{Model, Role, history, link};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 /// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
@@ -54,25 +54,25 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
     note_loss(model, now);
     if !model.link.unheard_reported
-        && let Some(hints) = unheard::hints(model, now)
+        && let Some(hints) = link::unheard_hints(model, now)
     {
         model.link.unheard_reported = true;
         model.warn(now, hints.join(" "));
     }
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
-    trace::note(model, now);
+    history::note_trace(model, now);
     if model.vehicle.in_flight() || model.vehicle.countdown_s().is_some() {
         model.recall.note(&model.vehicle, now);
     }
-    callouts::ring(model);
-    auto::step(model, now);
+    alarms::ring_bells(model);
+    commands::step_auto(model, now);
     commands::poll(model, now);
     commands::observe(model, now);
-    crew::step(model, now);
-    pad_check::pass(model, now);
-    book::pass(model, now);
-    place::pass(model, now);
+    commands::hold_if_unattended(model, now);
+    pad::pass_range_test(model, now);
+    vehicle_changes::send_book_end(model, now);
+    keep_place(model, now);
     if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
         let telemetry = telemetry_record(model, now);
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));
@@ -194,5 +194,24 @@ fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
         link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
         link_loss: model.link.loss(now),
         link_rx_bytes_s: Some(link.rx_bytes_s),
+    }
+}
+
+// Follows the last place of the vehicle, and has it kept, so that a lost vehicle can be found also after a restart.
+
+/// How often it is kept in flight.
+const KEPT_EVERY: Duration = Duration::from_secs(2);
+
+pub(super) fn keep_place(model: &mut Model, now: Duration) {
+    if model.place_due.is_some_and(|due| now < due) {
+        return;
+    }
+    model.place_due = Some(now + KEPT_EVERY);
+    let Some(place) = model.last_place(now).filter(|place| model.place.as_ref() != Some(place)) else {
+        return;
+    };
+    model.place = Some(place);
+    if model.settings.role == Role::Station {
+        model.outbox.push(Action::KeepPlace(Box::new(place)));
     }
 }

@@ -1,23 +1,23 @@
-//! Reports changes of the vehicle's state as events, and updates the outcome of the flight.
+//! Reports changes of the vehicle's state as events and in the book, and updates the outcome of the flight.
 
 use std::time::Duration;
 
-use protocol::dialect::{TdHold, TdPhase};
+use protocol::book::SignedHead;
+use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TdAct, TdHold, TdPhase};
+use protocol::identity::Address;
 use protocol::log::record::EventLevel;
+use protocol::mission::MissionHash;
 
-use super::{Action, checklist, commands};
+use super::{Action, commands, pad};
 use crate::model::command::is_aborted;
 use crate::model::dialog::{Dialog, RestOfWord};
-use crate::model::ending::Ending;
-use crate::model::events::Speaker;
-use crate::model::flight_so_far::FlightSoFar;
-use crate::model::flown_path::FlownPath;
 use crate::model::history::{History, Maxima};
-use crate::model::motor::{Approach, Danger, KeepAway, hold_words};
-use crate::model::parameters::Parameters;
-use crate::model::uplink::Uplink;
-use crate::model::vehicle::{Vehicle, Verdict, is_flight, is_on_pad};
-use crate::model::{Model, latch, words};
+use crate::model::link::Uplink;
+use crate::model::log::Speaker;
+use crate::model::motion::FlownPath;
+use crate::model::safety::{Approach, Danger, Ending, KeepAway, hold_words};
+use crate::model::vehicle::{Parameters, Vehicle, Verdict, is_flight, is_on_pad};
+use crate::model::{FlightSoFar, Model, safety, words};
 
 /// The part of the vehicle's state whose changes are reported.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -90,7 +90,7 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
     }
     if after.aborted && !before.aborted {
         model.outcome.aborted_at = Some(now);
-        let words = latch::words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
+        let words = safety::latch_words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
         model.say(now, Speaker::Ground, EventLevel::Error, format!("the vehicle says {words}"));
         model.outbox.push(Action::SyncLog);
     }
@@ -142,7 +142,7 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
             model.vehicle.burn = FlownPath::default();
         }
         model.outcome.started = true;
-        checklist::on_liftoff(model, now);
+        pad::reopen_checklist(model, now);
     }
     if phase == TdPhase::TD_PHASE_SAFED {
         model.outcome.safed_at = Some(now);
@@ -157,4 +157,103 @@ fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
     model.outcome.started = true;
     model.outcome.verdict = Some((verdict.landed, now));
     model.outbox.push(Action::SyncLog);
+}
+
+// Tells the vehicle the end of the station's book until it has confirmed it, and enters what the vehicle says of its
+// crew.
+
+/// How often the end is sent at most.
+const SENT_EVERY: Duration = Duration::from_secs(2);
+
+/// The station has signed a new end.
+pub(super) fn on_head(model: &mut Model, head: SignedHead, is_signed: bool) {
+    (model.book.head, model.book.is_signed) = (Some(head), is_signed);
+}
+
+/// Sends the end again while the vehicle is heard and has not confirmed it.
+pub(super) fn send_book_end(model: &mut Model, now: Duration) {
+    let Some(head) = model.book.head.filter(|signed| signed.head.entries > model.book.kept) else { return };
+    let due = model.book.sent_at.is_none_or(|at| now.saturating_sub(at) >= SENT_EVERY);
+    if due && model.link.state(now).carries() {
+        model.book.sent_at = Some(now);
+        let message = head.message(model.settings.vehicle);
+        model.outbox.push(Action::send(MavMessage::TD_BOOK_HEAD(message)));
+    }
+}
+
+pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
+    let target = Address { system_id: kept.target_system, component_id: kept.target_component };
+    let ours = model
+        .book
+        .head
+        .is_some_and(|signed| signed.head.book == kept.book && kept.entries <= signed.head.entries);
+    if model.settings.us.accepts(target) && ours {
+        model.book.kept = model.book.kept.max(kept.entries);
+    }
+}
+
+/// A vehicle that was switched on again has a new log, which keeps nothing yet.
+pub(super) fn forget_kept(model: &mut Model) {
+    model.book.kept = 0;
+}
+
+/// What the vehicle says of its crew and its mission, as far as the book has it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CrewTold {
+    people: u8,
+    ask: Option<(TdAct, u16, u8)>,
+    tapped_by: u8,
+    commanded_by: u8,
+    held_by: u8,
+    mission: Option<(MissionHash, String)>,
+}
+
+impl CrewTold {
+    pub(super) fn of(model: &Model) -> Self {
+        let crew = model.vehicle.crew.as_ref().map(|crew| &crew.value);
+        Self {
+            people: crew.map_or(0, |crew| crew.people),
+            ask: crew
+                .filter(|crew| crew.act != TdAct::TD_ACT_NONE)
+                .map(|crew| (crew.act, crew.ask_number, crew.asked_by)),
+            tapped_by: crew.map_or(0, |crew| crew.tapped_by),
+            commanded_by: crew.map_or(0, |crew| crew.commanded_by),
+            held_by: crew.map_or(0, |crew| crew.held_by),
+            mission: model.vehicle.mission.clone(),
+        }
+    }
+}
+
+/// Enters what has changed.
+pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewTold) {
+    let after = CrewTold::of(model);
+    if after == *before {
+        return;
+    }
+    let mut lines: Vec<(u8, String)> = Vec::new();
+    if after.people != before.people {
+        lines.push((0, format!("an arming and a start take {} of the crew", after.people)));
+    }
+    if let Some((act, number, by)) = after.ask.filter(|_| after.ask != before.ask) {
+        let act = if act == TdAct::TD_ACT_START { "start" } else { "arm" };
+        lines.push((by, format!("asks to {act} (ask {number})")));
+    }
+    let roles = [
+        (after.commanded_by, before.commanded_by, "is in command"),
+        (after.tapped_by, before.tapped_by, "confirmed the start and taps"),
+        (after.held_by, before.held_by, "held the countdown"),
+    ];
+    for (after, before, words) in roles {
+        if after != before && after > 0 {
+            lines.push((after, words.to_owned()));
+        }
+    }
+    if let Some((hash, name)) = after.mission.filter(|mission| before.mission.as_ref() != Some(mission)) {
+        lines.push((0, format!("it flies the mission {name} {hash}")));
+    }
+    for (by, words) in lines {
+        let who = if by > 0 { model.operator(by) } else { String::new() };
+        let text = if by > 0 { format!("key {by}: {words}") } else { words };
+        model.enter("vehicle says", &who, &text);
+    }
 }

@@ -1,31 +1,35 @@
-//! The text of the open dialog, and its box.
+//! The text of the open dialog, and its box; the box of the palette.
 
 use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdRole};
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::text::Line;
+use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
-use crate::model::act::Act;
+use crate::model::act::{Act, palette_entries};
+use crate::model::command::why_not_here;
+use crate::model::crew::role_name;
 use crate::model::dialog::{
     ABORT_WORD, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD, WITHOUT_LOG_WORD,
 };
-use crate::model::foreign::Foreign;
+use crate::model::identity::Foreign;
 use crate::model::pad_check::PadCheck;
-use crate::model::permits::why_not_here;
-use crate::model::two_person::role_name;
-use crate::model::words;
-use crate::model::{Model, Role};
+use crate::model::page::TextEntry;
+use crate::model::{Model, Role, words};
 
 const BOX_COLUMNS: u16 = 68;
 const ANY_OTHER_KEY: &str = "Any other key cancels. Nothing is sent before Enter.";
 
 /// Title and lines of the open dialog; `None` if none is open.
-pub fn lines(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
+pub fn dialog_lines(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+) -> Option<(&'static str, Vec<Line<'static>>)> {
     let left = model.dialog.until().map_or(0.0, |until| until.saturating_sub(now).as_secs_f64());
     let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
     let strong = |text: String| Line::styled(text, theme.style(TextRole::Caution));
@@ -263,8 +267,8 @@ fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
 }
 
 /// Draws the open dialog in the middle of an area.
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let Some((title, lines)) = lines(model, theme, now) else { return };
+pub fn draw_dialog(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let Some((title, lines)) = dialog_lines(model, theme, now) else { return };
     let width = BOX_COLUMNS.min(area.width);
     let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(2).min(area.height);
     // A notice leaves the middle of the page free.
@@ -279,4 +283,52 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     frame.render_widget(block, at);
     let padded = Rect { x: inside.x + 1, width: inside.width.saturating_sub(2), ..inside };
     draw_lines(frame, padded, &lines);
+}
+
+// The box of the palette: the typed text, and the actions found with their keys.
+
+const PALETTE_COLUMNS: u16 = 74;
+/// Rows around the list: the border, and the line of the typed text.
+const FRAME_ROWS: u16 = 3;
+/// Columns of a key.
+const KEY_COLUMNS: usize = 7;
+
+pub fn draw_palette(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
+    if !matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
+        return;
+    }
+    let width = PALETTE_COLUMNS.min(area.width);
+    let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
+    let block = Block::bordered().title(Line::styled(" Every action ", theme.style(TextRole::Title)));
+    let inside = block.inner(at);
+    frame.render_widget(Clear, at);
+    frame.buffer_mut().set_style(at, theme.ground());
+    frame.render_widget(block, at);
+    draw_lines(
+        frame,
+        inside,
+        &palette_lines(model, theme, usize::from(at.height.saturating_sub(FRAME_ROWS))),
+    );
+}
+
+/// The typed text and this many of the actions found, the marked one among them. Empty while it is closed.
+pub fn palette_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
+    let Some(TextEntry::Palette { typed, chosen }) = &model.pages.entry else { return Vec::new() };
+    let entries = palette_entries(model, typed);
+    let head = Line::from(vec![
+        Span::styled(format!(" :{typed}_"), theme.style(TextRole::Key)),
+        Span::styled(
+            format!("   {} found; Up Down choose, Enter does it, Esc closes", entries.len()),
+            theme.style(TextRole::Label),
+        ),
+    ]);
+    let start = (chosen + 1).saturating_sub(rows);
+    let list = entries.iter().enumerate().skip(start).take(rows).map(|(place, entry)| {
+        let (mark, role) = if place == *chosen { (">", TextRole::Key) } else { (" ", TextRole::Plain) };
+        Line::from(vec![
+            Span::styled(format!("{mark}{:<KEY_COLUMNS$}", entry.key), theme.style(TextRole::Key)),
+            Span::styled(entry.words.clone(), theme.style(role)),
+        ])
+    });
+    std::iter::once(head).chain(list).collect()
 }

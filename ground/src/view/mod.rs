@@ -1,54 +1,34 @@
 //! Draws the screen: one pure function from the model and the time to a frame.
 //!
-//! Every page has the same frame: [`identity`] is the first line, [`top_lines`] follow (phase, armed, countdown,
-//! link, what an abort would do), and [`alarm_line`] and the page names are at the bottom. [`pages`] has one module
-//! per page; the other modules are panels and helpers of the pages. From 80x22 on, [`wide`] lays the panels out side
-//! by side; on smaller terminals [`compact`] shows plain lines, the most important first. For terminals without
-//! Unicode, [`ascii`] converts the result.
+//! Every page has the same frame: [`top_lines`] (identity, phase, armed, countdown, link, what an abort would do), the
+//! page, and [`status_lines`] and the page names at the bottom. [`pages`] has the pages; [`panels`], [`pictures`],
+//! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
+//! there are plain lines, the most important first. For terminals without Unicode, [`theme`] converts the result.
 
-pub mod actuators;
-pub mod alarm_line;
-pub mod ascii;
-pub mod banner;
-pub mod checklist;
-pub mod compact;
-pub mod controller;
 pub mod dialog;
-pub mod event_list;
-pub mod filter;
-pub mod fins;
-pub mod flight;
-pub mod flight_bar;
-pub mod foremost;
-pub mod gauge;
 pub mod headline;
-pub mod identity;
-pub mod limit_bar;
-pub mod limit_rows;
-pub mod link_line;
-pub mod lost_position;
-pub mod next_event;
-pub mod number;
+pub mod lists;
 pub mod pages;
-pub mod palette;
-pub mod pins;
-pub mod side_view;
-pub mod sparkline;
+pub mod panels;
+pub mod pictures;
+pub mod status_lines;
 pub mod theme;
-pub mod ticks;
 pub mod top_lines;
-pub mod top_view;
-pub mod touchdown;
-pub mod wide;
+pub mod widgets;
 
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
-use ratatui::text::Line;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Wrap};
 
 use crate::model::Model;
-use theme::Theme;
+use crate::model::act::Act;
+use crate::model::command::CommandKind;
+use crate::model::history::LookBack;
+use crate::model::page::{Page, TextEntry};
+use theme::{TextRole, Theme};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;
@@ -58,12 +38,12 @@ pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
     let area = frame.area();
     frame.buffer_mut().set_style(area, theme.ground());
     if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
-        wide::draw(model, theme, now, frame, area);
+        draw_wide(model, theme, now, frame, area);
     } else {
-        compact::draw(model, theme, now, frame, area);
+        draw_compact(model, theme, now, frame, area);
     }
     if theme.ascii {
-        ascii::flatten(frame.buffer_mut());
+        theme::flatten(frame.buffer_mut());
     }
 }
 
@@ -88,4 +68,180 @@ fn draw_lines(frame: &mut Frame, area: Rect, lines: &[Line]) {
 /// Draws one line.
 fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
     draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
+}
+
+// The layout from 80x22 on: identity, top lines, pinned numbers, the page, the bar of the flight, the alarm line, the
+// page names.
+
+/// From this width on every page is named; below, those with a letter are not.
+const EVERY_NAME_COLUMNS: u16 = 100;
+
+pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let bar_rows = u16::from(status_lines::shows_flight_bar(model));
+    // The top lines, dialogs and the alarm line always show the present.
+    let past = model.past();
+    let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
+    let past_rows = u16::from(past.is_some());
+    let pinned_rows = u16::from(!model.pages.pinned.is_empty());
+    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] =
+        area.layout(&Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+            Constraint::Length(past_rows),
+            Constraint::Length(pinned_rows),
+            Constraint::Fill(1),
+            Constraint::Length(bar_rows),
+            Constraint::Length(1),
+            Constraint::Length(1),
+        ]));
+    top_lines::draw_identity(model, theme, now, frame, identity);
+    draw_status(model, theme, now, frame, status);
+    draw_line(frame, abort, top_lines::abort(model, theme, now));
+    draw_line(frame, command, top_lines::command(model, theme, now));
+    if let Some(looks) = model.look_back.filter(|_| past.is_some()) {
+        draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
+    }
+    draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
+    // Also over the past: whether people may approach is a matter of the present.
+    let body =
+        headline::banner(model, now).map_or(body, |words| headline::draw_banner(&words, theme, frame, body));
+    pages::draw(shown, theme, shown_at, frame, body);
+    status_lines::draw_flight_bar(model, theme, (now, shown_at), frame, bar);
+    status_lines::draw_alarm_line(model, theme, now, frame, alarm);
+    draw_line(frame, names, names_line(model, theme, names.width));
+    dialog::draw_palette(model, theme, frame, body);
+    dialog::draw_dialog(model, theme, now, frame, body);
+}
+
+fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [phase, armed, countdown, link, abort] = area.layout(&Layout::horizontal([
+        Constraint::Length(14),
+        Constraint::Length(11),
+        Constraint::Length(11),
+        Constraint::Fill(1),
+        Constraint::Length(20),
+    ]));
+    draw_line(frame, phase, top_lines::phase(model, theme, now).into());
+    draw_line(frame, armed, top_lines::armed(model, theme, now).into());
+    draw_line(frame, countdown, top_lines::countdown(model, theme, now).into());
+    draw_line(frame, link, top_lines::link(model, theme, now));
+    draw_line(frame, abort, Line::styled(top_lines::abort_key(model), theme.style(TextRole::Key)));
+}
+
+/// Says that the page shows the past, and for how long.
+fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -> Line<'static> {
+    let ago_s = now.saturating_sub(shown_at).as_secs_f64();
+    let left_s = looks.until.saturating_sub(now).as_secs();
+    let words = format!(
+        " PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move"
+    );
+    Line::styled(words, theme.style(TextRole::Alarm))
+}
+
+/// Keys and names of the pages, the shown one in brackets, and whether it is held.
+fn names_line(model: &Model, theme: Theme, columns: u16) -> Line<'static> {
+    let shown = model.page();
+    let every = columns >= EVERY_NAME_COLUMNS;
+    let lettered = Page::LETTERED.contains(&shown);
+    let mut spans = Vec::new();
+    for page in Page::all() {
+        let is_shown = page == shown.keyed();
+        if !every && !is_shown && Page::LETTERED.contains(&page) {
+            continue;
+        }
+        let (left, right, role) =
+            if is_shown { ("[", "]", TextRole::Key) } else { (" ", "", TextRole::Label) };
+        // Ascent and descent share a key.
+        let name = if is_shown { shown.name() } else { page.name() };
+        let key = model.settings.keys.name(Act::Show(page));
+        spans.push(Span::styled(format!("{left}{key}{name}{right}"), theme.style(role)));
+    }
+    if every || !lettered {
+        let key = model.settings.keys.name(Act::Palette);
+        spans.push(Span::styled(format!(" {key}more"), theme.style(TextRole::Label)));
+    }
+    let (word, role) = match model.pages.held {
+        Some(_) if every || !lettered => (" HELD 0", TextRole::Caution),
+        Some(_) => (" HELD", TextRole::Caution),
+        None => (" auto", TextRole::Good),
+    };
+    spans.push(Span::styled(word, theme.style(role)));
+    Line::from(spans)
+}
+
+// The layout for terminals smaller than 80x22: plain lines, the most important first.
+
+/// With fewer rows an open dialog replaces the line of countdown and link.
+const DIALOG_ROWS: u16 = 8;
+/// From this many rows on, the page name has a line of its own.
+const NAMED_ROWS: u16 = 10;
+
+/// Draws the lines that fit.
+pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let mut lines = vec![top_lines::identity_line(model, theme, now)];
+    lines.extend(
+        headline::banner(model, now)
+            .map(|words| Line::styled(format!(" {}", words.sentence()), theme.style(words.role))),
+    );
+    lines.push(Line::from(vec![
+        top_lines::phase(model, theme, now),
+        Span::raw(" "),
+        top_lines::armed(model, theme, now),
+    ]));
+    let open = dialog::dialog_lines(model, theme, now);
+    if open.is_none() || area.height >= DIALOG_ROWS {
+        let mut line = vec![top_lines::countdown(model, theme, now), Span::raw(" ")];
+        let link = top_lines::link(model, theme, now);
+        line.extend(link.spans.into_iter().map(|span| span.patch_style(link.style)));
+        lines.push(Line::from(line));
+    }
+    lines.push(compact_abort(model, theme, now));
+    if let Some((_, text)) = open {
+        draw_lines(frame, area, &lines);
+        let fixed = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(area.height);
+        let below = Rect { y: area.y + fixed, height: area.height - fixed, ..area };
+        frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), below);
+        return;
+    }
+    lines.extend(top_lines::hands_off(model, theme, now));
+    lines.extend(status_lines::next_event_line(model, theme, now));
+    lines.extend(model.playing.as_ref().map(|playing| status_lines::replay_line(playing, theme)));
+    if model.playing.is_none() {
+        lines.extend(status_lines::alarm_text(model, theme, now, usize::from(area.width)));
+    }
+    let page = model.page();
+    let named = u16::from(area.height >= NAMED_ROWS);
+    let taken = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(named);
+    let room = Rect { height: area.height.saturating_sub(taken), ..area };
+    let mut body = pages::lines(model, page, theme, now, room);
+    body.truncate(usize::from(room.height));
+    lines.extend(if matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
+        dialog::palette_lines(model, theme, usize::from(room.height).saturating_sub(1))
+    } else {
+        body
+    });
+    draw_lines(frame, area, &lines);
+    if named > 0 {
+        let held = if model.pages.held.is_some() { "HELD, 0 follows" } else { "auto" };
+        let key = model.settings.keys.name(Act::Show(page.keyed()));
+        let text = format!(" [{key}{}] 1-9 {held}  ? help", page.name());
+        let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
+        frame.render_widget(Line::styled(text, theme.style(TextRole::Label)), last);
+    }
+}
+
+fn compact_abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let line = top_lines::abort(model, theme, now);
+    if model.abort_chord.is_begun(now) || model.link.abort_unsent {
+        return line;
+    }
+    if let Some(track) = model.commands.of(CommandKind::Abort) {
+        return top_lines::command_facts_short(track, theme, now);
+    }
+    let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
+    let mut spans = vec![Span::styled(key, theme.style(TextRole::Key))];
+    spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
+    Line::from(spans)
 }

@@ -1,7 +1,7 @@
 //! What is entered into the station's book, and how the vehicle is told its end.
 
 use ground::key::Key;
-use ground::model::action::BookLine;
+use ground::model::BookLine;
 use ground::update::{Action, Msg};
 use protocol::book::{Book, Line, SignedHead};
 use protocol::dialect::{

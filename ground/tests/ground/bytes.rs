@@ -8,7 +8,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use flight::computer::LogState;
-use ground::app::pace::Pace;
+use ground::app::screen::Pace;
 use ground::model::Model;
 use ground::update::{Action, Msg, update};
 use ground::view::theme::{Palette, Theme};

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use ground::checklist_file::parse;
 use ground::key::Key;
+use ground::model::checklist::parse_checklist;
 use ground::model::checklist::{Checklist, ChecklistEntry, Mark};
-use ground::model::seat::Seat;
+use ground::model::crew::Seat;
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg, Request};
 use ground::view::theme::{Palette, Theme};
@@ -42,7 +42,7 @@ fn station(list: &str, role: Role) -> Rig {
         start_unix_s: 1_800_000_000,
         ..settings(false, true)
     });
-    rig.msg(Msg::Checklist(Box::new(parse(list).expect("a checklist"))));
+    rig.msg(Msg::Checklist(Box::new(parse_checklist(list).expect("a checklist"))));
     rig.run(1.0);
     upright(&mut rig, 90.0);
     rig
@@ -179,7 +179,7 @@ fn the_example_crew_can_finish_both_example_checklists() {
 }
 
 fn list_of(text: &str) -> Checklist {
-    parse(text).expect("a checklist")
+    parse_checklist(text).expect("a checklist")
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use ground::key::Key;
 use ground::model::Settings;
 use ground::model::command::CommandKind;
-use ground::model::seat::Seat;
+use ground::model::crew::Seat;
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdPhase};
 use protocol::log::record::Record;

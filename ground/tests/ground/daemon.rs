@@ -8,9 +8,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use ground::attach::codec::{decode_to_screen, encode_to_station, length};
-use ground::attach::message::{ToScreen, ToStation};
+use ground::attach::{ToScreen, ToStation};
 use ground::model::command::{CommandKind, TrackedCommand};
-use ground::model::seat::Seat;
+use ground::model::crew::Seat;
 use ground::model::{Model, Role, Settings};
 use ground::update::Request;
 use ground::update::{Msg, update};

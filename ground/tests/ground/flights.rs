@@ -7,7 +7,7 @@ use flight::computer::crew::{Asked, Request};
 use ground::model::Model;
 use ground::model::dead_reckoning::{Basis, PredictedPosition, predict_position};
 use ground::update::{Msg, update};
-use ground::view::next_event;
+use ground::view::status_lines;
 use protocol::dialect::{TdChute, TdPhase};
 use protocol::frame::Frame;
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
@@ -122,7 +122,7 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
                 continue;
             }
             carried_since.get_or_insert(now);
-            let line = next_event::line(&model, MONO, now).expect("it flies").to_string();
+            let line = status_lines::next_event_line(&model, MONO, now).expect("it flies").to_string();
             let (_, rest) = line.split_once("the ground in ").unwrap_or_else(|| panic!("{line}"));
             let told_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
             let flown_s = down.saturating_sub(now).as_secs_f64();

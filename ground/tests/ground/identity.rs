@@ -1,7 +1,7 @@
 //! Who commands, which boot of which vehicle, and whether people may approach it.
 
 use ground::key::Key;
-use ground::model::seat::Seat;
+use ground::model::crew::Seat;
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg};
 use protocol::dialect::{

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::Role;
-use ground::model::chord::ABORT_TIME_LIMIT;
 use ground::model::command::CommandKind;
+use ground::model::dialog::ABORT_TIME_LIMIT;
 use ground::update::{Action, Msg, Request};
 use proptest::prelude::*;
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};

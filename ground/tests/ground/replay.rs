@@ -7,7 +7,7 @@ use std::time::Duration;
 use ground::key::Key;
 use ground::model::page::Page;
 use ground::model::{Role, Settings};
-use ground::replay::player::Player;
+use ground::replay::Player;
 use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
 use ground::view::view;

@@ -1,9 +1,9 @@
 //! The station's own log as a check of its own.
 
 use ground::key::Key;
+use ground::model::crew::Seat;
 use ground::model::dialog::Dialog;
-use ground::model::seat::Seat;
-use ground::model::station_log::{LogFault, LogHealth, LogSpace, LogStanding};
+use ground::model::log::{LogFault, LogHealth, LogSpace, LogStanding};
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::log::record::Record;

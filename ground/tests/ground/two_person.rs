@@ -2,8 +2,8 @@
 
 use ground::key::Key;
 use ground::model::Settings;
-use ground::model::seat::Seat;
-use ground::model::two_person::KeyOwner;
+use ground::model::crew::KeyOwner;
+use ground::model::crew::Seat;
 use ground::update::Msg;
 use protocol::dialect::{
     COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult, TD_CREW_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TdAct,

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::command::CommandKind;
-use ground::model::seat::Seat;
-use ground::model::two_person::KeyOwner;
+use ground::model::crew::KeyOwner;
+use ground::model::crew::Seat;
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{

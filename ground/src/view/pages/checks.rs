@@ -1,4 +1,5 @@
-//! The page of the checks on the pad: every value with its limits, the radio range test, battery and storage.
+//! The page of the checks on the pad (every value with its limits, the radio range test, battery and storage), and the
+//! page that helps to find the vehicle.
 
 use std::time::Duration;
 
@@ -7,10 +8,13 @@ use ratatui::text::{Line, Span};
 
 use crate::model::Model;
 use crate::model::act::Act;
-use crate::model::pad_check::{CheckedValue, PadCheck, Standing, standing};
-use crate::model::range_test::{LOSS_MOST, MARGIN_LEAST_DB, RangeFound, RangeTest};
-use crate::view::number::{fixed, seconds};
+use crate::model::dead_reckoning::may_have_left;
+use crate::model::pad_check::{
+    CheckedValue, LOSS_MOST, MARGIN_LEAST_DB, PadCheck, RangeFound, RangeTest, Standing, standing,
+};
+use crate::model::place::{LastPlace, Spot};
 use crate::view::theme::{TextRole, Theme};
+use crate::view::widgets::{fixed, seconds};
 
 /// The surfaces, by the number of their first item.
 const SURFACES: [(&str, u32); 6] =
@@ -19,7 +23,7 @@ const SURFACES: [(&str, u32); 6] =
 const VALUE_COLUMNS: usize = 39;
 
 /// How the check stands, its values, the radio.
-pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let check = model.vehicle.pad_check.as_ref();
     let mut lines = vec![headline(model, check, theme, now), supply(model, theme)];
     lines.push(Line::styled(
@@ -205,4 +209,97 @@ fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> 
         None => spans.push(Span::styled(" no margin told", theme.style(TextRole::Label))),
     }
     Line::from(spans)
+}
+
+// The page that helps to find the vehicle: where it was last heard, where it is predicted, and the way there.
+
+/// The places and the ways to them.
+pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let place = model.last_place(now).or(model.place);
+    let label = |words: &'static str| Line::styled(words, theme.style(TextRole::Label));
+    if let Some(since) = may_have_left(&model.vehicle, now) {
+        return may_have_left_lines(model, since, theme);
+    }
+    let Some(place) = place else {
+        if model.vehicle.left_pad_at.is_some() {
+            return vec![Line::styled(
+                " The vehicle has left the pad, and has not told its place.",
+                theme.style(TextRole::Caution),
+            )];
+        }
+        return vec![
+            label(" The vehicle has not left the pad."),
+            label(" In flight its last place is kept beside the log, for maps"),
+            label(" (GeoJSON, and KML with --pad)."),
+        ];
+    };
+    let now_unix_s = model.settings.start_unix_s + now.as_secs();
+    let mut lines = Vec::new();
+    if let Some(predicted) = &place.predicted {
+        lines.push(Line::styled(" PREDICTED: look here first", theme.style(TextRole::Caution)));
+        lines.extend(spot(model, &place, predicted, theme));
+        lines.push(Line::default());
+    }
+    lines.push(Line::styled(" Last heard", theme.style(TextRole::Title)));
+    lines.extend(spot(model, &place, &place.heard, theme));
+    lines.push(row("height then", format!("{} m", fixed(place.height_m, 1)), theme));
+    let ago = now_unix_s.saturating_sub(place.heard_unix_s);
+    lines.push(row("heard", format!("{ago} s ago, boot {:08X}", place.boot), theme));
+    lines.push(Line::default());
+    if place.pad.is_none() {
+        let words = " Latitude, longitude and KML need the pad's place: --pad LATITUDE,LONGITUDE";
+        lines.push(Line::styled(words, theme.style(TextRole::Label)));
+    } else if model.settings.here.is_none() {
+        let words = " The way from this station needs its place: --here LATITUDE,LONGITUDE";
+        lines.push(Line::styled(words, theme.style(TextRole::Label)));
+    }
+    lines
+}
+
+/// It was last heard on the pad, in a countdown that must have ended.
+fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line<'static>> {
+    let words = format!(" MAY BE IN THE AIR since T+{:.1} s", since.as_secs_f64());
+    let mut lines = vec![Line::styled(words, theme.style(TextRole::Alarm))];
+    let Some(meant) = model.meant_to_come_down() else {
+        let words = " It has not told the fence of its mission: look around the pad.";
+        lines.push(Line::styled(words, theme.style(TextRole::Caution)));
+        return lines;
+    };
+    let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
+    lines.push(row("meant to land", format!("north {north} m, east {east} m of the pad"), theme));
+    lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
+    if let Some(at) = model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)) {
+        lines.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
+    }
+    let words = " Under a parachute, or without its landing motor, it may come down farther away.";
+    lines.push(Line::styled(words, theme.style(TextRole::Caution)));
+    lines
+}
+
+fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
+    Line::from(vec![
+        Span::styled(format!("   {label:<16}"), theme.style(TextRole::Label)),
+        Span::styled(value, theme.style(TextRole::Plain)),
+    ])
+}
+
+fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {
+    let way = place.way(spot, model.settings.here);
+    let from = if way.from_station { "from here" } else { "from the pad" };
+    // 359.6 is 000, as on a compass.
+    let bearing_deg = way.bearing_deg.round() as u32 % 360;
+    let plus_minus = theme.either_side(&format!("±{} m", fixed(spot.error_m, 0)));
+    let mut rows = vec![
+        row(from, format!("{} m, bearing {bearing_deg:03} deg", fixed(way.distance_m, 0)), theme),
+        row(
+            "pad frame",
+            format!("north {} m, east {} m", fixed(spot.north_m, 1), fixed(spot.east_m, 1)),
+            theme,
+        ),
+        row("19 of 20 cases", plus_minus, theme),
+    ];
+    if let Some(at) = place.degrees(spot) {
+        rows.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
+    }
+    rows
 }

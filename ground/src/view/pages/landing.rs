@@ -1,4 +1,4 @@
-//! The landing page: flight, controller, touchdown, actuators, events and side view.
+//! The landing page (flight, controller, touchdown, actuators, events and side view) and the review page after it.
 
 use std::time::Duration;
 
@@ -6,16 +6,14 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::{is_roomy, titled};
-use crate::model::Model;
+use super::{is_roomy, plots, titled};
+use crate::model::link::RED_AFTER;
 use crate::model::motion::{BodySpeed, Motion};
 use crate::model::vehicle::Sample;
-use crate::view::number::{STALE_MARK, fixed, row};
+use crate::model::{Model, words};
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{
-    actuators, controller, draw_lines, event_list, flight, foremost, headline, link_line, lost_position,
-    side_view, top_lines, touchdown,
-};
+use crate::view::widgets::{STALE_MARK, fixed, row};
+use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};
 
 /// Rows of the panels, with their title.
 const PANEL_ROWS: u16 = 9;
@@ -30,14 +28,14 @@ const TALL_ROWS: u16 = 24;
 const FIN_ROWS: u16 = 5;
 
 /// Draws the headline, the panels, the events and the side view.
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let first = if model.vehicle.verdict.is_some() {
-        foremost::verdict(model, now)
+        headline::verdict_headline(model, now)
     } else {
-        foremost::burn(model, now)
+        headline::burn_headline(model, now)
     };
     let roomy = is_roomy(area);
-    let area = headline::draw(&first, theme, frame, area);
+    let area = headline::draw_headline(&first, theme, frame, area);
     let (left, right) = if roomy {
         let [panels, below] =
             area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS + 1), Constraint::Fill(1)]));
@@ -61,73 +59,79 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         (events, right)
     };
     let inside = titled("Events", theme, frame, left);
-    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    let lines = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
     draw_pictures(model, theme, now, frame, right);
 }
 
 fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let shows = if lost_position::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
-    for (from, title, area) in side_view::pictures(model, area) {
-        let shows = if from == side_view::Viewpoint::South { "flown" } else { shows };
+    let shows = if panels::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
+    for (from, title, area) in pictures::side_views(model, area) {
+        let shows = if from == pictures::Viewpoint::South { "flown" } else { shows };
         let whole = format!("{title}: {shows}");
         // With a blank on either side, one column and some rule.
         let title = if whole.len() + 4 > usize::from(area.width) { title.to_owned() } else { whole };
         let inside = titled(&title, theme, frame, area);
-        side_view::draw(model, (side_view::FlightPart::Burn, from), theme, now, frame, inside);
+        pictures::draw_side_view(model, (pictures::FlightPart::Burn, from), theme, now, frame, inside);
     }
 }
 
 /// Altitude, speeds and attitude; after the loss of the link the predicted position.
 fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if lost_position::is_lost(model, now) {
+    if panels::is_lost(model, now) {
         let inside = titled("PREDICTED, not heard", theme, frame, area);
-        draw_lines(frame, inside, &lost_position::rows(model, theme, now));
+        draw_lines(frame, inside, &panels::lost_rows(model, theme, now));
     } else {
         let inside = titled("Flight", theme, frame, area);
-        let mut rows = controller::rows(model, theme, now);
+        let mut rows = panels::controller_rows(model, theme, now);
         rows.truncate(1);
-        rows.extend(flight::rows(model, theme, now));
+        rows.extend(panels::flight_rows(model, theme, now));
         draw_lines(frame, inside, &rows);
     }
 }
 
 fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (title, rows) = touchdown::panel_with_bars(model, theme, now, usize::from(area.width));
+    let (title, rows) = panels::touchdown_panel_with_bars(model, theme, now, usize::from(area.width));
     let inside = titled(title, theme, frame, area);
     draw_lines(frame, inside, &rows);
 }
 
 /// Who steers, how upright, and the gimbal against its limit.
 fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if lost_position::is_lost(model, now) {
+    if panels::is_lost(model, now) {
         return draw_flight(model, theme, now, frame, area);
     }
     let inside = titled("Steering", theme, frame, area);
-    let mut lines: Vec<Line> = controller::rows(model, theme, now).into_iter().take(1).collect();
+    let mut lines: Vec<Line> = panels::controller_rows(model, theme, now).into_iter().take(1).collect();
     let vehicle = &model.vehicle;
     let tilt = vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
     lines.push(row(theme, "tilt", tilt, 2, "deg", now));
     let motion = vehicle.best_motion();
     lines.push(row(theme, "horizontal", motion.map(|m| m.map(Motion::horizontal_m_s)), 2, "m/s", now));
     lines.push(row(theme, "distance", motion.map(|m| m.map(Motion::distance_m)), 1, "m", now));
-    lines.extend(actuators::gimbal_rows(model, theme, now));
+    lines.extend(panels::gimbal_rows(model, theme, now));
     draw_lines(frame, inside, &lines);
 }
 
 fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [fins, gimbal] = area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
     let inside = titled("Fins command|actual", theme, frame, fins);
-    draw_lines(frame, inside, &actuators::fin_rows(model, theme, now));
+    draw_lines(frame, inside, &panels::fin_rows(model, theme, now));
     let inside = titled("Gimbal", theme, frame, gimbal);
-    draw_lines(frame, inside, &actuators::gimbal_rows(model, theme, now));
+    draw_lines(frame, inside, &panels::gimbal_rows(model, theme, now));
 }
 
 /// The same content as lines, the most important first.
-pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
+pub fn landing_lines(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    columns: usize,
+    rows: usize,
+) -> Vec<Line<'static>> {
     let mut lines = vec![motion(model, theme, now)];
-    if lost_position::is_lost(model, now) {
-        lines = lost_position::rows(model, theme, now);
+    if panels::is_lost(model, now) {
+        lines = panels::lost_rows(model, theme, now);
     }
     // The newest event comes before everything else.
     lines.extend(newest_event(model, theme));
@@ -136,21 +140,21 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         lines.push(top_lines::command_facts_short(track, theme, now));
     }
     lines.push(attitude(model, theme, now));
-    let (title, touchdown) = touchdown::panel(model, theme, now);
+    let (title, touchdown) = panels::touchdown_panel(model, theme, now);
     let mut verdict = Line::styled(format!(" {title}: "), theme.style(TextRole::Label));
     verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
         let style = line.style;
         line.spans.into_iter().map(move |span| span.patch_style(style))
     }));
     lines.push(verdict);
-    lines.extend(controller::rows(model, theme, now).into_iter().take(2));
+    lines.extend(panels::controller_rows(model, theme, now).into_iter().take(2));
     // For a planar vehicle command and measurement; in space one row of each gimbal plane.
-    let gimbal = actuators::gimbal_rows(model, theme, now).into_iter();
+    let gimbal = panels::gimbal_rows(model, theme, now).into_iter();
     lines.extend(gimbal.step_by(if model.vehicle.in_space { 2 } else { 1 }).take(2));
-    lines.extend(actuators::fin_rows(model, theme, now));
-    lines.push(link_line::link(model, theme, now, columns));
+    lines.extend(panels::fin_rows(model, theme, now));
+    lines.push(status_lines::link_line(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
-    lines.extend(event_list::events(model, theme, columns, room));
+    lines.extend(lists::events(model, theme, columns, room));
     lines
 }
 
@@ -200,4 +204,140 @@ fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let event = model.events.newest(1).next()?;
     Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(TextRole::Plain)))
+}
+
+// The review page after a flight: verdict, limits, greatest values and timeline.
+
+/// Columns of the predicted touchdown beside the greatest values.
+const PLAN_COLUMNS: usize = 37;
+/// Columns of the greatest values.
+const MAXIMA_COLUMNS: usize = 34;
+/// Columns of a phase with its time.
+const TIMELINE_COLUMNS: usize = 24;
+/// Rows of verdict, limits and timeline on a larger screen.
+const TABLE_ROWS: u16 = 17;
+/// Columns of them on a larger screen; the events are beside them.
+const TABLE_COLUMNS: u16 = 80;
+
+/// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
+pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let roomy = is_roomy(area);
+    let area = headline::draw_headline(&headline::verdict_headline(model, now), theme, frame, area);
+    let columns = if roomy { TABLE_COLUMNS } else { area.width };
+    let mut lines = review_lines(model, theme, now, usize::from(columns));
+    if !roomy {
+        // The bar of the flight below shows the phases too.
+        lines.truncate(usize::from(area.height));
+        return draw_lines(frame, area, &lines);
+    }
+    let [table, pictures] =
+        area.layout(&Layout::vertical([Constraint::Length(TABLE_ROWS), Constraint::Fill(1)]));
+    let [left, right] =
+        table.layout(&Layout::horizontal([Constraint::Length(TABLE_COLUMNS), Constraint::Fill(1)]));
+    draw_lines(frame, left, &lines);
+    let inside = titled("Events", theme, frame, right);
+    let events = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &events);
+    plots::draw_path(model, theme, now, frame, pictures);
+}
+
+/// The verdict, then limits and greatest values, then the timeline.
+pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let (title, mut limits) = panels::touchdown_panel_with_bars(model, theme, now, PLAN_COLUMNS);
+    if model.vehicle.verdict.is_some() {
+        // In the first line it has more room.
+        limits.pop();
+    }
+    let (words, role) = match panels::ending_role(model, now) {
+        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
+        None => ("no verdict received yet".to_owned(), TextRole::Caution),
+    };
+    let head = Line::styled(format!(" {words}"), theme.style(role));
+    limits.insert(0, Line::styled(title, theme.style(TextRole::Title)));
+    let limit_columns = PLAN_COLUMNS;
+    let mut lines = vec![head];
+    let maxima = maxima(model, theme, now);
+    if columns > limit_columns + MAXIMA_COLUMNS {
+        lines.extend(beside(limits, limit_columns + 1, maxima));
+    } else {
+        lines.extend(limits);
+        lines.extend(maxima);
+    }
+    lines.push(Line::styled(" Timeline", theme.style(TextRole::Title)));
+    lines.extend(timeline(model, theme, columns));
+    lines
+}
+
+fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -> Vec<Line<'static>> {
+    let rows = left.len().max(right.len());
+    let (mut left, mut right) = (left.into_iter(), right.into_iter());
+    (0..rows)
+        .map(|_| {
+            let line = left.next().unwrap_or_default();
+            let gap = columns.saturating_sub(line.width() + 1);
+            let mut spans = vec![Span::raw(" ")];
+            let style = line.style;
+            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            spans.push(Span::raw(" ".repeat(gap)));
+            let line = right.next().unwrap_or_default();
+            let style = line.style;
+            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            Line::from(spans)
+        })
+        .collect()
+}
+
+fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let most = &model.history.maxima;
+    let lost = most.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64());
+    // What happened in the silence is not known.
+    let title = if lost.is_some() { " Greatest values heard" } else { " Greatest values in flight" };
+    let mut lines = vec![Line::styled(title, theme.style(TextRole::Title))];
+    lines.extend(lost.map(|silence_s| {
+        let unheard = model.vehicle.in_flight() && !model.link.state(now).carries();
+        let words = if unheard {
+            " link LOST before touchdown".to_owned()
+        } else {
+            format!(" silent for {} s of the flight", fixed(silence_s, 1))
+        };
+        Line::styled(words, theme.style(TextRole::Caution))
+    }));
+    let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
+        let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
+        Line::from(vec![
+            Span::styled(format!(" {label:<18}"), theme.style(TextRole::Label)),
+            Span::styled(format!("{text:>9}"), theme.style(TextRole::Plain)),
+            Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
+        ])
+    };
+    let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
+    lines.extend([
+        row("altitude", most.altitude_m, 2, "m"),
+        row("descent speed", most.descent_m_s, 2, "m/s"),
+        row("distance", most.distance_m, 1, "m"),
+        row("tilt", most.tilt_rad.map(f64::to_degrees), 2, "deg"),
+        row("turn rate", most.turn_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
+        row("gimbal", most.gimbal_rad.map(f64::to_degrees), 2, "deg"),
+        row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
+        row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
+        row("silence", most.silence_s, 1, "s"),
+    ]);
+    lines
+}
+
+/// Each phase and when it began, several on a line.
+fn timeline(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    let entries: Vec<String> = model
+        .history
+        .timeline
+        .iter()
+        .map(|(phase, at)| format!("{:>8.1} {:<14}", at.as_secs_f64(), words::phase(*phase)))
+        .collect();
+    if entries.is_empty() {
+        return vec![Line::styled("  nothing heard", theme.style(TextRole::Label))];
+    }
+    entries
+        .chunks((columns / TIMELINE_COLUMNS).max(1))
+        .map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain)))
+        .collect()
 }

@@ -9,14 +9,12 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::Model;
-use crate::model::link::LinkReport;
-use crate::model::link_state::LinkState;
-use crate::model::uplink::refusal;
+use crate::model::link::{LinkReport, LinkState, refusal};
 use crate::model::vehicle::STALE_AFTER;
-use crate::view::filter;
-use crate::view::link_line::{link, percent};
-use crate::view::number::{STALE_MARK, seconds};
+use crate::view::lists;
+use crate::view::status_lines::{link_line, percent};
 use crate::view::theme::{TextRole, Theme};
+use crate::view::widgets::{STALE_MARK, seconds};
 
 /// A loss above this share is marked.
 const LOSS_MARKED: f64 = 0.05;
@@ -44,12 +42,12 @@ const REGULAR: [&str; 13] = [
 
 /// The rates of all links together, of each link and of each component; then the age of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let mut lines = vec![link(model, theme, now, columns)];
+    let mut lines = vec![link_line(model, theme, now, columns)];
     lines.push(directions(model, theme, now));
     lines.extend(rejected(model, theme));
     lines.push(heading(theme, columns));
     for report in reports(model, now) {
-        lines.push(link_line(&report, theme, columns));
+        lines.push(report_line(&report, theme, columns));
         lines.extend(
             report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme, columns)),
         );
@@ -58,7 +56,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
         theme.style(TextRole::Title),
     ));
-    lines.extend(filter::line(model, theme));
+    lines.extend(lists::filter_line(model, theme));
     lines.extend(age_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
@@ -159,7 +157,7 @@ fn heading(theme: Theme, columns: usize) -> Line<'static> {
     Line::styled(text, theme.style(TextRole::Title))
 }
 
-fn link_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
+fn report_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
     let name = &report.name;
     if let Some(why) = &report.trouble {
         return Line::styled(format!(" {name} DOWN {why}"), theme.style(TextRole::Alarm));

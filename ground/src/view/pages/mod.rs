@@ -1,23 +1,12 @@
-//! One module per page. Each gives its content as lines for small terminals; pages with panels also draw them.
+//! The pages. Each gives its content as lines for small terminals; pages with panels also draw them.
 
-pub mod alarms;
-pub mod ascent;
 pub mod checks;
-pub mod descent;
-pub mod find;
-pub mod flying;
-pub mod foreign;
-pub mod help;
+pub mod flight;
 pub mod landing;
 pub mod link;
-pub mod log;
-pub mod messages;
+pub mod lists;
 pub mod pad;
-pub mod parameters;
-pub mod path;
-pub mod plot;
-pub mod review;
-pub mod values;
+pub mod plots;
 
 use std::time::Duration;
 
@@ -34,14 +23,14 @@ use crate::model::page::Page;
 /// Draws the present page between the top lines and the alarm line.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     match model.page() {
-        Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw(model, theme, now, frame, area),
-        Page::Ascent => ascent::draw(model, theme, now, frame, area),
-        Page::Descent => descent::draw(model, theme, now, frame, area),
-        Page::Landing => landing::draw(model, theme, now, frame, area),
-        Page::Review => review::draw(model, theme, now, frame, area),
-        Page::Path => path::draw(model, theme, now, frame, area),
-        Page::Values => values::draw(model, theme, now, frame, area),
-        Page::Plot => plot::draw(model, theme, now, frame, area),
+        Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
+        Page::Ascent => flight::draw_ascent(model, theme, now, frame, area),
+        Page::Descent => flight::draw_descent(model, theme, now, frame, area),
+        Page::Landing => landing::draw_landing(model, theme, now, frame, area),
+        Page::Review => landing::draw_review(model, theme, now, frame, area),
+        Page::Path => plots::draw_path(model, theme, now, frame, area),
+        Page::Values => plots::draw_values(model, theme, now, frame, area),
+        Page::Plot => plots::draw_plot_page(model, theme, now, frame, area),
         page => {
             let inside = titled(page.name(), theme, frame, area);
             draw_lines(frame, inside, &lines(model, page, theme, now, inside));
@@ -54,24 +43,24 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
         Page::Pad => match model.vehicle.as_foreign() {
-            Some(vehicle) => foreign::lines(model, vehicle, theme, now, (columns, rows)),
-            None => pad::lines(model, theme, now),
+            Some(vehicle) => pad::foreign_lines(model, vehicle, theme, now, (columns, rows)),
+            None => pad::pad_lines(model, theme, now),
         },
-        Page::Ascent => ascent::lines(model, theme, now),
-        Page::Descent => descent::lines(model, theme, now),
-        Page::Landing => landing::lines(model, theme, now, columns, rows),
-        Page::Review => review::lines(model, theme, now, columns),
+        Page::Ascent => flight::ascent_lines(model, theme, now),
+        Page::Descent => flight::descent_lines(model, theme, now),
+        Page::Landing => landing::landing_lines(model, theme, now, columns, rows),
+        Page::Review => landing::review_lines(model, theme, now, columns),
         Page::Link => link::lines(model, theme, now, columns, rows),
-        Page::Messages => messages::lines(model, theme, columns, rows),
-        Page::Parameters => parameters::lines(model, theme, rows),
-        Page::Log => log::lines(model, theme, now),
-        Page::Alarms => alarms::lines(model, theme, now, columns, rows),
-        Page::Path => path::lines(model, theme, now),
-        Page::Find => find::lines(model, theme, now),
-        Page::Checks => checks::lines(model, theme, now, columns),
-        Page::Values => values::lines(model, theme, now),
-        Page::Plot => plot::lines(model, theme, now),
-        Page::Help => help::lines(model, theme, now),
+        Page::Messages => lists::messages_lines(model, theme, columns, rows),
+        Page::Parameters => lists::parameters_lines(model, theme, rows),
+        Page::Log => lists::log_lines(model, theme, now),
+        Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
+        Page::Path => plots::path_lines(model, theme, now),
+        Page::Find => checks::find_lines(model, theme, now),
+        Page::Checks => checks::checks_lines(model, theme, now, columns),
+        Page::Values => plots::values_lines(model, theme, now),
+        Page::Plot => plots::plot_lines(model, theme, now),
+        Page::Help => lists::help_lines(model, theme, now),
     }
 }
 

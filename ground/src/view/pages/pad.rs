@@ -8,19 +8,15 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::{is_roomy, titled};
-use crate::model::Model;
 use crate::model::act::Act;
-use crate::model::command::CommandKind;
-use crate::model::permits::why_not_here;
-use crate::model::station_log::LogStanding;
+use crate::model::command::{CommandKind, why_not_here};
+use crate::model::identity::Foreign;
+use crate::model::log::LogStanding;
 use crate::model::vehicle::{Vehicle, is_on_pad};
-use crate::model::{unheard, words};
-use crate::view::number::{STALE_MARK, fixed};
+use crate::model::{Model, link, words};
 use crate::view::theme::{TextRole, Theme};
-use crate::view::{
-    actuators, checklist, draw_lines, event_list, flight, foremost, headline, link_line, next_event,
-    side_view, top_lines,
-};
+use crate::view::widgets::{STALE_MARK, age_mark, fixed};
+use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
@@ -34,8 +30,8 @@ const GO_ROWS: u16 = 5;
 const LADDER_COLUMNS: u16 = 40;
 
 /// Draws GO or NO-GO, the checks and the ladder, the events below.
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let foremost = foremost::pad(model, now);
+pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let foremost = headline::pad_headline(model, now);
     let (checks, ladder) = (checks(model, theme, now), ladder(model, theme, now));
     let lists_steps = model.checklist.is_some() && model.pages.checklist && !is_roomy(area);
     let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };
@@ -43,7 +39,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let rows = (checks.len() as u16 + 1).max(ladder.len() as u16 + besides);
     let upper_rows = if lists_steps { CHECK_ROWS } else { rows.min(CHECK_ROWS) };
     let (checks_area, ladder_area, events) = if is_roomy(area) {
-        let area = headline::draw(&foremost, theme, frame, area);
+        let area = headline::draw_headline(&foremost, theme, frame, area);
         let [upper, below] = area
             .layout(&Layout::vertical([Constraint::Length(upper_rows.max(NOW_ROWS)), Constraint::Fill(1)]));
         let [left, middle, right] = upper.layout(&Layout::horizontal([
@@ -67,7 +63,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         let [go, below] = right.layout(&Layout::vertical([Constraint::Length(go_rows), Constraint::Fill(1)]));
         if go_rows > 0 {
             let inside = titled("Now", theme, frame, go);
-            headline::draw(&foremost, theme, frame, inside);
+            headline::draw_headline(&foremost, theme, frame, inside);
         }
         (left, below, events)
     };
@@ -80,36 +76,36 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     let inside = titled("Arming ladder", theme, frame, ladder_area);
     draw_lines(frame, inside, &ladder);
     let inside = titled("Events", theme, frame, events);
-    let lines = event_list::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    let lines = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
 }
 
 /// The state of the vehicle and of the link.
 fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let inside = titled("Now", theme, frame, area);
-    let mut lines = flight::rows(model, theme, now);
-    lines.extend(actuators::gimbal_rows(model, theme, now).into_iter().take(2));
-    lines.push(link_line::link(model, theme, now, usize::from(inside.width)));
+    let mut lines = panels::flight_rows(model, theme, now);
+    lines.extend(panels::gimbal_rows(model, theme, now).into_iter().take(2));
+    lines.push(status_lines::link_line(model, theme, now, usize::from(inside.width)));
     draw_lines(frame, inside, &lines);
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = titled(&checklist::title(model, now), theme, frame, area);
+    let inside = titled(&lists::checklist_title(model, now), theme, frame, area);
     let size = (usize::from(inside.width), usize::from(inside.height));
-    draw_lines(frame, inside, &checklist::rows(model, theme, now, size));
+    draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
 /// The landing that the vehicle has planned on the pad.
 fn draw_rehearsal(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let inside = titled("Rehearsed landing: plan", theme, frame, area);
-    let seen = (side_view::FlightPart::Burn, side_view::Viewpoint::East);
-    side_view::draw(model, seen, theme, now, frame, inside);
+    let seen = (pictures::FlightPart::Burn, pictures::Viewpoint::East);
+    pictures::draw_side_view(model, seen, theme, now, frame, inside);
 }
 
 /// Failing checks first, because a small screen must show them.
-pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+pub fn pad_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // In flight the next event is already shown above.
-    let mut lines: Vec<Line> = match next_event::line(model, theme, now) {
+    let mut lines: Vec<Line> = match status_lines::next_event_line(model, theme, now) {
         Some(_) => Vec::new(),
         None => vec![top_lines::command(model, theme, now)],
     };
@@ -119,8 +115,16 @@ pub fn lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
     if model.checklist.is_some() {
-        lines.push(Line::styled(format!(" {}", checklist::title(model, now)), theme.style(TextRole::Title)));
-        lines.extend(checklist::rows(model, theme, now, (CHECK_COLUMNS.into(), usize::from(CHECK_ROWS))));
+        lines.push(Line::styled(
+            format!(" {}", lists::checklist_title(model, now)),
+            theme.style(TextRole::Title),
+        ));
+        lines.extend(lists::checklist_rows(
+            model,
+            theme,
+            now,
+            (CHECK_COLUMNS.into(), usize::from(CHECK_ROWS)),
+        ));
     }
     // Before the first command two lines may be equal.
     lines.dedup_by_key(|line| line.to_string());
@@ -133,8 +137,8 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
-        let hints = unheard::hints(model, now).unwrap_or_default();
-        let wrapped = |words: String| checklist::wrapped(&words, usize::from(CHECK_COLUMNS - 2));
+        let hints = link::unheard_hints(model, now).unwrap_or_default();
+        let wrapped = |words: String| lists::wrapped(&words, usize::from(CHECK_COLUMNS - 2));
         let lines = hints.into_iter().flat_map(wrapped);
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
@@ -179,7 +183,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     match model.vehicle.status.as_ref() {
         _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
-        None if unheard::hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
+        None if link::unheard_hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
         Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {
             top_lines::readiness(model, now).unwrap_or_default()
@@ -339,5 +343,35 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     });
     let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
     lines.extend(arming.map(|track| top_lines::command_facts_short(track, theme, now)));
+    lines
+}
+
+// What is shown instead of the Pad page while the vehicle is none of ours: its standard telemetry.
+
+/// The telemetry, and below it the newest events: why something was refused is one of them.
+pub fn foreign_lines(
+    model: &Model,
+    foreign: &Foreign,
+    theme: Theme,
+    now: Duration,
+    (columns, rows): (usize, usize),
+) -> Vec<Line<'static>> {
+    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
+    let mut lines = vec![
+        Line::styled(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), theme.style(TextRole::Alarm)),
+        plain(format!(" mode {}, {}", foreign.mode(), if foreign.armed { "ARMED" } else { "disarmed" })),
+        plain(" Nothing is armed or started there from here.".to_owned()),
+        Line::styled(format!(" An abort {}.", foreign.termination()), theme.style(TextRole::Caution)),
+    ];
+    lines.extend(foreign.told.iter().map(|(name, text)| {
+        let (mark, role) = age_mark(text, now);
+        let role = if role == TextRole::Stale { role } else { TextRole::Plain };
+        Line::from(vec![
+            Span::styled(format!(" {name:<9}"), theme.style(TextRole::Label)),
+            Span::styled(format!("{mark}{}", text.value), theme.style(role)),
+        ])
+    }));
+    let room = rows.saturating_sub(lines.len());
+    lines.extend(lists::events(model, theme, columns, room));
     lines
 }

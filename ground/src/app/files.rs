@@ -1,0 +1,504 @@
+//! The files that a station writes: the log, the book in it, the signatures of a checklist, the last place.
+
+use std::fs;
+use std::fs::File;
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::Context as _;
+use protocol::book::{Book, BookKey, CLOSED, Head, Line, OPENED, SignedHead};
+use protocol::log::record::Record;
+use protocol::log::recorder::{Recorder, RecorderError};
+use protocol::log::writer::LogHeader;
+use time::OffsetDateTime;
+use time::macros::format_description;
+
+use crate::cli::LogChoice;
+use crate::model::checklist::{Checklist, ChecklistEntry, Remembered};
+use crate::model::log::LogSpace;
+use crate::model::place::LastPlace;
+use crate::model::{BookLine, checklist, place};
+
+/// How many logs may start in the same second.
+const SAME_SECOND_MAX: u32 = 100;
+
+/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted.
+///
+/// # Errors
+/// A file exists or cannot be created, or a telemetry log is wanted without a log.
+pub fn open_log(
+    choice: Option<&LogChoice>,
+    tlog: Option<&LogChoice>,
+    header: &LogHeader,
+) -> anyhow::Result<Option<Recorder>> {
+    match choice {
+        Some(LogChoice::None) => {
+            let alone = matches!(tlog, Some(LogChoice::File(_)));
+            anyhow::ensure!(!alone, "--tlog writes beside a log; do not give --log none");
+            Ok(None)
+        }
+        Some(LogChoice::File(path)) => {
+            Ok(Some(Recorder::create_with_tlog(path, tlog_path(tlog, path).as_deref(), header)?))
+        }
+        None => open_named_by_time(Path::new(""), tlog, header).map(Some),
+    }
+}
+
+/// The named telemetry log, or the name of the log with the extension `.tlog`.
+fn tlog_path(tlog: Option<&LogChoice>, log: &Path) -> Option<PathBuf> {
+    match tlog {
+        None => Some(log.with_extension("tlog")),
+        Some(LogChoice::None) => None,
+        Some(LogChoice::File(path)) => Some(path.clone()),
+    }
+}
+
+fn open_named_by_time(
+    directory: &Path,
+    tlog: Option<&LogChoice>,
+    header: &LogHeader,
+) -> anyhow::Result<Recorder> {
+    let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
+        .context("the system clock is invalid")?;
+    let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
+    for number in 1..=SAME_SECOND_MAX {
+        let suffix = if number == 1 { String::new() } else { format!("-{number}") };
+        let path = directory.join(format!("touchdown-{stamp}{suffix}.mcap"));
+        match Recorder::create_with_tlog(&path, tlog_path(tlog, &path).as_deref(), header) {
+            Err(RecorderError::Create { path: refused, source })
+                if refused == path && source.kind() == std::io::ErrorKind::AlreadyExists => {}
+            other => return Ok(other?),
+        }
+    }
+    anyhow::bail!(
+        "touchdown-{stamp}.mcap and {SAME_SECOND_MAX} others exist already; name the log with --log"
+    )
+}
+
+/// How often the space is looked at; the rate is a mean over this time.
+const LOOKS_EVERY: Duration = Duration::from_secs(5);
+
+/// Watches the space that is left for the log, and how fast it grows.
+#[derive(Debug, Default)]
+pub struct SpaceWatch {
+    due: Duration,
+    /// When the files had how many bytes.
+    last: Option<(Duration, u64)>,
+    space: Option<LogSpace>,
+}
+
+impl SpaceWatch {
+    /// The space as it was last looked at; `None` where the system does not tell it.
+    pub fn look(&mut self, recorder: &Recorder, now: Duration) -> Option<LogSpace> {
+        if now < self.due {
+            return self.space;
+        }
+        self.due = now + LOOKS_EVERY;
+        let folder = recorder.path().parent().filter(|folder| !folder.as_os_str().is_empty());
+        let size = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
+        let bytes = size(recorder.path()) + recorder.tlog_path().map_or(0, size);
+        let last = self.last.replace((now, bytes));
+        let grows_bytes_s = last.map_or(0.0, |(at, before)| {
+            bytes.saturating_sub(before) as f64 / now.saturating_sub(at).as_secs_f64().max(1.0)
+        });
+        let free = fs4::available_space(folder.unwrap_or(Path::new("."))).ok();
+        self.space = free.map(|free_bytes| LogSpace { free_bytes, grows_bytes_s: grows_bytes_s as u32 });
+        self.space
+    }
+}
+
+/// Finishes the log when it goes out of scope, also while a panic unwinds.
+pub struct LogGuard {
+    recorder: Option<Recorder>,
+}
+
+impl LogGuard {
+    /// Guards a log, if there is one.
+    pub fn new(recorder: Option<Recorder>) -> Self {
+        Self { recorder }
+    }
+
+    /// Deletes the log again, because the run has failed before it began.
+    pub fn discard(mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            // Why the run has failed is being reported.
+            let _ = recorder.discard();
+        }
+    }
+
+    /// Finishes the log and returns its path.
+    ///
+    /// # Errors
+    /// A record could not be written.
+    pub fn finish(mut self) -> Result<Option<PathBuf>, RecorderError> {
+        self.recorder.take().map(|recorder| recorder.finish()).transpose()
+    }
+}
+
+impl Drop for LogGuard {
+    fn drop(&mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            // Another error is already being reported.
+            let _ = recorder.finish();
+        }
+    }
+}
+
+// Writes the station's book into its log, and signs its end.
+
+/// How often the end is signed at most.
+const SIGNED_EVERY: Duration = Duration::from_secs(2);
+
+/// The book of this run.
+pub(super) struct StationBook {
+    book: Book,
+    key: Option<BookKey>,
+    /// The last signed end, and when it was signed.
+    signed: Option<(Head, Duration)>,
+}
+
+impl StationBook {
+    /// Opens a book. `about` says who writes it. Returns the book and its first record.
+    pub(super) fn open(key: Option<BookKey>, about: &str, unix_ns: u64) -> (Self, Record) {
+        let key_words = match &key {
+            Some(key) => format!("signed with the key of public key {}", key.public()),
+            None => "not signed: the station has no key".to_owned(),
+        };
+        let mut book = Self { book: Book::default(), key, signed: None };
+        let text = format!("{about}; {key_words}");
+        let record = book.enter_line(&Line { unix_ns, kind: OPENED, who: "", text: &text });
+        (book, record)
+    }
+
+    pub(super) fn enter(&mut self, line: &BookLine, unix_ns: u64) -> Record {
+        self.enter_line(&Line { unix_ns, kind: &line.kind, who: &line.who, text: &line.text })
+    }
+
+    fn enter_line(&mut self, line: &Line) -> Record {
+        Record::BookEntry(self.book.enter(line))
+    }
+
+    /// Enters that the run ends.
+    pub(super) fn close(&mut self, unix_ns: u64) -> Record {
+        self.enter_line(&Line { unix_ns, kind: CLOSED, who: "", text: "the station ends" })
+    }
+
+    /// Signs the end if it has changed and the last signature is old enough. Returns it with its record.
+    pub(super) fn sign_if_due(&mut self, now: Duration) -> Option<(SignedHead, Record)> {
+        let waits = |at: &Duration| now.saturating_sub(*at) < SIGNED_EVERY;
+        if self.signed.as_ref().is_some_and(|(_, at)| waits(at)) {
+            return None;
+        }
+        self.sign(now)
+    }
+
+    /// Signs the end if it has changed.
+    pub(super) fn sign(&mut self, now: Duration) -> Option<(SignedHead, Record)> {
+        let head = self.book.head()?;
+        if self.signed.is_some_and(|(signed, _)| signed == head) {
+            return None;
+        }
+        self.signed = Some((head, now));
+        let signed = match &self.key {
+            Some(key) => key.sign(head),
+            None => SignedHead { head, signature: [0; 64] },
+        };
+        let record = Record::BookHead(signed.record(self.key.as_ref().map(BookKey::public)));
+        Some((signed, record))
+    }
+
+    pub(super) fn is_signed(&self) -> bool {
+        self.key.is_some()
+    }
+}
+
+// The files of a checklist: its text, and beside it the list of its signatures.
+
+/// Longer files are no checklists.
+const BYTES_MAX: u64 = 64 * 1024;
+
+/// Keeps the signatures of one checklist. The file only grows.
+pub(super) struct SignatureFile {
+    path: PathBuf,
+    /// `None` before the first signature.
+    file: Option<File>,
+    /// Open for its lock: it keeps other stations away while there is no file of signatures.
+    _checklist: File,
+    hash: String,
+}
+
+/// Opens a checklist, and marks what has been signed for it today. Also returns what the crew should be told.
+///
+/// # Errors
+/// The checklist is wrong, its signatures cannot be written, or another station keeps them.
+pub(super) fn open_checklist(
+    path: &Path,
+    now_unix_s: u64,
+) -> anyhow::Result<(Checklist, SignatureFile, Vec<String>)> {
+    let shown = path.display();
+    let mut text = String::new();
+    let written = File::open(path).with_context(|| format!("the checklist {shown}"))?;
+    lock(&written, path)?;
+    (&written).take(BYTES_MAX).read_to_string(&mut text).with_context(|| format!("the checklist {shown}"))?;
+    let mut checklist =
+        checklist::parse_checklist(&text).with_context(|| format!("the checklist {shown}"))?;
+    let mut signed_path = path.as_os_str().to_owned();
+    signed_path.push(".signed");
+    let signed_path = PathBuf::from(signed_path);
+    let signatures = || format!("the signatures {}", signed_path.display());
+    let mut list = Vec::new();
+    let file = match File::options().read(true).append(true).open(&signed_path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => None,
+        opened => {
+            let mut file = opened.with_context(signatures)?;
+            lock(&file, &signed_path)?;
+            file.read_to_end(&mut list).with_context(signatures)?;
+            Some(file)
+        }
+    };
+    let Remembered { entries, outdated, broken } =
+        checklist::remembered(&String::from_utf8_lossy(&list), &checklist.hash, now_unix_s);
+    let mut told = Vec::new();
+    for entry in &entries {
+        checklist.apply(entry);
+    }
+    if outdated > 0 {
+        told.push(format!("{outdated} signatures of the checklist are not of today and do not count"));
+    }
+    if broken > 0 {
+        told.push(format!("{broken} entries of {} cannot be read and do not count", signed_path.display()));
+    }
+    let hash = checklist.hash.clone();
+    let kept = SignatureFile { path: signed_path.clone(), file, _checklist: written, hash };
+    Ok((checklist, kept, told))
+}
+
+/// Keeps other stations away from a file, as long as it is open.
+fn lock(file: &File, path: &Path) -> anyhow::Result<()> {
+    file.try_lock().map_err(|error| match error {
+        std::fs::TryLockError::WouldBlock => anyhow::anyhow!(
+            "another station keeps {}: attach a screen to it to sign (`ground attach`)",
+            path.display()
+        ),
+        std::fs::TryLockError::Error(error) => {
+            anyhow::Error::from(error).context(format!("locking {}", path.display()))
+        }
+    })
+}
+
+impl SignatureFile {
+    /// Adds a change and waits until it is on the disk: a signature must survive the next power cut.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn add(&mut self, entry: &ChecklistEntry) -> anyhow::Result<()> {
+        let signatures = || format!("the signatures {}", self.path.display());
+        let mut file = if let Some(file) = self.file.take() {
+            file
+        } else {
+            let file = File::options().append(true).create(true).open(&self.path);
+            let file = file.with_context(signatures)?;
+            lock(&file, &self.path)?;
+            file
+        };
+        let text = checklist::entry_text(&self.hash, entry);
+        let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_data());
+        let written = written.with_context(signatures);
+        self.file = Some(file);
+        written
+    }
+}
+
+// The files with the last place of a vehicle, beside the log: one GeoJSON and one KML for each boot of a vehicle.
+
+/// What the names of the files begin with; the vehicle's boot number follows.
+const PLACE_NAME: &str = "touchdown-place-";
+/// Older places are of no use to somebody who looks for a vehicle today.
+const KEPT_FOR_S: u64 = 24 * 3_600;
+/// Longer files are none of ours.
+const PLACE_BYTES_MAX: u64 = 64 * 1024;
+
+/// Writes both files. A file gets its name when it is complete, so a crash leaves the former place.
+///
+/// # Errors
+/// The folder cannot be written.
+pub(super) fn write_place(folder: &Path, place: &LastPlace) -> anyhow::Result<()> {
+    let name = format!("{PLACE_NAME}{:08X}", place.boot);
+    write_one(folder, &format!("{name}.geojson"), &place::geojson(place))?;
+    match place::kml(place) {
+        Some(kml) => write_one(folder, &format!("{name}.kml"), &kml),
+        None => Ok(()),
+    }
+}
+
+fn write_one(folder: &Path, name: &str, text: &str) -> anyhow::Result<()> {
+    let (part, whole) = (folder.join(format!("{name}.part")), folder.join(name));
+    let failed = || format!("writing {}", whole.display());
+    let mut file = File::create(&part).with_context(failed)?;
+    file.write_all(text.as_bytes()).with_context(failed)?;
+    fs::rename(&part, &whole).with_context(failed)
+}
+
+/// The newest place that was kept in the folder of the log in the last day.
+pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<LastPlace> {
+    let folder = match folder? {
+        here if here.as_os_str().is_empty() => Path::new("."),
+        folder => folder,
+    };
+    let files = fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let ours = files.filter(|file| {
+        let name = file.file_name();
+        let name = name.to_string_lossy();
+        name.starts_with(PLACE_NAME)
+            && Path::new(&*name).extension().is_some_and(|ending| ending == "geojson")
+    });
+    let places = ours.filter_map(|file| {
+        let mut text = String::new();
+        File::open(file.path()).ok()?.take(PLACE_BYTES_MAX).read_to_string(&mut text).ok()?;
+        place::read_geojson(&text)
+    });
+    places
+        .filter(|place| now_unix_s.saturating_sub(place.heard_unix_s) <= KEPT_FOR_S)
+        .max_by_key(|place| place.heard_unix_s)
+}
+
+#[cfg(test)]
+mod log_tests {
+    use super::*;
+    use protocol::log::reader::{LogItem, LogReader};
+    use protocol::log::record::{Event, EventLevel, Record};
+
+    #[test]
+    fn a_log_is_never_overwritten() {
+        let directory = tempfile::tempdir().unwrap();
+        let header = LogHeader { start_unix_ns: 1_800_000_000_000_000_000, ..LogHeader::default() };
+        let names: Vec<String> = (0..3)
+            .map(|_| {
+                let recorder = open_named_by_time(directory.path(), None, &header).unwrap();
+                assert!(recorder.tlog_path().unwrap().with_extension("mcap") == recorder.path());
+                recorder.finish().unwrap().file_name().unwrap().to_string_lossy().into_owned()
+            })
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "touchdown-20270115-080000.mcap",
+                "touchdown-20270115-080000-2.mcap",
+                "touchdown-20270115-080000-3.mcap"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_panic_ends_the_log_properly() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("panic.mcap");
+        let recorder = Recorder::create(&path, &LogHeader::default()).unwrap();
+        let event =
+            Event { level: EventLevel::Info, name: "ground".to_owned(), message: "before".to_owned() };
+        let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let _guard = LogGuard::new(Some(recorder.clone()));
+            recorder.try_record(Record::Event(event), 0);
+            panic!("drawing went wrong");
+        }));
+        assert!(panicked.is_err());
+        let mut reader = LogReader::new(std::fs::File::open(&path).unwrap());
+        let mut messages = 0;
+        while let Some(item) = reader.next_item().unwrap() {
+            messages += usize::from(matches!(item, LogItem::Message { .. }));
+        }
+        assert_eq!((messages, reader.damage()), (1, None));
+    }
+}
+
+#[cfg(test)]
+mod book_tests {
+    use super::*;
+    use protocol::signing::Key;
+
+    #[test]
+    fn the_end_is_signed_only_when_it_has_changed_and_not_too_often() {
+        let key = BookKey::of(&Key::new([3; 32]));
+        let (mut book, first) = StationBook::open(Some(key.clone()), "station 255/190", 1);
+        assert!(matches!(&first, Record::BookEntry(entry) if entry.text.contains(&key.public().to_string())));
+        let (signed, _) = book.sign_if_due(Duration::ZERO).unwrap();
+        assert!(key.public().signed(&signed) && signed.head.entries == 1);
+        assert!(book.sign_if_due(Duration::from_secs(9)).is_none());
+        let line = BookLine { kind: "key".to_owned(), who: "Ann".to_owned(), text: "A".to_owned() };
+        book.enter(&line, 2);
+        assert!(book.sign_if_due(Duration::from_secs(1)).is_none(), "too soon");
+        let (signed, _) = book.sign_if_due(Duration::from_secs(10)).unwrap();
+        assert_eq!(signed.head.entries, 2);
+        book.close(3);
+        assert!(book.sign(Duration::from_secs(10)).is_some(), "the last one is signed at once");
+    }
+}
+
+#[cfg(test)]
+mod checklist_tests {
+    use super::*;
+    use crate::model::checklist::{Mark, Signature};
+
+    #[test]
+    fn signatures_survive_a_restart_and_another_text_has_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.toml");
+        std::fs::write(&path, include_str!("../../checklist-example.toml")).unwrap();
+        let now = 1_800_000_000;
+        let signature = Signature { by: "Ann".to_owned(), unix_s: now, ..Signature::default() };
+        let entry = ChecklistEntry::Signed { step: 2, signature: signature.clone() };
+        let (list, mut kept, told) = open_checklist(&path, now).unwrap();
+        assert!(!list.is_touched() && told.is_empty());
+        let another = || open_checklist(&path, now).map(|_| ()).unwrap_err().to_string();
+        assert!(another().contains("another station keeps"), "{}", another());
+        let signed = folder.path().join("list.toml.signed");
+        assert!(!signed.exists(), "nothing is signed");
+        kept.add(&entry).unwrap();
+        assert!(signed.exists());
+        assert!(another().contains("another station keeps"), "{}", another());
+        drop(kept);
+        let (list, kept, _) = open_checklist(&path, now + 60).unwrap();
+        assert_eq!(list.steps[2].mark, Mark::Signed(signature));
+        drop(kept);
+        let (list, kept, told) = open_checklist(&path, now + 13 * 3_600).unwrap();
+        assert!(!list.is_touched());
+        assert!(told[0].starts_with("1 signatures of the checklist are not of today"), "{told:?}");
+        drop(kept);
+        let edited = include_str!("../../checklist-example.toml").replace("3.0", "30.0");
+        std::fs::write(&path, edited).unwrap();
+        assert!(!open_checklist(&path, now + 60).unwrap().0.is_touched(), "it was signed for another text");
+    }
+}
+
+#[cfg(test)]
+mod places_tests {
+    use super::*;
+    use crate::model::place::{Degrees, Spot};
+
+    #[test]
+    fn the_newest_place_of_today_survives_a_restart() {
+        let folder = tempfile::tempdir().unwrap();
+        let now = 1_800_000_000;
+        let place = |boot, heard_unix_s| LastPlace {
+            boot,
+            heard_unix_s,
+            heard: Spot { north_m: 1.0, east_m: 2.0, error_m: 3.0 },
+            height_m: 4.0,
+            predicted: None,
+            pad: Some(Degrees { latitude: 35.0, longitude: -117.0 }),
+        };
+        assert_eq!(newest_place(Some(folder.path()), now), None);
+        for (boot, heard) in [(1, now - 100), (2, now - 50), (3, now - 2 * KEPT_FOR_S)] {
+            write_place(folder.path(), &place(boot, heard)).unwrap();
+        }
+        // The place of a vehicle is written again and again.
+        write_place(folder.path(), &place(2, now - 10)).unwrap();
+        fs::write(folder.path().join(format!("{PLACE_NAME}broken.geojson")), "{").unwrap();
+        assert_eq!(newest_place(Some(folder.path()), now), Some(place(2, now - 10)));
+        let kml = fs::read_to_string(folder.path().join(format!("{PLACE_NAME}00000002.kml"))).unwrap();
+        assert!(kml.contains("<name>last heard</name>"));
+        let parts = fs::read_dir(folder.path()).unwrap().filter_map(Result::ok);
+        assert_eq!(parts.filter(|file| file.path().extension().is_some_and(|end| end == "part")).count(), 0);
+    }
+}

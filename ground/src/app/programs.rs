@@ -1,0 +1,202 @@
+//! Programs that a station starts: the crew's voice, the alarm command, `replay report`.
+
+use std::io;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+
+/// How many callouts wait for the command; further ones are dropped, because late words mislead.
+const WAITING_MAX: usize = 4;
+
+/// Passes lines to the command from a thread of its own, so that a command that hangs delays nothing.
+#[derive(Debug)]
+pub struct Voice {
+    lines: SyncSender<String>,
+    #[cfg(test)]
+    thread: std::thread::JoinHandle<()>,
+}
+
+/// The command has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the voice command has ended; nothing is called out any more")]
+pub struct VoiceEnded;
+
+impl Voice {
+    /// Starts the command: its name and arguments, with spaces between them.
+    ///
+    /// # Errors
+    /// The command or its thread cannot be started.
+    pub fn start(command: &str) -> io::Result<Self> {
+        let mut words = command.split_whitespace();
+        let name = words.next().ok_or_else(|| io::Error::other("the voice command is empty"))?;
+        let child = Command::new(name)
+            .args(words)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let (lines, waiting) = sync_channel(WAITING_MAX);
+        let thread = std::thread::Builder::new().name("voice".to_owned());
+        let thread = thread.spawn(move || speak(child, &waiting))?;
+        // It is never joined, because it may hang with the command.
+        #[cfg(not(test))]
+        drop(thread);
+        Ok(Self {
+            lines,
+            #[cfg(test)]
+            thread,
+        })
+    }
+
+    /// Says a line, unless the command is too far behind. It never waits.
+    ///
+    /// # Errors
+    /// The command has ended.
+    pub fn say(&self, line: &str) -> Result<(), VoiceEnded> {
+        match self.lines.try_send(format!("{line}\n")) {
+            Ok(()) | Err(TrySendError::Full(_)) => Ok(()),
+            Err(TrySendError::Disconnected(_)) => Err(VoiceEnded),
+        }
+    }
+}
+
+fn speak(mut child: Child, lines: &Receiver<String>) {
+    if let Some(mut input) = child.stdin.take() {
+        for line in lines {
+            if input.write_all(line.as_bytes()).and_then(|()| input.flush()).is_err() {
+                break;
+            }
+        }
+    }
+    // Without more input the command ends; waiting only prevents a zombie process.
+    let _ = child.wait();
+}
+
+// Runs the command that reports an alarm to people who are not at the screen.
+
+/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, without waiting for it.
+///
+/// # Errors
+/// The command, or the thread that waits for it, cannot be started.
+pub fn run_alarm_command(command: &str, alarm: &str) -> std::io::Result<()> {
+    let mut child = Command::new("sh")
+        .args(["-c", command])
+        .env("TOUCHDOWN_ALARM", alarm)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()?;
+    std::thread::Builder::new()
+        .name("alarm command".to_owned())
+        // Waiting only prevents a zombie process; the result is ignored.
+        .spawn(move || drop(child.wait()))
+        .map(drop)
+}
+
+// Writes the report of the flight: runs `replay report` on the station's log.
+
+/// Reports of one log.
+const REPORTS_MAX: u32 = 100;
+
+/// A report that is being written: where it is, or why it is not.
+pub(super) type Writing = Receiver<Result<String, String>>;
+
+/// Starts to write the report beside the log, under a name that is free.
+///
+/// # Errors
+/// There is no free name, or no thread can be started.
+pub(super) fn begin_report(log: &Path) -> Result<Writing, String> {
+    let page = free_name(log).ok_or("there are a hundred reports of this log already")?;
+    let (tell, told) = sync_channel(1);
+    let log = log.to_owned();
+    std::thread::Builder::new()
+        .name("report".to_owned())
+        .spawn(move || {
+            // The station may have ended.
+            let _ = tell.send(write_report(&log, &page));
+        })
+        .map_err(|error| error.to_string())?;
+    Ok(told)
+}
+
+/// `flight.html`, then `flight-2.html`: nothing is overwritten.
+fn free_name(log: &Path) -> Option<PathBuf> {
+    let stem = log.file_stem()?.to_string_lossy().into_owned();
+    (1..=REPORTS_MAX)
+        .map(|number| if number == 1 { format!("{stem}.html") } else { format!("{stem}-{number}.html") })
+        .map(|name| log.with_file_name(name))
+        .find(|page| page.symlink_metadata().is_err())
+}
+
+fn write_report(log: &Path, page: &Path) -> Result<String, String> {
+    // The program beside this one, otherwise the one that the shell would find.
+    let beside = std::env::current_exe().ok().map(|own| own.with_file_name("replay"));
+    let program = beside.filter(|program| program.exists()).unwrap_or_else(|| PathBuf::from("replay"));
+    let ran = Command::new(&program)
+        .args(["report".as_ref(), log.as_os_str(), "--output".as_ref(), page.as_os_str()])
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("{}: {error}", program.display()))?;
+    if ran.status.success() {
+        return Ok(page.display().to_string());
+    }
+    let words = protocol::text::printable(&ran.stderr);
+    Err(words.lines().last().unwrap_or("replay report failed").to_owned())
+}
+
+#[cfg(test)]
+mod voice_tests {
+    use super::*;
+
+    #[test]
+    fn every_line_reaches_the_command_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let heard = folder.path().join("heard");
+        let voice = Voice::start(&format!("tee {}", heard.display())).unwrap();
+        for line in ["liftoff", "$(reboot); `x` | y"] {
+            assert_eq!(voice.say(line), Ok(()));
+        }
+        let Voice { lines, thread } = voice;
+        drop(lines);
+        thread.join().unwrap();
+        assert_eq!(std::fs::read_to_string(heard).unwrap(), "liftoff\n$(reboot); `x` | y\n");
+    }
+
+    /// More than a pipe holds; a call that waited would never return.
+    #[test]
+    fn a_command_that_never_reads_delays_nothing() {
+        let voice = Voice::start("sleep 3").unwrap();
+        for _ in 0..100_000 {
+            let _ = voice.say("150 metres");
+        }
+    }
+
+    #[test]
+    fn an_unknown_command_is_an_error_and_an_ended_one_is_noticed() {
+        assert!(Voice::start("no-such-command-anywhere").is_err());
+        assert!(Voice::start(" ").is_err());
+        let voice = Voice::start("true").unwrap();
+        while voice.say("anybody there?").is_ok() {
+            std::thread::yield_now();
+        }
+        assert_eq!(voice.say("nobody"), Err(VoiceEnded));
+    }
+}
+
+#[cfg(test)]
+mod report_tests {
+    use super::*;
+
+    #[test]
+    fn a_report_gets_a_free_name_and_a_wrong_log_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("flight.mcap");
+        assert_eq!(free_name(&log), Some(folder.path().join("flight.html")));
+        std::fs::write(folder.path().join("flight.html"), "").unwrap();
+        assert_eq!(free_name(&log), Some(folder.path().join("flight-2.html")));
+        let told = begin_report(&log).unwrap().recv().unwrap();
+        assert!(told.is_err(), "there is no such log: {told:?}");
+        assert_eq!(std::fs::read_to_string(folder.path().join("flight.html")).unwrap(), "");
+    }
+}

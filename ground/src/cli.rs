@@ -1,0 +1,567 @@
+//! The command line: every command, flag and help text.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::builder::NonEmptyStringValueParser;
+use clap::{Parser, Subcommand, ValueEnum};
+use protocol::dialect::TdPhase;
+use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::transport::LinkAddress;
+use serde::Deserialize;
+use simulated_vehicle::fly::StartPoint;
+
+use crate::demo::Speed;
+use crate::exit;
+use crate::model::act::Bindings;
+use crate::model::place::Degrees;
+use crate::model::words;
+use crate::view::theme::Palette;
+
+/// The profile that the demonstration flies by default.
+const DEMO_PROFILE: &str = "mk2";
+const DEMO_SEED: u64 = 1;
+
+/// Terminal ground station for a rocket that lands on its own thrust.
+///
+/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from apogee to touchdown,
+/// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
+/// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended.
+#[derive(Debug, Clone, Parser)]
+#[command(name = "ground", version, after_help = exit::HELP)]
+pub struct Cli {
+    /// What to run instead of a station with its screen.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
+    #[arg(long, value_name = "LINK", global = true)]
+    pub connect: Vec<LinkAddress>,
+
+    /// This station's own MAVLink system id; every station on a link needs a different one. Default: 255.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub sysid: Option<u8>,
+
+    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1; for a replay the
+    /// first vehicle in the log.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
+    pub vehicle_sysid: Option<u8>,
+
+    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen` creates a key.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub key: Option<PathBuf>,
+
+    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
+    /// share. Without the name of somebody who has a key this station only looks on.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub crew: Option<PathBuf>,
+
+    /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
+    #[arg(long, value_name = "NAME|FILE", global = true)]
+    pub mission: Option<String>,
+
+    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub checklist: Option<PathBuf>,
+
+    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub pad: Option<Degrees>,
+
+    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
+    pub here: Option<Degrees>,
+
+    /// Log to write (MCAP), or `none`. An existing file is not overwritten.
+    ///
+    /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub log: Option<LogChoice>,
+
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2; the paper's landing is paper-calibrated.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
+    pub profile: Option<String>,
+
+    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one.
+    #[arg(long, value_name = "START", conflicts_with = "connect", global = true)]
+    pub start: Option<StartPoint>,
+
+    /// Demonstration: seed of its dispersions. Default: 1.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", global = true)]
+    pub seed: Option<u64>,
+
+    /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
+    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", global = true)]
+    pub speed: Option<Speed>,
+
+    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
+    ///
+    /// Default: with --connect the name of the log with this extension; the demonstration writes none.
+    #[arg(long, value_name = "FILE|none", global = true)]
+    pub tlog: Option<LogChoice>,
+
+    /// Settings file (TOML); `ground config example` prints one.
+    ///
+    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
+    #[arg(long, value_name = "FILE", global = true)]
+    pub config: Option<PathBuf>,
+
+    /// `ground daemon`: fly the demonstration even if the settings name a link.
+    #[arg(long, conflicts_with = "connect", global = true)]
+    pub demo: bool,
+
+    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
+    /// touchdown-*.mcap in the current directory.
+    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
+    pub replay: Option<PathBuf>,
+
+    /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
+    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
+    pub from: Option<ReplayFrom>,
+
+    /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
+    #[arg(long, value_name = "PATH", global = true)]
+    pub socket: Option<PathBuf>,
+
+    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
+    #[arg(long, value_name = "ADDRESS:PORT", global = true)]
+    pub watchers: Option<String>,
+
+    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub operator: Option<String>,
+
+    /// Ring the terminal's bell on an alarm. Default: true.
+    #[arg(long, value_name = "true|false", global = true)]
+    pub bell: Option<bool>,
+
+    /// Command to run with `sh -c` when an alarm is raised, with its text in $TOUCHDOWN_ALARM; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub alarm_command: Option<String>,
+
+    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub characters: Option<Characters>,
+
+    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
+    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
+    #[arg(long, value_name = "WHICH", global = true)]
+    pub theme: Option<ThemeChoice>,
+
+    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
+    pub voice: Option<String>,
+
+    /// How much is called out. Default: normal.
+    #[arg(long, value_name = "HOW_MUCH", global = true)]
+    pub talk: Option<TalkAmount>,
+
+    /// The least time between two heights that are called out. Default: 1.5.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, global = true)]
+    pub talk_every_s: Option<Seconds>,
+
+    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
+    #[arg(long, value_name = "ACTION=KEY,...", global = true)]
+    pub keys: Option<Bindings>,
+
+    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
+    #[arg(long, global = true)]
+    pub auto: bool,
+
+    /// Print lines instead of the full screen, even on a terminal.
+    #[arg(long)]
+    pub headless: bool,
+
+    /// Without a screen: give up if the flight has not ended after this time.
+    ///
+    /// Default: 120 s if the flight is started automatically, otherwise never.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub timeout_s: Option<Seconds>,
+}
+
+/// The commands of `ground` besides a station with its screen.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Command {
+    /// A station without a screen: holds the link, records, and serves screens until `ground stop` or SIGTERM ends it.
+    ///
+    /// It keeps running when its screens close and when the session that started it ends.
+    #[command(after_help = "Example: ground daemon --connect serial:/dev/ttyUSB0:57600 --log flight.mcap")]
+    Daemon,
+    /// A screen for a station in another process on this machine. Quitting does not affect the station.
+    #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
+    Attach {
+        /// Show only; command nothing.
+        #[arg(long)]
+        watch: bool,
+        /// Watch a station on another machine: the HOST:PORT of its --watchers.
+        #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
+        from: Option<String>,
+    },
+    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
+    ///
+    /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
+    /// it. In a station that holds the link, the key L does the same.
+    #[command(
+        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
+    )]
+    Download {
+        /// File on the vehicle. Default: its newest log.
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
+        /// Folder to write into.
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        to: PathBuf,
+    },
+    /// List your stations: socket, process, link, vehicle, phase, log and screens.
+    #[command(after_help = "Example: ground status")]
+    Status,
+    /// End a station. This is refused while its vehicle is armed or in flight.
+    #[command(after_help = "Example: ground stop")]
+    Stop {
+        /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Check the settings file or print an example.
+    #[command(after_help = "Example: ground config check")]
+    Config {
+        /// Check the file, or print an example.
+        #[command(subcommand)]
+        command: ConfigCommand,
+    },
+    /// Print a shell's completions.
+    #[command(after_help = "Example: ground completions bash")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff).
+    #[command(after_help = "Example: ground man")]
+    Man,
+}
+
+/// What can be done with the settings.
+#[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
+pub enum ConfigCommand {
+    /// Check the settings and print them as a table.
+    #[command(after_help = "Examples:\n  ground config check\n  ground config check field.toml")]
+    Check {
+        /// The file, as with --config.
+        #[arg(value_name = "FILE", conflicts_with = "config")]
+        file: Option<PathBuf>,
+    },
+    /// Print a file with every key, its meaning and its default.
+    #[command(after_help = "Example: ground config example")]
+    Example,
+}
+
+/// What the demonstration flies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demonstration<'a> {
+    /// A built-in name or a file.
+    pub profile: &'a str,
+    /// Where it begins; `None` leaves it to the profile.
+    pub start: Option<StartPoint>,
+    pub seed: u64,
+    pub speed: Speed,
+}
+
+impl Cli {
+    /// What the demonstration flies.
+    pub fn demonstration(&self) -> Demonstration<'_> {
+        Demonstration {
+            profile: self.profile.as_deref().unwrap_or(DEMO_PROFILE),
+            start: self.start,
+            seed: self.seed.unwrap_or(DEMO_SEED),
+            speed: self.speed.unwrap_or(Speed::Factor(1.0)),
+        }
+    }
+
+    /// Our own MAVLink address.
+    pub fn us(&self) -> Address {
+        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
+    }
+
+    /// The vehicle's MAVLink address.
+    pub fn vehicle(&self) -> Address {
+        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
+    }
+
+    /// Whether the flags describe a demonstration, so that links in the settings do not apply.
+    pub fn describes_demonstration(&self) -> bool {
+        self.demo
+            || self.profile.is_some()
+            || self.start.is_some()
+            || self.seed.is_some()
+            || self.speed.is_some()
+    }
+
+    /// A given flag that the command would ignore.
+    pub fn ignored_flag(&self) -> Option<&'static str> {
+        let downloads = matches!(self.command, Some(Command::Download { .. }));
+        let ignores = downloads
+            || matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
+        // A download has a link of its own.
+        let ignored =
+            |flag: &str| ignores && !(downloads && ["--connect", "--key", "--crew"].contains(&flag));
+        let given = [
+            ("--connect", !self.connect.is_empty()),
+            ("--key", self.key.is_some()),
+            ("--crew", self.crew.is_some()),
+            ("--mission", self.mission.is_some()),
+            ("--checklist", self.checklist.is_some()),
+            ("--pad", self.pad.is_some()),
+            ("--here", self.here.is_some()),
+            ("--watchers", self.watchers.is_some()),
+            ("--log", self.log.is_some()),
+            ("--tlog", self.tlog.is_some()),
+            ("--profile", self.profile.is_some()),
+            ("--start", self.start.is_some()),
+            ("--seed", self.seed.is_some()),
+            ("--speed", self.speed.is_some()),
+            ("--demo", self.demo),
+            ("--replay", self.replay.is_some()),
+            ("--auto", self.auto),
+            ("--timeout-s", self.timeout_s.is_some()),
+            ("--alarm-command", self.alarm_command.is_some()),
+        ];
+        given.into_iter().find(|(flag, given)| *given && ignored(flag)).map(|(flag, _)| flag)
+    }
+
+    /// Whether the automatic mode starts the flight.
+    pub fn starts_by_itself(&self, interactive: bool) -> bool {
+        self.auto || (self.connect.is_empty() && !interactive)
+    }
+}
+
+// The values that flags take, and how their text is parsed.
+
+/// Where the log goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LogChoice {
+    /// No log.
+    None,
+    /// This file.
+    File(PathBuf),
+}
+
+impl FromStr for LogChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given {
+            "" => Err("the name of the log is empty; give a file or `none`".to_owned()),
+            "none" => Ok(Self::None),
+            path => Ok(Self::File(PathBuf::from(path))),
+        }
+    }
+}
+
+/// Where a replay begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReplayFrom {
+    /// Time since the first frame.
+    Time(Duration),
+    /// The start of this phase.
+    Phase(TdPhase),
+}
+
+impl FromStr for ReplayFrom {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if let Some(phase) = words::phase_from_name(given) {
+            return Ok(Self::Phase(phase));
+        }
+        match given.parse::<f64>() {
+            Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(Self::Time(Duration::from_secs_f64(seconds))),
+            _ => Err(format!(
+                "`{given}` is neither a number of seconds from 0 to 1000000 nor a phase such as POWERED"
+            )),
+        }
+    }
+}
+
+/// How much is called out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum TalkAmount {
+    /// Neither voice nor bells, except those of alarms
+    Nothing,
+    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO and a lost link
+    Few,
+    /// Also phases and every 50 m
+    #[default]
+    Normal,
+    /// Also every 10 m below 50 m
+    All,
+}
+
+/// A time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "f64")]
+pub struct Seconds(pub Duration);
+
+impl FromStr for Seconds {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        match given.parse::<f64>() {
+            Ok(seconds) => Self::try_from(seconds),
+            Err(_) => Err(wrong_seconds(given)),
+        }
+    }
+}
+
+impl TryFrom<f64> for Seconds {
+    type Error = String;
+
+    fn try_from(seconds: f64) -> Result<Self, String> {
+        let accepted = (0.1..=86_400.0).contains(&seconds);
+        if accepted { Ok(Self(Duration::from_secs_f64(seconds))) } else { Err(wrong_seconds(seconds)) }
+    }
+}
+
+fn wrong_seconds(given: impl std::fmt::Display) -> String {
+    format!("`{given}` is not a number of seconds from 0.1 to 86400")
+}
+
+/// What the terminal can show.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Characters {
+    /// Decide by the environment
+    #[default]
+    Auto,
+    /// Unicode characters
+    Unicode,
+    /// Only ASCII characters
+    Ascii,
+}
+
+/// Which colours to use.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub enum ThemeChoice {
+    /// Decide by the environment.
+    #[default]
+    Auto,
+    Palette(Palette),
+}
+
+impl FromStr for ThemeChoice {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        if given == "auto" {
+            return Ok(Self::Auto);
+        }
+        let found = Palette::ALL.into_iter().find(|palette| palette.name() == given);
+        found.map(Self::Palette).ok_or_else(|| {
+            let names = Palette::ALL.map(Palette::name).join(", ");
+            format!("`{given}` is no theme; give auto, {names}")
+        })
+    }
+}
+
+impl TryFrom<String> for ThemeChoice {
+    type Error = String;
+
+    fn try_from(given: String) -> Result<Self, String> {
+        given.parse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_names_every_option_and_exit_code() {
+        let help = Cli::command().render_long_help().to_string();
+        for word in [
+            "--connect",
+            "--key",
+            "--crew",
+            "--mission",
+            "--checklist",
+            "--sysid",
+            "--vehicle-sysid",
+            "--log",
+            "--profile",
+            "--start",
+            "--seed",
+            "--speed",
+            "--auto",
+            "--headless",
+            "--timeout-s",
+        ] {
+            assert!(help.contains(word), "{word}");
+        }
+        assert!(help.contains(exit::HELP));
+    }
+
+    #[test]
+    fn wrong_values_are_refused_with_what_would_do() {
+        let refuse = |arguments: &[&str]| {
+            Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().to_string()
+        };
+        assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
+        assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
+        assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
+        assert!(refuse(&["--speed", "0"]).contains("0.01"));
+        assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
+    }
+
+    #[test]
+    fn a_demonstration_without_a_screen_starts_by_itself() {
+        let demo = Cli::try_parse_from(["ground"]).unwrap();
+        let expected = Demonstration { profile: "mk2", start: None, seed: 1, speed: Speed::Factor(1.0) };
+        assert_eq!(demo.demonstration(), expected, "the mission itself");
+        assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
+        let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
+        assert!(!live.starts_by_itself(false));
+    }
+
+    #[test]
+    fn flags_that_an_attached_screen_would_ignore_are_found() {
+        let ignored = |line: &str| Cli::try_parse_from(line.split(' ')).unwrap().ignored_flag();
+        for (flag, value) in [
+            ("--connect", " udpin:0.0.0.0:14550"),
+            ("--key", " k"),
+            ("--mission", " mk2"),
+            ("--checklist", " c"),
+            ("--pad", " -1.5,2"),
+            ("--here", " 1,2"),
+            ("--watchers", " 127.0.0.1:1"),
+            ("--log", " none"),
+            ("--tlog", " none"),
+            ("--profile", " mk2"),
+            ("--start", " apogee"),
+            ("--seed", " 1"),
+            ("--speed", " 1"),
+            ("--demo", ""),
+            ("--auto", ""),
+            ("--alarm-command", " true"),
+        ] {
+            for command in ["attach", "status", "stop"] {
+                assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
+            }
+            let of_a_link = ["--connect", "--key"].contains(&flag);
+            let expected = (!of_a_link).then_some(flag);
+            assert_eq!(ignored(&format!("ground download {flag}{value}")), expected);
+            assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
+        }
+        assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
+        assert_eq!(ignored("ground --replay f.mcap attach"), Some("--replay"));
+        assert_eq!(ignored("ground attach --watch --socket s --operator anna --bell false"), None);
+    }
+}

@@ -1,0 +1,509 @@
+//! The settings file (TOML). [`EXAMPLE`] documents every key; the flag of the same name overrides it.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use protocol::identity::{GROUND, VEHICLE};
+use protocol::transport::LinkAddress;
+use serde::Deserialize;
+
+use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, TalkAmount, ThemeChoice};
+use crate::model::act::{Bindings, DEFINITIONS};
+use crate::model::alarm::{Amount, Talk};
+
+/// A file with every key, its meaning and its default; `ground config example` prints it.
+pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
+# Its path is $XDG_CONFIG_HOME/touchdown/ground.toml, or ~/.config/touchdown/ground.toml.
+
+# Links to the vehicle, as for --connect, for `ground daemon`. A bare `ground` flies its demonstration.
+#connect = ["udpin:0.0.0.0:14550"]
+
+# MAVLink system ids of this station and of its vehicle, as for --sysid and --vehicle-sysid.
+#sysid = 255
+#vehicle_sysid = 1
+
+# Signing key, as for --key. Default: nothing is signed.
+#key = "touchdown.key"
+
+# Who may command, and who sits here, as for --crew and --operator. Default: nobody is named.
+#crew = "crew.toml"
+#operator = "Ann"
+
+# The mission that the vehicle should fly, as for --mission. Default: any.
+#mission = "mission.toml"
+
+# Checklist, as for --checklist. Default: none.
+#checklist = "checklist.toml"
+
+# Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
+#log = "flight.mcap"
+
+# Telemetry log (.tlog), or "none". Default with a link: the log's name with this ending.
+#tlog = "flight.tlog"
+
+# Socket between a station and its screens. Default: one socket per station.
+#socket = "/run/user/1000/touchdown/field.sock"
+
+# Ring the terminal's bell on an alarm.
+#bell = true
+
+# Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM; or "none", the default.
+#alarm_command = "notify-send \"$TOUCHDOWN_ALARM\""
+
+# Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
+#characters = "auto"
+
+# Colours: "dark", "light" (black on white, for sunlight), "16" (the terminal's own), "none", "contrast" (high
+# contrast), or "auto": by NO_COLOR, TERM, COLORTERM and COLORFGBG. The key c changes them too.
+#theme = "auto"
+
+# Calls out the flight: a command that speaks each line of its standard input. Its words are split at spaces, without
+# a shell. Linux: "espeak-ng -s 170" (words per minute; -a is the loudness) or "spd-say -e". macOS: "xargs -I{} say {}".
+# Or "none", the default: then bells ring, one to three of them.
+#voice = "espeak-ng -s 170"
+
+# How much is called out: "nothing", "few", "normal" or "all", and the least time between two heights, s.
+#talk = "normal"
+#talk_every_s = 1.5
+
+# Other keys for actions; the key : lists every action. The keys of the abort, Enter and Esc cannot be chosen.
+# Actions that open a ladder (arm, start, disarm) need a capital letter.
+#keys = { theme = "c", path = "p" }
+"#;
+
+/// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
+/// same name.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    #[serde(default)]
+    pub connect: Vec<String>,
+    pub sysid: Option<u8>,
+    pub vehicle_sysid: Option<u8>,
+    pub key: Option<PathBuf>,
+    pub crew: Option<PathBuf>,
+    pub operator: Option<String>,
+    pub mission: Option<String>,
+    pub checklist: Option<PathBuf>,
+    pub log: Option<String>,
+    pub tlog: Option<String>,
+    pub socket: Option<PathBuf>,
+    pub bell: Option<bool>,
+    pub alarm_command: Option<String>,
+    #[serde(default)]
+    pub characters: Characters,
+    #[serde(default)]
+    pub theme: ThemeChoice,
+    #[serde(default)]
+    pub keys: Bindings,
+    pub voice: Option<String>,
+    #[serde(default)]
+    pub talk: TalkAmount,
+    pub talk_every_s: Option<Seconds>,
+}
+
+/// Why a settings file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    #[error("cannot read the settings {}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    /// It is not valid; the reason names line and key.
+    #[error("{}: {reason}", path.display())]
+    Wrong {
+        path: PathBuf,
+        /// Where it is wrong, and what would be accepted.
+        reason: String,
+    },
+}
+
+impl Config {
+    /// Loads the named file, otherwise the usual one if it exists.
+    ///
+    /// # Errors
+    /// The file cannot be read or is invalid, or a named file is missing.
+    pub fn load(named: Option<&Path>) -> Result<Self, ConfigError> {
+        let path = match (named, usual_path()) {
+            (Some(path), _) => path.to_owned(),
+            (None, Some(path)) if path.exists() => path,
+            (None, _) => return Ok(Self::default()),
+        };
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
+        Self::parse(&text).map_err(|reason| ConfigError::Wrong { path, reason })
+    }
+
+    /// Parses the text of a file and checks every value.
+    ///
+    /// # Errors
+    /// The text is invalid; the error says where.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let config: Self = toml::from_str(text).map_err(|error| error.to_string())?;
+        for link in &config.connect {
+            link.parse::<LinkAddress>().map_err(|error| format!("connect: {error}"))?;
+        }
+        for (key, value) in [("sysid", config.sysid), ("vehicle_sysid", config.vehicle_sysid)] {
+            if value == Some(0) {
+                return Err(format!("{key}: 0 addresses every system; give one from 1 to 255"));
+            }
+        }
+        for (key, value) in [("log", &config.log), ("tlog", &config.tlog)] {
+            if let Some(file) = value {
+                file.parse::<LogChoice>().map_err(|error| format!("{key}: {error}"))?;
+            }
+        }
+        if config.alarm_command.as_ref().is_some_and(|command| command.trim().is_empty()) {
+            return Err("alarm_command is empty; give a command or \"none\"".to_owned());
+        }
+        if config.voice.as_ref().is_some_and(|command| command.trim().is_empty()) {
+            return Err("voice is empty; give a command or \"none\"".to_owned());
+        }
+        Ok(config)
+    }
+
+    /// Fills in the flags that the command line does not give.
+    pub fn fill(&self, cli: &mut Cli) {
+        fn parsed<T: std::str::FromStr>(value: Option<&String>) -> Option<T> {
+            value.and_then(|value| value.parse().ok())
+        }
+        // Only a daemon takes links from the settings: a bare `ground` must always be the demonstration.
+        let is_daemon = matches!(cli.command, Some(Command::Daemon));
+        if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
+            cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        }
+        // A replay shows the vehicle in the log, whatever the settings say.
+        if cli.replay.is_none() {
+            cli.sysid = cli.sysid.or(self.sysid);
+            cli.vehicle_sysid = cli.vehicle_sysid.or(self.vehicle_sysid);
+        }
+        if cli.key.is_none() && !cli.connect.is_empty() {
+            cli.key.clone_from(&self.key);
+        }
+        if cli.crew.is_none() && !cli.connect.is_empty() {
+            cli.crew.clone_from(&self.crew);
+        }
+        if cli.mission.is_none() && !cli.connect.is_empty() {
+            cli.mission.clone_from(&self.mission);
+        }
+        if cli.checklist.is_none() && !cli.connect.is_empty() {
+            cli.checklist.clone_from(&self.checklist);
+        }
+        if cli.operator.is_none() {
+            cli.operator.clone_from(&self.operator);
+        }
+        if cli.log.is_none() {
+            cli.log = parsed(self.log.as_ref());
+        }
+        if cli.tlog.is_none() {
+            cli.tlog = parsed(self.tlog.as_ref());
+        }
+        if cli.socket.is_none() {
+            cli.socket.clone_from(&self.socket);
+        }
+    }
+
+    /// What is called out.
+    pub fn talk(&self) -> Talk {
+        let amount = match self.talk {
+            TalkAmount::Nothing => Amount::Nothing,
+            TalkAmount::Few => Amount::Few,
+            TalkAmount::Normal => Amount::Normal,
+            TalkAmount::All => Amount::All,
+        };
+        let usual = Talk::default();
+        let height_every = self.talk_every_s.map_or(usual.height_every, |Seconds(every)| every);
+        Talk { amount, height_every, has_voice: self.voice.is_some() }
+    }
+
+    /// The flags about the screen and its alarms override the file.
+    #[must_use]
+    pub fn overridden_by(self, cli: &Cli) -> Self {
+        let alarm_command = cli.alarm_command.clone().or(self.alarm_command);
+        Self {
+            bell: cli.bell.or(self.bell),
+            alarm_command: alarm_command.filter(|command| command != "none"),
+            characters: cli.characters.unwrap_or(self.characters),
+            theme: cli.theme.unwrap_or(self.theme),
+            keys: cli.keys.clone().unwrap_or(self.keys),
+            voice: cli.voice.clone().or(self.voice).filter(|command| command != "none"),
+            talk: cli.talk.unwrap_or(self.talk),
+            talk_every_s: cli.talk_every_s.or(self.talk_every_s),
+            ..self
+        }
+    }
+}
+
+/// The usual path of the settings file.
+pub fn usual_path() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let directory = match (set("XDG_CONFIG_HOME"), set("HOME")) {
+        (Some(directory), _) => PathBuf::from(directory),
+        (None, Some(home)) => PathBuf::from(home).join(".config"),
+        (None, None) => return None,
+    };
+    Some(directory.join("touchdown").join("ground.toml"))
+}
+
+// The settings as a table, for `ground config check`.
+
+/// Values begin in this column.
+const VALUES: usize = 15;
+
+impl Config {
+    /// One line for each key: its value, or in parentheses what holds without one.
+    pub fn table(&self) -> String {
+        // Named one by one, so that a new key does not compile without its line.
+        let Self {
+            connect,
+            sysid,
+            vehicle_sysid,
+            key,
+            crew,
+            operator,
+            mission,
+            checklist,
+            log,
+            tlog,
+            socket,
+            bell,
+            alarm_command,
+            characters,
+            theme,
+            keys,
+            voice,
+            talk,
+            talk_every_s,
+        } = self;
+        let usual = Self::default();
+        let seconds = |time: std::time::Duration| time.as_secs_f64().to_string();
+        let given =
+            |value: Option<String>, otherwise: &str| value.unwrap_or_else(|| format!("({otherwise})"));
+        let chosen = |name: String, is_usual: bool| if is_usual { format!("({name})") } else { name };
+        let path = |path: &Option<std::path::PathBuf>| path.as_ref().map(|path| path.display().to_string());
+        let other_keys: Vec<String> = DEFINITIONS
+            .iter()
+            .filter(|definition| keys.key(definition.act) != definition.usual)
+            .map(|definition| format!("{}={}", definition.name, keys.name(definition.act)))
+            .collect();
+        let theme_name = match theme {
+            ThemeChoice::Auto => "auto",
+            ThemeChoice::Palette(palette) => palette.name(),
+        };
+        let rows = [
+            ("connect", given((!connect.is_empty()).then(|| connect.join(" ")), "the demonstration")),
+            ("sysid", given(sysid.map(|id| id.to_string()), &GROUND.system_id.to_string())),
+            ("vehicle_sysid", given(vehicle_sysid.map(|id| id.to_string()), &VEHICLE.system_id.to_string())),
+            ("key", given(path(key), "nothing is signed")),
+            ("crew", given(path(crew), "nobody is named")),
+            ("operator", given(operator.clone(), "the user and the terminal, or the SSH client")),
+            ("mission", given(mission.clone(), "any")),
+            ("checklist", given(path(checklist), "none")),
+            ("log", given(log.clone(), "touchdown-YYYYMMDD-HHMMSS.mcap in the current directory")),
+            ("tlog", given(tlog.clone(), "with a link: beside the log")),
+            ("socket", given(path(socket), "one for each station")),
+            ("bell", given(bell.map(|bell| bell.to_string()), "true")),
+            ("alarm_command", given(alarm_command.clone(), "none")),
+            ("characters", chosen(value_name(characters), *characters == usual.characters)),
+            ("theme", chosen(theme_name.to_owned(), *theme == usual.theme)),
+            ("voice", given(voice.clone(), "none")),
+            ("talk", chosen(value_name(talk), *talk == usual.talk)),
+            (
+                "talk_every_s",
+                given(
+                    talk_every_s.map(|Seconds(every)| seconds(every)),
+                    &seconds(Talk::default().height_every),
+                ),
+            ),
+            ("keys", given((!other_keys.is_empty()).then(|| other_keys.join(" ")), "the usual ones")),
+        ];
+        let mut table = String::new();
+        for (key, value) in rows {
+            // Writing to a string cannot fail.
+            let _ = writeln!(table, "{key:VALUES$}{value}");
+        }
+        table
+    }
+}
+
+/// The name of a value, as in the file.
+fn value_name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{CommandFactory as _, Parser as _};
+
+    use crate::model::act::Act;
+    use crate::model::alarm::Amount;
+    use crate::view::theme::Palette;
+
+    // Tests of the settings file, its example and the flags.
+
+    /// Every key of the example is valid without its comment mark, and the example names every key.
+    #[test]
+    fn the_example_contains_every_key() {
+        let keys =
+            EXAMPLE.lines().filter_map(|line| line.strip_prefix('#')).filter(|line| !line.starts_with(' '));
+        let uncommented = keys.collect::<Vec<_>>().join("\n");
+        let config = Config::parse(&uncommented).unwrap();
+        assert!(
+            !config.connect.is_empty()
+                && config.key.is_some()
+                && config.log.is_some()
+                && config.tlog.is_some()
+        );
+        assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
+        assert_eq!(uncommented.lines().count(), 19, "one line a key: {uncommented}");
+        assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
+    }
+
+    #[test]
+    fn an_error_names_the_wrong_key() {
+        let wrong = |text: &str| Config::parse(text).unwrap_err();
+        assert!(wrong("belll = true").contains("belll"));
+        assert!(wrong("connect = [\"tcp\"]").contains("udpin:ADDRESS:PORT"));
+        assert!(wrong("theme = \"blue\"").contains("light"));
+        assert!(wrong("sysid = 0").contains("sysid: 0 addresses every system"));
+        assert!(wrong("vehicle_sysid = 256").contains("vehicle_sysid"));
+        assert!(wrong("log = \"\"").contains("log: "));
+        assert!(wrong("voice = \"\"").contains("voice is empty"));
+        assert!(wrong("talk = \"loud\"").contains("few"));
+        assert!(wrong("talk_every_s = 0.0").contains("from 0.1 to 86400"));
+        assert!(wrong("keys = { arm = \"a\" }").contains("capital letter"));
+        assert!(wrong("alarm_command = \" \"").contains("empty"));
+    }
+
+    /// A key, its value in a file, its flags, and a check that the value of the flag is used.
+    type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
+
+    const OVERRIDES: [Override; 19] = [
+        ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
+            cli.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
+        }),
+        ("sysid", "3", &["--sysid", "4"], |cli, _| cli.us().system_id == 4),
+        ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |cli, _| cli.vehicle().system_id == 4),
+        ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |cli, _| {
+            cli.key == Some("b".into())
+        }),
+        ("crew", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--crew", "b"], |cli, _| {
+            cli.crew == Some("b".into())
+        }),
+        ("operator", "\"Ann\"", &["--operator", "Bob"], |cli, _| cli.operator.as_deref() == Some("Bob")),
+        ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |cli, _| {
+            cli.mission.as_deref() == Some("mk3")
+        }),
+        ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |cli, _| {
+            cli.checklist.as_deref() == Some(Path::new("b"))
+        }),
+        ("log", "\"a.mcap\"", &["--log", "b.mcap"], |cli, _| {
+            cli.log == Some(LogChoice::File("b.mcap".into()))
+        }),
+        ("tlog", "\"a.tlog\"", &["--tlog", "none"], |cli, _| cli.tlog == Some(LogChoice::None)),
+        ("socket", "\"/a\"", &["--socket", "/b"], |cli, _| cli.socket == Some("/b".into())),
+        ("bell", "true", &["--bell", "false"], |_, config| config.bell == Some(false)),
+        ("alarm_command", "\"a\"", &["--alarm-command", "b"], |_, config| {
+            config.alarm_command.as_deref() == Some("b")
+        }),
+        ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
+            config.characters == Characters::Ascii
+        }),
+        ("theme", "\"dark\"", &["--theme", "light"], |_, config| {
+            config.theme == ThemeChoice::Palette(Palette::Light)
+        }),
+        ("voice", "\"a\"", &["--voice", "b"], |_, config| config.voice.as_deref() == Some("b")),
+        ("talk", "\"few\"", &["--talk", "all"], |_, config| config.talk().amount == Amount::All),
+        ("talk_every_s", "3", &["--talk-every-s", "4"], |_, config| {
+            config.talk().height_every.as_secs() == 4
+        }),
+        ("keys", "{ theme = \"w\" }", &["--keys", "theme=z"], |_, config| {
+            config.keys.name(Act::NextTheme) == "z"
+        }),
+    ];
+
+    /// Combines settings and command line as a run does.
+    fn together(file: &str, flags: &[&str]) -> (Cli, Config) {
+        let config = Config::parse(file).unwrap();
+        let mut cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
+        config.fill(&mut cli);
+        let config = config.overridden_by(&cli);
+        (cli, config)
+    }
+
+    #[test]
+    fn every_key_has_a_flag_that_overrides_it() {
+        let keys: Vec<&str> = EXAMPLE
+            .lines()
+            .filter_map(|line| line.strip_prefix('#')?.split_once(" = "))
+            .map(|(key, _)| key)
+            .filter(|key| !key.contains(' '))
+            .collect();
+        assert_eq!(OVERRIDES.map(|(key, ..)| key).as_slice(), keys);
+        for (key, in_file, flags, holds) in OVERRIDES {
+            let file = format!("{key} = {in_file}");
+            assert!(flags.contains(&format!("--{}", key.replace('_', "-")).as_str()), "{key}: its own name");
+            let (cli, config) = together(&file, flags);
+            assert!(holds(&cli, &config), "{key}: the flag counts");
+            let (cli, config) = together(&file, &[]);
+            assert!(!holds(&cli, &config), "{key}: without the flag the file counts");
+        }
+    }
+
+    #[test]
+    fn completions_and_manual_page_have_the_flag_of_every_key() {
+        let (mut script, mut page) = (Vec::new(), Vec::new());
+        clap_complete::generate(clap_complete::Shell::Bash, &mut Cli::command(), "ground", &mut script);
+        clap_mangen::Man::new(Cli::command()).render(&mut page).unwrap();
+        let (script, page) = (String::from_utf8(script).unwrap(), String::from_utf8(page).unwrap());
+        for (key, ..) in OVERRIDES {
+            let flag = format!("--{}", key.replace('_', "-"));
+            assert!(script.contains(&flag), "{flag}");
+            // A hyphen is escaped in roff.
+            assert!(page.contains(&flag.replace('-', "\\-")), "{flag}");
+        }
+    }
+
+    /// A bare `ground` flies the demonstration; it must not command a real vehicle over a link in the settings.
+    #[test]
+    fn a_bare_ground_takes_no_link_from_the_settings() {
+        for bare in [&[][..], &["--auto"], &["--headless"], &["--log", "none"]] {
+            assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).0.connect, [], "{bare:?}");
+        }
+    }
+
+    #[test]
+    fn flags_for_the_demonstration_and_none_override_the_file() {
+        let file = "connect = [\"udpin:0.0.0.0:14550\"]";
+        for demonstration in [&["daemon", "--demo"][..], &["daemon", "--seed", "2"]] {
+            assert_eq!(together(file, demonstration).0.connect, []);
+        }
+        assert_eq!(together(file, &["daemon"]).0.connect.len(), 1);
+        let (_, config) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
+        assert_eq!(config.alarm_command, None);
+        let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);
+        assert!(empty.unwrap_err().to_string().contains("--alarm-command"));
+    }
+
+    /// The table has a line for every key; what the file does not give is in parentheses.
+    #[test]
+    fn the_table_shows_every_key() {
+        let usual = Config::default().table();
+        assert_eq!(usual.lines().count(), OVERRIDES.len());
+        for (key, in_file, ..) in OVERRIDES {
+            let line = |table: &str| {
+                let found = table.lines().find(|line| line.split(' ').next() == Some(key));
+                found.unwrap_or_else(|| panic!("no line for {key} in {table}")).to_owned()
+            };
+            assert!(line(&usual).ends_with(')'), "{}", line(&usual));
+            let given = line(&Config::parse(&format!("{key} = {in_file}")).unwrap().table());
+            assert!(!given.ends_with(')'), "{given}");
+            if key != "keys" {
+                let value = in_file.trim_matches(['[', ']']).trim_matches('"');
+                assert!(given.ends_with(value), "{given}: {value}");
+            }
+        }
+        let keys = Config::parse("keys = { theme = \"w\", path = \"m\" }").unwrap().table();
+        assert!(keys.contains("theme=w") && keys.contains("path=m"), "{keys}");
+    }
+}

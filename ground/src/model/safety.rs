@@ -1,0 +1,424 @@
+//! What keeps people safe: the landing motor, holds, aborts and their effect, and how a flight ended.
+
+use std::time::Duration;
+
+use protocol::dialect::{
+    TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLatch,
+    TdLimit, TdMotor, TdPhase,
+};
+use protocol::log::record::EventLevel;
+
+use super::Model;
+use super::command::CommandKind;
+use super::crew::role_name;
+use super::dead_reckoning::{is_unheard, may_have_left, predict_position};
+use super::log::Speaker;
+use super::vehicle::{Vehicle, Verdict, is_on_pad};
+
+/// Why nobody may approach, the worst reason first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Danger {
+    /// The motor is not lit, and only software keeps it from lighting.
+    Live,
+    /// The same after the waiting time: a person may approach to insert the pin.
+    LiveWaited,
+    /// The motor burns or has been commanded to light.
+    Burning,
+    /// After a flight the vehicle reports nothing about the motor.
+    NotReported,
+    /// The motor is burnt out and still hot.
+    Hot,
+    /// The waiting time after an abort on the pad.
+    Wait,
+}
+
+/// Why people must stay away from the vehicle, and for how long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KeepAway {
+    pub danger: Danger,
+    /// For how long, s; `None` while it is unknown.
+    pub wait_s: Option<u16>,
+}
+
+impl KeepAway {
+    /// The present warning. `None` while a vehicle is being prepared, and while it flies as planned.
+    ///
+    /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
+    pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        let sample = vehicle.status.as_ref()?;
+        let status = &sample.value;
+        let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
+        let passed_s = u16::try_from(sample.age(now).as_secs()).unwrap_or(u16::MAX);
+        let wait_s = told_s.map(|told_s| told_s.max(status.pad_wait_s).saturating_sub(passed_s));
+        let danger = match status.motor {
+            _ if !concerns(status) => return None,
+            TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,
+            TdMotor::TD_MOTOR_LIVE => Danger::Live,
+            TdMotor::TD_MOTOR_BURNING => Danger::Burning,
+            TdMotor::TD_MOTOR_HOT if wait_s != Some(0) || !sample.is_stale(now) => Danger::Hot,
+            TdMotor::TD_MOTOR_UNKNOWN if !is_on_pad(status.phase) => Danger::NotReported,
+            TdMotor::TD_MOTOR_UNKNOWN | TdMotor::TD_MOTOR_PIN_IN | TdMotor::TD_MOTOR_BURNT
+                if wait_s != Some(0) =>
+            {
+                Danger::Wait
+            }
+            _ => return None,
+        };
+        Some(Self { danger, wait_s })
+    }
+
+    /// For how long, and the reason: what follows `do not approach`.
+    pub fn reason(&self) -> String {
+        let left = self.wait_s.filter(|left_s| *left_s > 0);
+        let left = left.map_or_else(String::new, |left_s| format!(" for {left_s} s"));
+        match self.danger {
+            Danger::Live => format!("{left}: LIVE MOTOR"),
+            Danger::LiveWaited => " but to put the pin in: LIVE MOTOR".to_owned(),
+            Danger::Burning => format!("{left}: MOTOR BURNING"),
+            Danger::NotReported => format!("{left}: MOTOR NOT REPORTED: treat it as live"),
+            Danger::Hot => format!("{left}: MOTOR HOT, burnt out"),
+            Danger::Wait => format!("{left}: the waiting time runs"),
+        }
+    }
+}
+
+/// Whether people may approach a vehicle that is down, or whose countdown was aborted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Approach {
+    DoNot(KeepAway),
+    /// They may, for this reason.
+    May(&'static str),
+}
+
+impl Approach {
+    /// `None` in flight, and while a vehicle is being prepared.
+    pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        let status = &vehicle.status.as_ref()?.value;
+        if vehicle.in_flight() || !concerns(status) {
+            return None;
+        }
+        Some(match (KeepAway::of(vehicle, now), status.motor) {
+            (Some(away), _) => Self::DoNot(away),
+            (None, TdMotor::TD_MOTOR_PIN_IN) => Self::May("the pin is in"),
+            (None, TdMotor::TD_MOTOR_BURNT) => Self::May("the motor is burnt out and cool"),
+            (None, TdMotor::TD_MOTOR_HOT) => {
+                Self::May("the motor is burnt out, and its cooling time is over")
+            }
+            (None, _) => Self::May("the waiting time is over"),
+        })
+    }
+
+    /// The words that stand largest on every page.
+    pub fn headline(&self) -> &'static str {
+        match self {
+            Self::DoNot(_) => "DO NOT APPROACH",
+            Self::May(_) => "MAY BE APPROACHED",
+        }
+    }
+
+    /// What follows the headline in a sentence: for how long, and the reason.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::DoNot(away) => away.reason(),
+            Self::May(why) => format!(": {why}"),
+        }
+    }
+}
+
+/// Whether the motor matters to people on the ground: the flight is over or does not go as planned, or a waiting time
+/// runs.
+fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
+    let amiss = TdInterlock::TD_INTERLOCK_ABORT_LATCHED
+        | TdInterlock::TD_INTERLOCK_NO_LIGHT
+        | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    match status.phase {
+        TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED | TdPhase::TD_PHASE_CHUTE => true,
+        // The arming ladder shows this state to the crew.
+        TdPhase::TD_PHASE_PAD_ARMED => false,
+        // Before a flight the motor is inhibited as planned.
+        phase if is_on_pad(phase) => {
+            let latched = status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
+            latched || status.approach_wait_s > 0 || status.pad_wait_s > 0
+        }
+        _ => status.interlocks.intersects(amiss),
+    }
+}
+
+/// The operator who held the countdown, or whose silence did.
+fn held_by(vehicle: &Vehicle) -> Option<String> {
+    let number = vehicle.crew.as_ref().map(|crew| crew.value.held_by)?;
+    let (role, name) = vehicle.operators.get(&number)?;
+    Some(format!("{} {name}", role_name(*role)))
+}
+
+/// Why the countdown was held and what happens next; `None` while it is not held.
+pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
+    let status = &vehicle.status.as_ref()?.value;
+    let whom = if armed_here { "this station" } else { "its station" };
+    let why = match status.hold {
+        TdHold::TD_HOLD_NONE => return None,
+        TdHold::TD_HOLD_UPLINK_SILENT if held_by(vehicle).is_some() && !armed_here => {
+            format!("the vehicle did not hear {} for 2 s", held_by(vehicle).unwrap_or_default())
+        }
+        TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 2 s"),
+        TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
+            Some(who) => format!("{who} asked for it"),
+            None => "a station asked for it".to_owned(),
+        },
+        TdHold::TD_HOLD_TAP_OVERDUE => match held_by(vehicle) {
+            Some(who) => format!("no tap of {who} for 2 s"),
+            None => "no tap for 2 s".to_owned(),
+        },
+    };
+    let held = status.phase == TdPhase::TD_PHASE_PAD_ARMED;
+    held.then(|| format!("HOLD: {why}; start anew; disarms in {} s", status.hold_left_s))
+}
+
+// How a flight ended: one of four ends, each with its word.
+
+/// A vehicle that hits the ground at this speed or faster, m/s, is a wreck: that of a fall from 5 m. Its legs withstand
+/// 1 m/s, and under an open parachute it comes down at 6 m/s.
+const WRECKED_FROM_M_S: f64 = 10.0;
+/// After this long without a word, a vehicle in flight whose fall cannot be predicted is down: 300 m under a parachute
+/// take 50 s.
+const SURELY_DOWN_AFTER: Duration = Duration::from_mins(2);
+
+/// The four ends of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// It stands, inside every limit.
+    Landed,
+    /// It came down under an open parachute.
+    UnderParachute,
+    /// It met the ground outside a limit.
+    Hard,
+    /// It is a wreck, or it fell silent in flight and must be down.
+    Lost,
+}
+
+impl Ending {
+    /// The word that every screen uses.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Landed => "LANDED",
+            Self::UnderParachute => "DOWN UNDER THE PARACHUTE",
+            Self::Hard => "HARD LANDING",
+            Self::Lost => "LOST",
+        }
+    }
+
+    /// The end of this flight; `None` while it goes on, or while nothing has been told of its end.
+    pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        if let Some(verdict) = vehicle.verdict {
+            return Some(Self::judged(vehicle, &verdict.value));
+        }
+        let phase = vehicle.phase()?.value;
+        match phase {
+            TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED => {
+                hangs_on_its_chute(vehicle).then_some(Self::UnderParachute)
+            }
+            _ => is_silent_and_down(vehicle, now).then_some(Self::Lost),
+        }
+    }
+
+    fn judged(vehicle: &Vehicle, verdict: &Verdict) -> Self {
+        let (along_m_s, across_m_s) = (verdict.touchdown.u_m_s, verdict.touchdown.w_m_s);
+        if verdict.landed {
+            Self::Landed
+        } else if hangs_on_its_chute(vehicle) && along_m_s.abs() < WRECKED_FROM_M_S {
+            Self::UnderParachute
+        } else if libm::hypot(along_m_s, across_m_s) < WRECKED_FROM_M_S {
+            Self::Hard
+        } else {
+            Self::Lost
+        }
+    }
+
+    /// The word with what is known of this end.
+    pub fn sentence(self, vehicle: &Vehicle) -> String {
+        format!("{}{}", self.word(), self.detail(vehicle))
+    }
+
+    /// What is known of this end: what follows the word.
+    pub fn detail(self, vehicle: &Vehicle) -> String {
+        let verdict = vehicle.verdict.map(|verdict| verdict.value);
+        let speed_m_s = verdict.map(|verdict| libm::hypot(verdict.touchdown.u_m_s, verdict.touchdown.w_m_s));
+        match (self, verdict) {
+            (Self::Landed, _) if vehicle.limits.as_ref().is_some_and(are_of_legs) => {
+                " inside every limit of the legs".to_owned()
+            }
+            (Self::Landed, _) => " inside every limit".to_owned(),
+            (Self::UnderParachute, Some(verdict)) => {
+                format!(", sinking at {:.1} m/s", verdict.touchdown.u_m_s.abs())
+            }
+            (Self::Hard, Some(verdict)) => match verdict.touchdown.violations() {
+                Some(names) => format!(": outside {names}"),
+                None => ": it did not stay upright".to_owned(),
+            },
+            (Self::Lost, Some(_)) => format!(": hit the ground at {:.0} m/s", speed_m_s.unwrap_or_default()),
+            (Self::Lost, None) => ": it fell silent in flight and must be down".to_owned(),
+            (Self::UnderParachute | Self::Hard, None) => String::new(),
+        }
+    }
+}
+
+/// Whether its parachute was open when last told.
+fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
+    vehicle.descent.as_ref().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
+}
+
+/// Whether it fell silent in flight so long ago that it must have come down.
+fn is_silent_and_down(vehicle: &Vehicle, now: Duration) -> bool {
+    if let Some(since) = may_have_left(vehicle, now) {
+        return since >= SURELY_DOWN_AFTER;
+    }
+    if !is_unheard(vehicle, now) {
+        return false;
+    }
+    let silence = vehicle.phase().map_or(Duration::ZERO, |phase| phase.age(now));
+    predict_position(vehicle, now).map_or(silence >= SURELY_DOWN_AFTER, |at| at.is_down)
+}
+
+// A state at touchdown, predicted or reached, with the limits that the vehicle found violated.
+
+/// A state at touchdown, predicted or reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touchdown {
+    pub x_m: f64,
+    pub altitude_m: f64,
+    /// Pitch from the horizontal, rad; pi/2 is upright.
+    pub pitch_rad: f64,
+    /// Axial speed, towards the nose, m/s.
+    pub u_m_s: f64,
+    pub w_m_s: f64,
+    pub q_rad_s: f64,
+    /// The limits that the vehicle reports as violated.
+    pub violated: TdLimit,
+}
+
+/// The limits of a touchdown in the order of the state: the word on screens and the vehicle's bit.
+pub const LIMITS: [(&str, TdLimit); 6] = [
+    ("distance", TdLimit::TD_LIMIT_X),
+    ("height", TdLimit::TD_LIMIT_ALTITUDE),
+    ("tilt", TdLimit::TD_LIMIT_PITCH),
+    ("sink", TdLimit::TD_LIMIT_AXIAL_SPEED),
+    ("drift", TdLimit::TD_LIMIT_LATERAL_SPEED),
+    ("turn", TdLimit::TD_LIMIT_PITCH_RATE),
+];
+
+impl Touchdown {
+    /// The angle from upright, rad.
+    pub fn tilt_rad(&self) -> f64 {
+        (self.pitch_rad - std::f64::consts::FRAC_PI_2).abs()
+    }
+
+    /// The names of the violated limits; `None` if there is none.
+    pub fn violations(&self) -> Option<String> {
+        let violated = LIMITS.iter().filter(|(_, bit)| self.violated.contains(*bit));
+        let names: Vec<&str> = violated.map(|(name, _)| *name).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    }
+}
+
+/// What the landing legs withstand: lean, rad; vertical and horizontal speed, m/s; rotation rate, rad/s.
+const LEGS: [f64; 4] = [10.0 * DEGREE, 1.0, 0.7, 30.0 * DEGREE];
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Limits sent as `f32` match within this relative error.
+const SAME_SHARE: f64 = 1e-5;
+
+/// Whether these limits are what the landing legs withstand.
+pub fn are_of_legs(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> bool {
+    let sent = [limits.pitch_error_rad, limits.u_m_s, limits.w_m_s, limits.q_rad_s];
+    sent.into_iter().zip(LEGS).all(|(sent, own)| (f64::from(sent) - own).abs() <= SAME_SHARE * own)
+}
+
+// Why the landing motor is inhibited for good.
+
+/// A text of the vehicle this long before its latch is still about it: the text waits for the radio.
+const TEXT_APART: Duration = Duration::from_secs(2);
+/// How many of the newest events are searched for the text.
+const TEXTS_SEARCHED: usize = 100;
+
+/// The cause that the vehicle tells; `None` if it tells none, or says it in a text only.
+pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
+    Some(match vehicle.status.as_ref()?.value.latch {
+        TdLatch::TD_LATCH_NONE | TdLatch::TD_LATCH_OTHER => return None,
+        TdLatch::TD_LATCH_COMMANDED => "commanded by the crew",
+        TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF => "uncommanded lift-off",
+        TdLatch::TD_LATCH_UNCOMMANDED_RELEASE => "uncommanded release",
+        TdLatch::TD_LATCH_NO_SEPARATION => "the booster stayed on",
+        TdLatch::TD_LATCH_GATE => "the ignition gate did not open in time",
+        TdLatch::TD_LATCH_NO_LIGHT => "the motor gave no thrust",
+    })
+}
+
+/// The latch in words, with its cause; `None` while nothing is latched. A motor that did not light has words of its own.
+pub fn latch_words(model: &Model) -> Option<String> {
+    let vehicle = &model.vehicle;
+    let aborted = vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
+    let cause = latch_cause(vehicle);
+    let no_light =
+        vehicle.status.as_ref().is_some_and(|status| status.value.latch == TdLatch::TD_LATCH_NO_LIGHT);
+    let word = match (aborted, cause) {
+        (true, _) => "ABORT LATCHED",
+        (false, Some(_)) if !no_light => "MOTOR INHIBITED",
+        (false, _) => return None,
+    };
+    let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here");
+    let cause = cause.or(ours).map(str::to_owned).or_else(|| text_of_the_latch(model));
+    Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
+}
+
+/// The first grave text of the vehicle about the time of its latch, because an older vehicle tells no cause: what follows is
+/// about the consequences.
+fn text_of_the_latch(model: &Model) -> Option<String> {
+    let since = model.outcome.aborted_at?.saturating_sub(TEXT_APART);
+    let mut events = model.events.newest(TEXTS_SEARCHED);
+    let found = events.find(|event| {
+        let grave = matches!(event.level, EventLevel::Error | EventLevel::Fatal);
+        event.speaker == Speaker::Vehicle && grave && event.at >= since && event.at <= since + 2 * TEXT_APART
+    });
+    found.map(|event| event.text.clone())
+}
+
+// Whether an abort that is sent now would arrive too late. The vehicle reports what an abort would do at this
+// moment; the command takes time to reach it.
+
+/// The assumed one-way delay before a round trip has been measured: a telemetry radio's usual uplink latency.
+const ONE_WAY_UNMEASURED: Duration = Duration::from_millis(250);
+
+/// Why an abort sent now would be too late for what the vehicle offers; `None` if it is in time, or if that is
+/// unknown.
+pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
+    // A report from before a loss of the link still counts: the time keeps running.
+    let offered = model.vehicle.status.as_ref()?.value.abort_effect;
+    let chute = offered == TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    let before_ignition = chute
+        || matches!(
+            offered,
+            TdAbortEffect::TD_ABORT_EFFECT_BURN
+                | TdAbortEffect::TD_ABORT_EFFECT_IMPACT
+                | TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT
+        );
+    if !before_ignition {
+        return None;
+    }
+    let descent = model.vehicle.descent.as_ref()?;
+    let d = &descent.value;
+    let one_way = model.link.round_trip.map_or(ONE_WAY_UNMEASURED, |round_trip| round_trip / 2);
+    // Since the vehicle sent its report, and until the command arrives.
+    let passes_s = (descent.age(now) + 2 * one_way).as_secs_f64();
+    let left_s = f64::from(d.time_to_ignition_s);
+    if left_s.is_finite() && left_s < passes_s {
+        return Some(if offered == TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT {
+            // An older vehicle may then abandon its landing.
+            "TOO LATE: arrives after ignition"
+        } else {
+            "TOO LATE: arrives after ignition, lands here"
+        });
+    }
+    let (above_m, down_m_s) =
+        (f64::from(d.height_m) - f64::from(d.commit_height_m), -f64::from(d.vertical_speed_m_s));
+    let chute_lost = chute && above_m > 0.0 && down_m_s > 0.0 && above_m < down_m_s * passes_s;
+    chute_lost.then_some("TOO LATE for a chute: arrives below the commit height")
+}

@@ -1,0 +1,311 @@
+//! Lists of lines: the newest events, the checklist, and the filter above a list.
+
+use std::time::Duration;
+
+use protocol::log::record::EventLevel;
+use ratatui::text::{Line, Span};
+
+use super::CUT_MARK;
+use super::theme::{TextRole, Theme};
+use super::widgets::fixed;
+use crate::model::Model;
+use crate::model::act::Act;
+use crate::model::checklist::{Mark, Step, StepState};
+use crate::model::crew::role_name;
+use crate::model::log::Event;
+use crate::model::page::TextEntry;
+
+/// Columns before the text of an event: time, speaker and mark.
+const BEFORE_TEXT: usize = 18;
+/// Narrower than this, a text is cut rather than wrapped.
+const WRAP_COLUMNS_MIN: usize = 20;
+
+/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
+/// is its reason.
+pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    chosen(model, |_| true, theme, columns, rows)
+}
+
+/// The same of those that the crew's filter lets pass, by their text or their speaker.
+pub fn filtered(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let pages = &model.pages;
+    let passes = |event: &Event| pages.lets_pass(&event.text) || pages.lets_pass(event.speaker.name());
+    chosen(model, passes, theme, columns, rows)
+}
+
+fn chosen(
+    model: &Model,
+    passes: impl Fn(&Event) -> bool,
+    theme: Theme,
+    columns: usize,
+    rows: usize,
+) -> Vec<Line<'static>> {
+    let text_columns = columns.saturating_sub(BEFORE_TEXT);
+    let of_events: Vec<Vec<Line>> = model
+        .events
+        .newest(rows)
+        .filter(|event| passes(event))
+        .map(|event| {
+            let role = match event.level {
+                EventLevel::Info => TextRole::Plain,
+                EventLevel::Warning => TextRole::Caution,
+                EventLevel::Error | EventLevel::Fatal => TextRole::Alarm,
+            };
+            let head = format!("{:>7.1} {:<7} ", event.at.as_secs_f64(), event.speaker.name());
+            let mark = event.mark();
+            let mut pieces = wrap(&event.text, text_columns).into_iter();
+            let first = pieces.next().unwrap_or_default();
+            let first = Line::from(vec![
+                Span::styled(head, theme.style(TextRole::Label)),
+                Span::styled(format!("{mark}{first}"), theme.style(role)),
+            ]);
+            let rest = pieces.map(move |piece| {
+                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), Span::styled(piece, theme.style(role))])
+            });
+            std::iter::once(first).chain(rest).collect()
+        })
+        .collect();
+    newest_lines(of_events, columns, rows)
+}
+
+/// As many of the last lines as there are rows. If the newest event alone has more, its beginning stays, with a mark where it
+/// is cut.
+fn newest_lines(mut events: Vec<Vec<Line<'static>>>, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    if let Some(newest) = events.last_mut().filter(|newest| newest.len() > rows) {
+        newest.truncate(rows);
+        let cut = newest.last_mut().map(|line| (line.width(), line.spans.last_mut()));
+        if let Some((width, Some(text))) = cut {
+            let mut words = text.content.to_string();
+            if width >= columns {
+                words.pop();
+            }
+            words.push(CUT_MARK);
+            text.content = words.into();
+        }
+    }
+    let mut lines = events.concat();
+    lines.drain(..lines.len().saturating_sub(rows));
+    lines
+}
+
+/// Breaks a text at spaces; a word longer than a line is broken at the end of the line.
+fn wrap(text: &str, columns: usize) -> Vec<String> {
+    if columns < WRAP_COLUMNS_MIN {
+        return vec![text.to_owned()];
+    }
+    let mut lines = Vec::new();
+    let (mut line, mut used) = (String::new(), 0);
+    for word in text.split(' ') {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > columns {
+            lines.push(std::mem::take(&mut line));
+            used = 0;
+        } else if used > 0 {
+            line.push(' ');
+            used += 1;
+        }
+        for c in word.chars() {
+            if used == columns {
+                lines.push(std::mem::take(&mut line));
+                used = 0;
+            }
+            line.push(c);
+            used += 1;
+        }
+    }
+    lines.push(line);
+    lines
+}
+
+// The checklist as rows: which step counts, who signed it, and the value found.
+
+/// Columns of the mark and the number.
+const FRONT_COLUMNS: usize = 9;
+
+/// How long the reason why a step was not signed stands below the steps.
+const REFUSAL_SHOWN: Duration = Duration::from_secs(15);
+
+/// How far the checklist is, as a title.
+pub fn checklist_title(model: &Model, now: Duration) -> String {
+    let (done, all) = model.steps_done(now).unwrap_or_default();
+    let keys = &model.settings.keys;
+    let [sign, void] = [Act::SignStep, Act::VoidStep].map(|act| keys.name(act));
+    format!("Checklist {done} of {all}: {sign} signs, {void} voids")
+}
+
+/// The steps around the chosen one, on at most this many rows; below them who signs the chosen one, or who did.
+pub fn checklist_rows(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    (columns, rows): (usize, usize),
+) -> Vec<Line<'static>> {
+    let (Some(list), Some(chosen)) = (&model.checklist, model.chosen_step(now)) else { return Vec::new() };
+    let steps: Vec<Vec<Line>> = list
+        .steps
+        .iter()
+        .enumerate()
+        .map(|(place, step)| step_rows(model, (place, step), place == chosen, theme, now, columns))
+        .collect();
+    let room = rows.saturating_sub(1);
+    // Before the chosen step at most half of the rows, unless the end of the list leaves more.
+    let mut first = chosen;
+    let taken = |from: usize, to: usize| steps[from..to].iter().map(Vec::len).sum::<usize>();
+    while first > 0
+        && taken(first - 1, chosen + 1) <= room
+        && (taken(first - 1, chosen) <= room / 2 || taken(first - 1, steps.len()) <= room)
+    {
+        first -= 1;
+    }
+    let mut lines: Vec<Line> = Vec::new();
+    for step in steps.into_iter().skip(first) {
+        if lines.len() + step.len() > room {
+            break;
+        }
+        lines.extend(step);
+    }
+    let refused = model.sign_refused.as_ref().filter(|(_, at)| now.saturating_sub(*at) < REFUSAL_SHOWN);
+    lines.push(match refused {
+        Some((why, _)) => Line::styled(format!(" {why}"), theme.style(TextRole::Caution)),
+        None => Line::styled(format!(" {}", below(&list.steps[chosen])), theme.style(TextRole::Label)),
+    });
+    lines
+}
+
+/// A step; long words continue on further lines.
+fn step_rows(
+    model: &Model,
+    (place, step): (usize, &Step),
+    is_chosen: bool,
+    theme: Theme,
+    now: Duration,
+    columns: usize,
+) -> Vec<Line<'static>> {
+    let (word, role) = match model.step_state(step, now) {
+        StepState::Done => ("OK  ", TextRole::Good),
+        StepState::Open => ("open", TextRole::Caution),
+        StepState::Voided => ("VOID", TextRole::Alarm),
+        StepState::Outside => ("NO  ", TextRole::Alarm),
+        StepState::Unknown => ("?   ", TextRole::Alarm),
+    };
+    let value = step.value.as_ref().map_or_else(String::new, |limits| {
+        let found = model.fresh(limits, now);
+        let found = found.map_or_else(|| "--".to_owned(), |found| fixed(found, limits.quantity.decimals));
+        format!(" {found} {}", limits.quantity.unit)
+    });
+    let room = columns.saturating_sub(FRONT_COLUMNS + value.chars().count()).max(1);
+    let mut parts = wrapped(&step.words, room).into_iter();
+    let first = parts.next().unwrap_or_default();
+    let mark = if is_chosen { ">" } else { " " };
+    let words_style = theme.style(if is_chosen { TextRole::Title } else { TextRole::Plain });
+    let front = Line::from(vec![
+        Span::styled(format!("{mark}{word} "), theme.style(role)),
+        Span::styled(format!("{:>2} {first:<room$}", place + 1), words_style),
+        Span::styled(value, theme.style(TextRole::Plain)),
+    ]);
+    let more = parts.map(|part| Line::styled(format!("{:FRONT_COLUMNS$}{part}", ""), words_style));
+    std::iter::once(front).chain(more).collect()
+}
+
+/// The words on lines of at most this many columns; only a longer word is split.
+pub fn wrapped(words: &str, room: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in words.split_whitespace() {
+        for part in word.chars().collect::<Vec<_>>().chunks(room) {
+            let part: String = part.iter().collect();
+            let line = lines
+                .last_mut()
+                .filter(|line| line.is_empty() || line.chars().count() + 1 + part.chars().count() <= room);
+            match line {
+                Some(line) if line.is_empty() => line.push_str(&part),
+                Some(line) => {
+                    line.push(' ');
+                    line.push_str(&part);
+                }
+                None => lines.push(part),
+            }
+        }
+    }
+    lines
+}
+
+/// Who signs the step, or who did.
+fn below(step: &Step) -> String {
+    let limits = step
+        .value
+        .as_ref()
+        .map_or_else(String::new, |limits| format!(": {} {}", limits.quantity.name, limits.words()));
+    let who = step.role.map_or("anybody", role_name);
+    match &step.mark {
+        Mark::Open => format!("{who} signs{limits}"),
+        Mark::Signed(signature) => {
+            format!("signed by {}, {}", signer(&signature.by), clock(signature.unix_s))
+        }
+        Mark::Voided(signature) => {
+            format!("voided by {}, {}; {who} signs", signer(&signature.by), clock(signature.unix_s))
+        }
+    }
+}
+
+fn signer(by: &str) -> &str {
+    if by.is_empty() { "somebody" } else { by }
+}
+
+/// Hours and minutes of the day, UTC.
+fn clock(unix_s: u64) -> String {
+    format!("{:02}:{:02} UTC", unix_s / 3_600 % 24, unix_s / 60 % 60)
+}
+
+// The line of the filter, above a list that it narrows down.
+
+/// `None` without a filter.
+pub fn filter_line(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let typing = model.pages.entry == Some(TextEntry::Filter);
+    let filter = &model.pages.filter;
+    if filter.is_empty() && !typing {
+        return None;
+    }
+    let (cursor, keys) =
+        if typing { ("_", "Enter keeps it, Esc lists all") } else { ("", "FILTERED; Esc lists all") };
+    Some(Line::from(vec![
+        Span::styled(format!(" /{filter}{cursor}"), theme.style(TextRole::Key)),
+        Span::styled(format!("   {keys}"), theme.style(TextRole::Caution)),
+    ]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    use crate::model::Settings;
+    use crate::model::log::Speaker;
+    use crate::view::theme::Palette;
+
+    #[test]
+    fn the_newest_event_keeps_its_beginning() {
+        let mut model = Model::new(Settings::on_screen("udpin:127.0.0.1:14550"));
+        let at = Duration::from_secs(7);
+        model.events.push(at, Speaker::Vehicle, EventLevel::Info, "SAFED".to_owned());
+        let text = "arming refused: pin: found in the vehicle".to_owned();
+        model.events.push(at, Speaker::Vehicle, EventLevel::Warning, text);
+        let theme = Theme { palette: Palette::None, ascii: false };
+        let shown = |rows| -> Vec<String> {
+            events(&model, theme, BEFORE_TEXT + 20, rows).iter().map(Line::to_string).collect()
+        };
+        let gap = " ".repeat(BEFORE_TEXT);
+        let whole = ["    7.0 vehicle ! arming refused: pin:", &format!("{gap}found in the vehicle")];
+        assert_eq!(shown(0), [""; 0]);
+        assert_eq!(shown(1), ["    7.0 vehicle ! arming refused: pin…"]);
+        assert_eq!(shown(2), whole);
+        assert_eq!(shown(3), ["    7.0 vehicle   SAFED", whole[0], whole[1]]);
+    }
+
+    #[test]
+    fn texts_wrap_at_spaces_and_keep_every_character() {
+        assert_eq!(wrap("one two", 20), ["one two"]);
+        assert_eq!(wrap("arming refused: pin: found in", 20), ["arming refused: pin:", "found in"]);
+        assert_eq!(wrap(&"x".repeat(45), 20).concat().len(), 45);
+        assert_eq!(wrap("", 20), [""]);
+    }
+}

@@ -1,0 +1,281 @@
+//! The pages of ascent and descent, and their shared layout: the headline, the height gauge, the values, the pictures.
+
+use std::time::Duration;
+
+use protocol::dialect::{TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::Line;
+
+use super::{is_roomy, titled};
+use crate::model::motion::Motion;
+use crate::model::vehicle::Sample;
+use crate::model::{Model, words};
+use crate::view::pictures::FlightPart;
+use crate::view::theme::{TextRole, Theme};
+use crate::view::widgets::{age_mark, fixed, row, text_row};
+use crate::view::{draw_line, draw_lines, headline, panels, pictures, status_lines, widgets};
+
+/// Columns of the height gauge and of the values at 80 columns, and on a larger screen. At 80 columns they are those of
+/// the landing page: what stands in the same place costs a slow line nothing at ignition.
+const NARROW_COLUMNS: [u16; 2] = [33, 28];
+const ROOMY_COLUMNS: [u16; 2] = [30, 40];
+/// Columns of the picture of the fins.
+const FIN_COLUMNS: u16 = 27;
+
+/// Draws a page with these values; the picture of the fins is drawn if they steer.
+pub fn draw_flying(
+    model: &Model,
+    (title, values): (&str, Vec<Line<'static>>),
+    fins_steer: bool,
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    let roomy = is_roomy(area);
+    let area = headline::draw_headline(&headline::flight_headline(model, now), theme, frame, area);
+    let [gauge_columns, value_columns] = if roomy { ROOMY_COLUMNS } else { NARROW_COLUMNS };
+    let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
+        Constraint::Length(gauge_columns),
+        Constraint::Length(value_columns),
+        Constraint::Fill(1),
+    ]));
+    let inside = titled("Height, m", theme, frame, gauge_area);
+    draw_lines(frame, inside, &widgets::gauge_lines(model, theme, now, usize::from(inside.height)));
+    let title = if panels::is_lost(model, now) { "PREDICTED, not heard" } else { title };
+    draw_values(model, (title, values, roomy), theme, now, frame, middle);
+    draw_pictures(model, fins_steer && roomy, theme, now, frame, right);
+}
+
+/// The values, the most important first; those that do not fit are on the page of all values.
+fn draw_values(
+    model: &Model,
+    (title, mut values, roomy): (&str, Vec<Line<'static>>, bool),
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    let rows = u16::try_from(values.len() + 1).unwrap_or(u16::MAX).min(area.height);
+    let [numbers, below] = area.layout(&Layout::vertical([Constraint::Length(rows), Constraint::Fill(1)]));
+    let inside = titled(title, theme, frame, numbers);
+    values.truncate(usize::from(inside.height));
+    draw_lines(frame, inside, &values);
+    if roomy {
+        let [link, lines] = below.layout(&Layout::vertical([Constraint::Length(2), Constraint::Fill(1)]));
+        draw_line(frame, link, status_lines::link_line(model, theme, now, usize::from(link.width)));
+        let names = ["vertical speed", "height", "tilt", "horizontal speed", "distance", "link rate"];
+        widgets::draw_sparklines(&names, model, theme, now, frame, lines);
+    }
+}
+
+fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [upper, sides] = area.layout(&Layout::vertical([
+        if with_fins { Constraint::Length(pictures::FIN_PICTURE_ROWS + 1) } else { Constraint::Length(0) },
+        Constraint::Fill(1),
+    ]));
+    if with_fins {
+        let [fin_area, above] =
+            upper.layout(&Layout::horizontal([Constraint::Length(FIN_COLUMNS), Constraint::Fill(1)]));
+        let inside = titled(&pictures::fins_title(model, now), theme, frame, fin_area);
+        pictures::draw_fins(model, theme, now, frame, inside);
+        let inside = titled("From above", theme, frame, above);
+        pictures::draw_top_view(model, theme, now, frame, inside);
+    }
+    for (from, title, area) in pictures::side_views(model, sides) {
+        let inside = titled(title, theme, frame, area);
+        pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
+    }
+}
+
+/// A field of TD_DESCENT, while it is known.
+pub fn of_descent(model: &Model, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
+    let descent = model.vehicle.descent.as_ref()?;
+    let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
+    Some(sample).filter(|sample| sample.value.is_finite())
+}
+
+/// Adds height and vertical speed before the second value. After the loss of the link the prediction shows them.
+pub fn insert_height(lines: &mut Vec<Line<'static>>, model: &Model, theme: Theme, now: Duration) {
+    if panels::is_lost(model, now) {
+        return;
+    }
+    lines.insert(1, row(theme, "height", model.vehicle.height_m(), 1, "m", now));
+    lines.insert(2, row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
+}
+
+// The ascent page: height gauge with the expected apogee, speed, tilt and booster, side views.
+
+pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let values = ascent_values(model, theme, now);
+    draw_flying(model, ("Ascent", values), false, theme, now, frame, area);
+}
+
+/// For small screens: the values, with height and speed, which have no headline there.
+pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = ascent_values(model, theme, now);
+    insert_height(&mut lines, model, theme, now);
+    lines
+}
+
+/// The values, the most important first.
+fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = panels::lost_rows(model, theme, now);
+    let motion = model.vehicle.best_motion();
+    let of = |pick| of_descent(model, pick);
+    lines.push(motor(model, theme, now));
+    lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
+    lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
+    let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
+    lines.push(booster(model.vehicle.descent.as_ref(), theme, now));
+    let horizontal = motion.map(|motion| motion.map(Motion::horizontal_m_s));
+    let distance = motion.map(|motion| motion.map(Motion::distance_m));
+    lines.push(row(theme, "horizontal", horizontal, 1, "m/s", now));
+    lines.push(row(theme, "distance", distance, 1, "m", now));
+    lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 0, "m", now));
+    lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 0, "m", now));
+    lines
+}
+
+/// What carries the vehicle up, in words.
+fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(phase) = model.vehicle.phase() else {
+        return Line::styled(" no data", theme.style(TextRole::Caution));
+    };
+    let (mark, role) = age_mark(&phase, now);
+    let text = match phase.value {
+        TdPhase::TD_PHASE_BOOST => "ascent motor: no cut-off",
+        TdPhase::TD_PHASE_COAST => "coasting",
+        _ => "not rising",
+    };
+    Line::styled(format!("{mark}{text}"), theme.style(role))
+}
+
+fn booster(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = descent else {
+        return text_row(theme, "booster", " ", "no data", TextRole::Label, "");
+    };
+    let (mark, stale) = age_mark(descent, now);
+    let text = words::lower_case(&descent.value.booster, "TD_BOOSTER_");
+    let role = match descent.value.booster {
+        TdBooster::TD_BOOSTER_SEPARATING => TextRole::Caution,
+        TdBooster::TD_BOOSTER_SEPARATED => TextRole::Good,
+        TdBooster::TD_BOOSTER_NONE | TdBooster::TD_BOOSTER_ATTACHED => TextRole::Plain,
+    };
+    text_row(theme, "booster", mark, &text, if stale == TextRole::Stale { stale } else { role }, "")
+}
+
+// The descent page: height gauge with the ignition band, values of the descent, fins from above, side view.
+
+pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let values = descent_values(model, theme, now);
+    draw_flying(model, ("Descent", values), true, theme, now, frame, area);
+}
+
+/// For small screens: the values, with height and speed, which have no headline there.
+pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = descent_values(model, theme, now);
+    insert_height(&mut lines, model, theme, now);
+    lines
+}
+
+/// The values, the most important first.
+fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = panels::lost_rows(model, theme, now);
+    let motion = model.vehicle.best_motion();
+    let of = |pick| of_descent(model, pick);
+    let of_motion = |pick: fn(&Motion) -> f64| {
+        motion.map(|motion| motion.map(pick)).filter(|sample| !sample.value.is_nan())
+    };
+    let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
+    lines.push(band_word(model, theme, now));
+    lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
+    lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
+    lines.push(band(model.vehicle.descent.as_ref(), theme, now));
+    lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
+    lines.push(chute(model.vehicle.descent.as_ref(), theme, now));
+    let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(row(theme, "distance", of_motion(Motion::distance_m), 1, "m", now));
+    lines.push(row(theme, "horizontal", of_motion(Motion::horizontal_m_s), 1, "m/s", now));
+    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
+    lines.push(row(theme, "wind", wind_speed(model.vehicle.descent.as_ref()), 1, "m/s", now));
+    lines.push(row(theme, "wind from", wind_from(model.vehicle.descent.as_ref()), 0, "deg", now));
+    lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
+    lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
+    lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
+    lines
+}
+
+/// The heights from which a burn lands.
+fn band(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
+    let known = descent.filter(|d| d.value.band_low_m.is_finite() && d.value.band_high_m.is_finite());
+    let Some(descent) = known else { return text_row(theme, "band", " ", "--", TextRole::Label, "m") };
+    let (mark, role) = age_mark(descent, now);
+    let (low_m, high_m) = (f64::from(descent.value.band_low_m), f64::from(descent.value.band_high_m));
+    text_row(theme, "band", mark, &format!("{}..{}", fixed(low_m, 0), fixed(high_m, 0)), role, "m")
+}
+
+/// Compares the height with the ignition band and the commit height, in words.
+fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
+        return Line::styled(" NO BURN: motor inhibited", theme.style(TextRole::Alarm));
+    }
+    let Some(descent) = model.vehicle.descent.as_ref() else {
+        return Line::styled(" ignition band: no data", theme.style(TextRole::Caution));
+    };
+    let (mark, stale) = age_mark(descent, now);
+    let d = &descent.value;
+    let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
+    let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
+    let (words, role) = if !(height_m.is_finite() && low_m.is_finite() && high_m.is_finite()) {
+        ("band not known", TextRole::Caution)
+    } else if low_m > high_m {
+        ("NO HEIGHT LANDS", TextRole::Alarm)
+    } else if height_m < low_m {
+        ("BELOW the band", TextRole::Alarm)
+    } else if height_m > high_m {
+        ("above the band", TextRole::Plain)
+    } else {
+        ("INSIDE the band", TextRole::Good)
+    };
+    let committed = height_m < f64::from(d.commit_height_m) && !parachute_may_fly(model, d.chute);
+    let commit = if committed { ", committed" } else { "" };
+    let role = if stale == TextRole::Stale { stale } else { role };
+    Line::styled(format!("{mark}{words}{commit}"), theme.style(role))
+}
+
+/// Whether the parachute is out, or an abort would still throw it out. Then the vehicle is not committed to a burn.
+fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
+    let out = matches!(chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
+    let ordered = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+    let now = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
+    out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
+}
+
+fn chute(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = descent else { return text_row(theme, "chute", " ", "no data", TextRole::Label, "") };
+    let (mark, stale) = age_mark(descent, now);
+    let text = words::lower_case(&descent.value.chute, "TD_CHUTE_");
+    let role = match descent.value.chute {
+        TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => TextRole::Caution,
+        _ => TextRole::Plain,
+    };
+    text_row(theme, "chute", mark, &text, if stale == TextRole::Stale { stale } else { role }, "")
+}
+
+fn wind_speed(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
+    let descent = descent?;
+    let speed = libm::hypot(f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
+    speed.is_finite().then(|| Sample::new(speed, descent.received_at))
+}
+
+/// The direction that the wind comes from, as in weather reports: 0 is north, 90 is east.
+fn wind_from(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
+    let descent = descent?;
+    let (north, east) = (f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
+    let from_deg = libm::atan2(-east, -north).to_degrees().rem_euclid(360.0);
+    let known = from_deg.is_finite() && (north != 0.0 || east != 0.0);
+    known.then(|| Sample::new(from_deg, descent.received_at))
+}

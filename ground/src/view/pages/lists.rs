@@ -1,0 +1,237 @@
+//! The pages that are lists: alarms, texts, parameters, the recording, help.
+
+use std::time::Duration;
+
+use ratatui::text::{Line, Span};
+
+use super::window;
+use crate::model::act::{ABORT_WORDS, Act, DEFINITIONS};
+use crate::model::{Model, Role};
+use crate::view::lists;
+use crate::view::status_lines::{AlarmState, alarm_state, cut};
+use crate::view::theme::{TextRole, Theme};
+use crate::view::widgets::{seconds, shortest};
+
+/// Columns of `ended alarm: ` and shorter words.
+const WORD_COLUMNS: usize = 13;
+
+/// The keys, then one alarm per line, the oldest first. The one that Space acknowledges is marked.
+pub fn alarms_lines(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    columns: usize,
+    rows: usize,
+) -> Vec<Line<'static>> {
+    let list = model.alarms.list();
+    if list.is_empty() {
+        return vec![Line::styled(" no active or unacknowledged alarm", theme.style(TextRole::Good))];
+    }
+    let chosen = model.pointed_at().map(|alarm| alarm.kind);
+    let head = Line::from(vec![
+        Span::styled(" Space", theme.style(TextRole::Key)),
+        Span::styled(" acknowledges the marked one; ", theme.style(TextRole::Label)),
+        Span::styled("Up Down", theme.style(TextRole::Key)),
+        Span::styled(
+            format!(" choose; {} of {} not seen", model.alarms.unacknowledged(), list.len()),
+            theme.style(TextRole::Label),
+        ),
+    ]);
+    let mut marked = 0;
+    let lines: Vec<Line> = list
+        .iter()
+        .enumerate()
+        .map(|(place, alarm)| {
+            let is_chosen = Some(alarm.kind) == chosen;
+            if is_chosen {
+                marked = place;
+            }
+            let AlarmState { word, age, role } = alarm_state(alarm, now);
+            let lasted = alarm.ended_at.map(|at| at.saturating_sub(alarm.raised_at).as_secs());
+            let lasted = lasted.map_or_else(String::new, |held_s| format!(", held {held_s} s"));
+            let mark = if is_chosen { ">" } else { " " };
+            let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
+            let text = cut(&alarm.text, room);
+            Line::from(vec![
+                Span::styled(mark, theme.style(TextRole::Key)),
+                Span::styled(format!("{word:<WORD_COLUMNS$}"), theme.style(role)),
+                Span::styled(format!("{text:<room$} {age}{lasted}"), theme.style(TextRole::Plain)),
+            ])
+        })
+        .collect();
+    let room = rows.saturating_sub(1);
+    let start = (marked + 1).saturating_sub(room);
+    std::iter::once(head).chain(window(lines, start, room)).collect()
+}
+
+// The texts page: the list of events, newest at the bottom.
+
+/// Enough lines for every kept event, each wrapped to a few lines.
+const EVERY_LINE: usize = 4_000;
+
+/// The newest events, or older ones when scrolled back.
+pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    let all = lists::filtered(model, theme, columns, EVERY_LINE);
+    let room = rows.saturating_sub(1);
+    let back = model.pages.scroll.min(all.len().saturating_sub(room));
+    let start = all.len().saturating_sub(room + back);
+    let count = all.len();
+    let mut lines = window(all, start, room);
+    let place = if back == 0 { String::new() } else { format!(", {back} below") };
+    let text = format!(" {} events, {count} lines{place}; Up and Down scroll", model.events.total());
+    let head = lists::filter_line(model, theme);
+    lines.insert(0, head.unwrap_or_else(|| Line::styled(text, theme.style(TextRole::Label))));
+    lines
+}
+
+// The parameters page: the vehicle's parameters by name.
+
+/// How many are known, then one parameter per line.
+pub fn parameters_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
+    let parameters = &model.parameters;
+    let of = parameters.count.map_or_else(|| "?".to_owned(), |count| count.to_string());
+    let state = if parameters.is_empty() && parameters.asked {
+        " requested; no answer yet".to_owned()
+    } else if parameters.is_empty() {
+        " not requested yet".to_owned()
+    } else {
+        format!(" {} of {of} known", parameters.len())
+    };
+    let head = Line::from(vec![
+        Span::styled(state, theme.style(TextRole::Plain)),
+        Span::styled("   r", theme.style(TextRole::Key)),
+        Span::styled(" asks the vehicle again; read-only here", theme.style(TextRole::Label)),
+    ]);
+    let head = lists::filter_line(model, theme).unwrap_or(head);
+    let list: Vec<Line> = parameters
+        .iter()
+        .filter(|(name, _)| model.pages.lets_pass(name))
+        .map(|(name, value)| {
+            Line::from(vec![
+                Span::styled(format!("  {name:<18}"), theme.style(TextRole::Label)),
+                Span::styled(format!("{:>14}", shortest(value)), theme.style(TextRole::Plain)),
+            ])
+        })
+        .collect();
+    // Scrolling up goes towards the first line.
+    let start = list.len().saturating_sub(rows.saturating_sub(1)).min(model.pages.scroll);
+    std::iter::once(head).chain(window(list, start, rows.saturating_sub(1))).collect()
+}
+
+// The log page: whether the flight is recorded, and where.
+
+/// The end of the book: how many entries, the head, whether it is signed, and what the vehicle has of it.
+fn book(model: &Model) -> String {
+    let Some(signed) = model.book.head else { return "none".to_owned() };
+    let (entries, hash) = (signed.head.entries, protocol::book::shown(&signed.head.hash[..6]));
+    let is_signed = if model.book.is_signed { "signed" } else { "not signed" };
+    format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.kept)
+}
+
+/// The space that is left for the log, and how fast it grows.
+fn space(model: &Model) -> String {
+    model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words())
+}
+
+/// The state of the recording, its files and counts.
+pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let row = |label: &str, value: String, role: TextRole| {
+        Line::from(vec![
+            Span::styled(format!(" {label:<14}"), theme.style(TextRole::Label)),
+            Span::styled(value, theme.style(role)),
+        ])
+    };
+    if model.settings.role == Role::Replaying {
+        return vec![
+            row("state", "a recorded flight; nothing is written".to_owned(), TextRole::Plain),
+            row("log", model.settings.log_path.clone().unwrap_or_default(), TextRole::Plain),
+            row("events", model.events.total().to_string(), TextRole::Plain),
+        ];
+    }
+    let state = match (&model.settings.log_path, model.log.failed, model.log.dropped) {
+        (None, _, _) => row("state", "NOT RECORDING: --log none".to_owned(), TextRole::Caution),
+        (Some(_), true, _) => row("state", "FAILED: nothing more is recorded".to_owned(), TextRole::Alarm),
+        (Some(_), false, 0) => row("state", "recording; nothing lost".to_owned(), TextRole::Good),
+        (Some(_), false, lost) => row("state", format!("recording; {lost} records LOST"), TextRole::Caution),
+    };
+    let none = || "none".to_owned();
+    vec![
+        state,
+        row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
+        row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
+        row("space", space(model), TextRole::Plain),
+        row("running for", seconds(now), TextRole::Plain),
+        row("events", model.events.total().to_string(), TextRole::Plain),
+        row("book", book(model), TextRole::Plain),
+        Line::default(),
+        Line::styled(
+            " Both directions of the link, every key, command and event are recorded.",
+            theme.style(TextRole::Label),
+        ),
+        Line::styled(
+            " Records older than 0.2 s are on disk, even if this program crashes.",
+            theme.style(TextRole::Label),
+        ),
+    ]
+}
+
+// The help page: the keys that work now, and the marks.
+
+/// Columns of a key.
+const KEY_COLUMNS: usize = 13;
+
+/// Columns for the names of pages, on the smallest whole screen.
+const PAGES_COLUMNS: usize = 80 - KEY_COLUMNS - 1;
+
+const REPLAY: [(&str, &str); 4] = [
+    ("Space", "pause, or go on"),
+    ("Left Right", "5 s back or forward"),
+    ("[ ]", "to the phase before or after; g G to the begin or end"),
+    ("+ -", "faster or slower"),
+];
+
+const MARKS: [&str; 4] = [
+    "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed",
+    "on the ground. Commanded, acknowledged and observed are three facts; armed is",
+    "what HEARTBEAT says. Without link, + is the PREDICTED position, its circle",
+    "contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.",
+];
+
+/// The actions whose keys do something now; those that show a page in one line.
+pub fn help_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let line = |key: String, words: &str| {
+        Line::from(vec![
+            Span::styled(format!(" {key:<KEY_COLUMNS$}"), theme.style(TextRole::Key)),
+            Span::styled(words.to_owned(), theme.style(TextRole::Plain)),
+        ])
+    };
+    let mut lines = Vec::new();
+    if model.settings.role.why_not_command().is_none() {
+        lines.push(line("Ctrl-X Enter".to_owned(), ABORT_WORDS));
+    }
+    if model.playing.is_some() {
+        lines.extend(REPLAY.map(|(key, words)| line(key.to_owned(), words)));
+    }
+    let keys = &model.settings.keys;
+    let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
+    // The smallest screen has no room for every key. The palette lists these, too, and the page of the checks its own.
+    let elsewhere =
+        |act: Act| matches!(act, Act::Show(_) | Act::Redraw | Act::Check | Act::CheckStill | Act::RangeTest);
+    for definition in works.filter(|definition| !elsewhere(definition.act)) {
+        lines.push(line(keys.name(definition.act), definition.words));
+    }
+    let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
+        Act::Show(page) => Some(format!("{} {}", keys.name(definition.act), page.name())),
+        _ => None,
+    });
+    let mut rows: Vec<String> = Vec::new();
+    for page in pages {
+        match rows.last_mut().filter(|row| row.len() + 2 + page.len() <= PAGES_COLUMNS) {
+            Some(row) => *row = format!("{row}  {page}"),
+            None => rows.push(page),
+        }
+    }
+    lines.extend(rows.iter().map(|row| line("pages".to_owned(), row)));
+    lines.extend(MARKS.map(|mark| Line::styled(format!(" {mark}"), theme.style(TextRole::Label))));
+    lines
+}

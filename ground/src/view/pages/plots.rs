@@ -1,0 +1,277 @@
+//! The pages of numbers and paths: one quantity over time, the flight from three sides, every value.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
+
+use super::flight::of_descent;
+use super::{is_roomy, titled};
+use crate::model::act::Act;
+use crate::model::motion::Motion;
+use crate::model::quantity::{ALL, Quantity};
+use crate::model::vehicle::is_on_pad;
+use crate::model::{Model, quantity};
+use crate::view::pictures::{FlightPart, Viewpoint};
+use crate::view::theme::{Ink, TextRole, Theme};
+use crate::view::widgets::{age_mark, fixed, row};
+use crate::view::{draw_line, draw_lines, panels, pictures, widgets};
+
+/// Columns of the list of quantities.
+const LIST_COLUMNS: u16 = 24;
+/// Without a flight this much of the past is shown; in flight all of it, and this much before.
+const CALM_SPAN: Duration = Duration::from_mins(2);
+const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
+
+/// Draws the list of quantities and the plot of the chosen one.
+pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [list, right] =
+        area.layout(&Layout::horizontal([Constraint::Length(LIST_COLUMNS), Constraint::Fill(1)]));
+    let quantity = model.pages.plotted;
+    let inside = titled("Up Down choose", theme, frame, list);
+    draw_lines(frame, inside, &names(model, theme, usize::from(inside.height)));
+    let inside = titled(&format!("{} over time", quantity.name), theme, frame, right);
+    let [head, plot] = inside.layout(&Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]));
+    draw_line(frame, head, present(quantity, model, theme, now));
+    draw_plot(quantity, model, theme, now, frame, plot);
+}
+
+/// The present value of every quantity, the chosen one first.
+pub fn plot_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let chosen = model.pages.plotted;
+    std::iter::once(chosen)
+        .chain(ALL.iter().filter(|quantity| *quantity != chosen))
+        .map(|quantity| {
+            row(theme, quantity.name, quantity.read(model, now), quantity.decimals, quantity.unit, now)
+        })
+        .collect()
+}
+
+/// The names around the chosen one, which is marked; pinned ones have a star.
+fn names(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
+    let chosen = model.pages.plotted;
+    let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
+    let line = |quantity: &'static Quantity| {
+        let is_chosen = quantity == chosen;
+        let (mark, role) = if is_chosen { (">", TextRole::Key) } else { (" ", TextRole::Label) };
+        let pin = if model.pages.pinned.contains(&quantity) { "*" } else { " " };
+        Line::styled(format!("{mark}{pin}{}", quantity.name), theme.style(role))
+    };
+    ALL.iter().skip(start).take(rows).map(line).collect()
+}
+
+fn present(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let sample = quantity.read(model, now);
+    let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
+    let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
+    Line::from(vec![
+        Span::styled(
+            format!("{mark}{value} {}", quantity.unit),
+            theme.style(role).patch(theme.style(TextRole::Title)),
+        ),
+        Span::styled(
+            format!("   {} pins it to every page", model.settings.keys.name(Act::Pin)),
+            theme.style(TextRole::Label),
+        ),
+    ])
+}
+
+fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let first = model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
+    let from = first.unwrap_or_else(|| now.saturating_sub(CALM_SPAN)).saturating_sub(BEFORE_FLIGHT);
+    let zero_s = first.unwrap_or(now).as_secs_f64();
+    let points: Vec<(f64, f64)> = model
+        .history
+        .trace
+        .values(quantity, from, now)
+        .map(|(at, value)| (at.as_secs_f64() - zero_s, value))
+        .collect();
+    if points.len() < 2 {
+        return draw_line(frame, area, Line::styled(" nothing to plot yet", theme.style(TextRole::Label)));
+    }
+    let of = |pick: fn(&(f64, f64)) -> f64| {
+        let least = points.iter().map(pick).fold(f64::INFINITY, f64::min);
+        let most = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        (least, most)
+    };
+    let label = theme.style(TextRole::Label);
+    let axis = |(least, most): (f64, f64), parts: usize| {
+        let span = (most - least).max(1e-6);
+        let step = widgets::tick_step(span, parts);
+        let (low, high) =
+            (libm::floor(least / step) * step, (libm::ceil(most / step) * step).max(low_end(least, step)));
+        let labels: Vec<String> = widgets::ticks(low - step / 2.0, high + step / 2.0, step)
+            .map(|tick| fixed(tick, widgets::tick_decimals(step)))
+            .collect();
+        Axis::default().style(label).bounds([low, high]).labels(labels)
+    };
+    let dataset = Dataset::default()
+        .marker(Marker::Braille)
+        .graph_type(GraphType::Line)
+        .style(theme.ground().fg(theme.ink(Ink::Flown)))
+        .data(&points);
+    let chart = Chart::new(vec![dataset])
+        .style(theme.ground())
+        .x_axis(axis(of(|point| point.0), usize::from(area.width / 16)).title("s"))
+        .y_axis(axis(of(|point| point.1), usize::from(area.height / 3)).title(quantity.unit));
+    frame.render_widget(chart, area);
+}
+
+/// The least upper end of a scale that begins at or below a value.
+fn low_end(least: f64, step: f64) -> f64 {
+    (libm::floor(least / step) + 1.0) * step
+}
+
+// The path page: the flight from the east, from the south and from above.
+
+/// From this width on the pictures stand side by side without a row of their own for the view from above.
+const ROWS_FOR_TWO: u16 = 30;
+
+/// Draws the three views: side by side, or on a high screen the view from above below the two others.
+pub fn draw_path(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let [pictures, legend] = area.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]));
+    let thirds = || Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1), Constraint::Fill(1)]);
+    let [east, south, above] = if area.height < ROWS_FOR_TWO {
+        pictures.layout(&thirds())
+    } else {
+        let [left, above] = pictures.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+        let [east, south] = left.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Fill(1)]));
+        [east, south, above]
+    };
+    for (from, title, at) in [
+        (Viewpoint::East, "From east, north right", east),
+        (Viewpoint::South, "From south, east right", south),
+    ] {
+        let inside = titled(title, theme, frame, at);
+        pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
+    }
+    let inside = titled("From above, north up", theme, frame, above);
+    pictures::draw_top_view(model, theme, now, frame, inside);
+    draw_line(frame, legend, comes_down(model, theme, now));
+}
+
+/// The position in numbers, for small screens.
+pub fn path_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let motion = model.vehicle.best_motion();
+    let of = |pick: fn(&Motion) -> f64| motion.map(|motion| motion.map(pick));
+    let mut lines = panels::lost_rows(model, theme, now);
+    if lines.is_empty() {
+        lines = vec![
+            row(theme, "height", model.vehicle.height_m(), 1, "m", now),
+            row(theme, "north", of(|motion| motion.x_m), 1, "m", now),
+            row(theme, "east", of(|motion| motion.y_m), 1, "m", now),
+            row(theme, "distance", of(Motion::distance_m), 1, "m", now),
+        ];
+    }
+    lines.push(comes_down(model, theme, now));
+    lines
+}
+
+/// Where it will come down.
+fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let words = match pictures::comes_down(model, now) {
+        Some(at) => {
+            let words = format!(
+                " x comes down {} m N, {} m E, moved ±{} m in 5 s*",
+                fixed(at.north_m, 1),
+                fixed(at.east_m, 1),
+                fixed(at.radius_m, 1)
+            );
+            theme.either_side(&words)
+        }
+        None => " x where it will come down: not known".to_owned(),
+    };
+    Line::from(vec![
+        Span::styled(words, theme.style(TextRole::Plain)),
+        Span::styled("; line flown, dots planned", theme.style(TextRole::Label)),
+    ])
+}
+
+// The page of all values: flight, descent, controller with its residuals, actuators, link.
+
+/// Rows of the controller's panel and of the fins', with their titles.
+const CONTROLLER_ROWS: u16 = 9;
+const FIN_ROWS: u16 = 5;
+/// The columns of every panel on a larger screen.
+const PANEL_COLUMNS: u16 = 30;
+
+/// Draws three columns of panels; on a larger screen sparklines of every quantity beside them.
+pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let roomy = is_roomy(area);
+    let (panels, lines) = if roomy {
+        let [panels, lines] =
+            area.layout(&Layout::horizontal([Constraint::Length(3 * PANEL_COLUMNS), Constraint::Fill(1)]));
+        (panels, lines)
+    } else {
+        (area, Rect::default())
+    };
+    let [left, middle, right] = panels.layout(&Layout::horizontal([Constraint::Fill(1); 3]));
+    let half = Constraint::Length(CONTROLLER_ROWS);
+    let [flight_area, below_flight] = left.layout(&Layout::vertical([half, Constraint::Fill(1)]));
+    let [controller_area, below_controller] = middle.layout(&Layout::vertical([half, Constraint::Fill(1)]));
+    let lost = panels::is_lost(model, now);
+    let (title, rows) = if lost {
+        ("PREDICTED, not heard", panels::lost_rows(model, theme, now))
+    } else {
+        ("Flight", panels::flight_rows(model, theme, now))
+    };
+    panel(title, &rows, theme, frame, flight_area);
+    panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, below_flight);
+    panel("Controller (NMPC)", &panels::controller_rows(model, theme, now), theme, frame, controller_area);
+    panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, below_controller);
+    panel("Descent", &descent_rows(model, theme, now), theme, frame, right);
+    if roomy {
+        let below = Rect {
+            y: flight_area.bottom() + FIN_ROWS + 1,
+            height: below_flight.height.saturating_sub(FIN_ROWS + 1),
+            ..left
+        };
+        let inside = titled(&pictures::fins_title(model, now), theme, frame, below);
+        pictures::draw_fins(model, theme, now, frame, inside);
+        let names: Vec<&str> = quantity::ALL.iter().map(|quantity| quantity.name).collect();
+        widgets::draw_sparklines(&names, model, theme, now, frame, lines);
+    }
+}
+
+/// The same as lines.
+pub fn values_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let mut lines = panels::lost_rows(model, theme, now);
+    lines.extend(panels::flight_rows(model, theme, now));
+    lines.extend(panels::controller_rows(model, theme, now));
+    lines.extend(descent_rows(model, theme, now));
+    lines.extend(panels::fin_rows(model, theme, now));
+    lines.extend(panels::gimbal_rows(model, theme, now));
+    lines
+}
+
+fn panel(title: &str, rows: &[Line<'static>], theme: Theme, frame: &mut Frame, area: Rect) {
+    let inside = titled(title, theme, frame, area);
+    draw_lines(frame, inside, rows);
+}
+
+/// The estimates behind the descent.
+fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let of = |pick| of_descent(model, pick);
+    let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
+    let mut rows = vec![
+        line("band high", of(|d| d.band_high_m), 1, "m"),
+        line("band low", of(|d| d.band_low_m), 1, "m"),
+        line("ignite at", of(|d| d.chosen_height_m), 1, "m"),
+        line("ignite in", model.vehicle.ignition_in_s(now), 1, "s"),
+        line("commit at", of(|d| d.commit_height_m), 1, "m"),
+        line("apogee at", of(|d| d.apogee_m), 0, "m"),
+        line("wind north", of(|d| d.wind_x_m_s), 1, "m/s"),
+        line("wind east", of(|d| d.wind_y_m_s), 1, "m/s"),
+        line("drag x", of(|d| d.drag_scale), 3, ""),
+        line("thrust x", of(|d| d.thrust_scale), 3, ""),
+        line("down north", of(|d| d.touchdown_x_m), 1, "m"),
+        line("down east", of(|d| d.touchdown_y_m), 1, "m"),
+    ];
+    if model.vehicle.descent.is_none() {
+        rows.insert(0, Line::styled(" no data", theme.style(TextRole::Caution)));
+    }
+    rows
+}

@@ -1,0 +1,580 @@
+//! The panels of the pages: flight, controller, actuators, touchdown, and the predicted position of a lost vehicle.
+
+use std::time::Duration;
+
+use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdSolverStatus};
+use ratatui::text::{Line, Span};
+
+use super::theme::{TextRole, Theme};
+use super::widgets::{age_mark, fixed, row, seconds, shortest};
+use crate::model::dead_reckoning::{Basis, is_unheard, predict_position};
+use crate::model::motion::{Attitude, BodySpeed, Motion};
+use crate::model::safety::{Ending, LIMITS, Touchdown, are_of_legs};
+use crate::model::vehicle::{Deflection, Gimbal, Sample};
+use crate::model::{Model, words};
+
+/// The rows: signed values for a planar vehicle, magnitudes for a vehicle in space.
+pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let vehicle = &model.vehicle;
+    let (motion, attitude, body) = (vehicle.best_motion(), vehicle.attitude, vehicle.body_speed());
+    let of_motion = |pick: fn(&Motion) -> f64| motion.map(|known| known.map(pick));
+    let of_attitude = |pick: fn(&Attitude) -> f64| attitude.map(|known| known.map(pick));
+    let of_body = |pick: fn(&BodySpeed) -> f64| body.map(|known| known.map(pick));
+    let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
+    let mut rows = vec![
+        line("altitude", of_motion(|m| m.altitude_m), 2, "m"),
+        line("vertical", of_motion(|m| m.climb_m_s), 2, "m/s"),
+    ];
+    let tilt = of_attitude(|a| a.tilt_rad.to_degrees());
+    let axial = of_body(|b| b.u_m_s);
+    if vehicle.in_space {
+        rows.extend([
+            line("horizontal", of_motion(Motion::horizontal_m_s), 2, "m/s"),
+            line("distance", of_motion(Motion::distance_m), 1, "m"),
+            line("u axial", axial, 2, "m/s"),
+            line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
+            line("tilt", tilt, 2, "deg"),
+            line("turn rate", of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
+        ]);
+    } else {
+        rows.extend([
+            line("horizontal", of_motion(|m| m.vx_m_s), 2, "m/s"),
+            line("u axial", axial, 2, "m/s"),
+            line("w lateral", of_body(|b| b.w_m_s), 3, "m/s"),
+            line("pitch", of_attitude(|a| a.pitch_rad.to_degrees()), 2, "deg"),
+            line("tilt", tilt, 2, "deg"),
+            line("pitch rate", of_attitude(|a| a.pitch_rate_rad_s.to_degrees()), 2, "deg/s"),
+        ]);
+    }
+    rows
+}
+
+// The panel of the landing controller (NMPC).
+
+/// The panel's rows.
+pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let controller = model.vehicle.controller.as_ref();
+    let number = |value: Option<f64>| {
+        value
+            .zip(controller.map(|controller| controller.received_at))
+            .map(|(value, received_at)| Sample { value, received_at })
+    };
+    let data = controller.map(|controller| &controller.value);
+    let (mark, age_role) = controller.map_or((" ", TextRole::Label), |controller| age_mark(controller, now));
+    let wide_text = |label: &str, text: String, role: TextRole| {
+        let role = if age_role == TextRole::Stale { age_role } else { role };
+        Line::from(vec![
+            Span::styled(format!(" {label:<6}"), theme.style(TextRole::Label)),
+            Span::styled(format!("{mark}{text:>17.17}"), theme.style(role)),
+        ])
+    };
+    let level = data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.level, "TD_CONTROL_LEVEL_"));
+    let status =
+        data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.solver_status, "TD_SOLVER_STATUS_"));
+    let kkt = data
+        .map_or_else(|| "--".to_owned(), |d| format!("{:.1e} {:.1e}", d.kkt_stationarity, d.kkt_feasibility));
+    let missed = data.is_some_and(|d| d.deadline_margin_us < 0);
+    let margin = number(data.map(|d| f64::from(d.deadline_margin_us) / 1_000.0));
+    vec![
+        wide_text("level", level, data.map_or(TextRole::Label, |d| level_role(d.level))),
+        wide_text("solver", status, data.map_or(TextRole::Label, |d| status_role(d.solver_status))),
+        row(theme, "iterations", number(data.map(|d| f64::from(d.iterations))), 0, "", now),
+        row(theme, "solve time", number(data.map(|d| f64::from(d.solve_time_us) / 1_000.0)), 2, "ms", now),
+        row(theme, if missed { "MISSED BY" } else { "margin" }, margin, 2, "ms", now),
+        row(theme, "cost", number(data.map(|d| f64::from(d.cost))), 1, "", now),
+        wide_text("KKT", kkt, TextRole::Plain),
+        row(theme, "thrust x", number(data.map(|d| f64::from(d.thrust_scale))), 3, "", now),
+    ]
+}
+
+fn level_role(level: TdControlLevel) -> TextRole {
+    match level {
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => TextRole::Good,
+        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE | TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => {
+            TextRole::Caution
+        }
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => TextRole::Alarm,
+        _ => TextRole::Plain,
+    }
+}
+
+fn status_role(status: TdSolverStatus) -> TextRole {
+    match status {
+        TdSolverStatus::TD_SOLVER_STATUS_CONVERGED => TextRole::Good,
+        TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN => TextRole::Plain,
+        _ => TextRole::Caution,
+    }
+}
+
+// The panels of fins and gimbal: commanded and measured angles.
+
+/// The scale of the gimbal bar until the vehicle has reported the limit of its gimbal.
+const DEFAULT_SCALE_DEG: f64 = 20.0;
+/// Columns of the bar; odd, so that zero has a column.
+const BAR_COLUMNS: usize = 21;
+
+/// One row for each of the four fins.
+pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let fins = model.vehicle.fins;
+    let (mark, role) = fins.map_or((" ", TextRole::Label), |fins| age_mark(&fins, now));
+    (0..4)
+        .map(|k| {
+            let degrees = |pick: fn(&Deflection) -> f64| {
+                fins.map_or_else(|| "--".to_owned(), |fins| fixed(pick(&fins.value[k]).to_degrees(), 1))
+            };
+            Line::from(vec![
+                Span::styled(format!(" fin {} ", k + 1), theme.style(TextRole::Label)),
+                Span::styled(
+                    format!(
+                        "{mark}{:>6} | {:>5}",
+                        degrees(|fin| fin.commanded_rad),
+                        degrees(|fin| fin.measured_rad)
+                    ),
+                    theme.style(role),
+                ),
+                Span::styled(" deg", theme.style(TextRole::Label)),
+            ])
+        })
+        .collect()
+}
+
+/// The rows of the gimbal: command, measured angle, and a bar with both. In space the gimbal has two planes, with a
+/// row of numbers and a bar each.
+pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let gimbal = model.vehicle.gimbal;
+    let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
+    let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
+    if model.vehicle.in_space {
+        let plane = |name, pick: fn(&Gimbal) -> Deflection| {
+            plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
+        };
+        return [plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)].concat();
+    }
+    let angle = |pick: fn(&Deflection) -> f64| gimbal.map(|g| g.map(|g| pick(&g.pitch).to_degrees()));
+    let commanded = angle(|deflection| deflection.commanded_rad);
+    let measured = angle(|deflection| deflection.measured_rad);
+    let role = gimbal.map_or(TextRole::Label, |gimbal| age_mark(&gimbal, now).1);
+    let value = |sample: Option<Sample<f64>>| sample.map(|sample| sample.value);
+    vec![
+        row(theme, "command o", commanded, 2, "deg", now),
+        row(theme, "actual  #", measured, 2, "deg", now),
+        Line::styled(
+            format!(" {}", gimbal_bar(value(commanded), value(measured), limit.unwrap_or(DEFAULT_SCALE_DEG))),
+            theme.style(role),
+        ),
+        Line::styled(gimbal_scale(limit), theme.style(TextRole::Label)),
+    ]
+}
+
+fn plane_rows(
+    name: &str,
+    angles: Option<Sample<Deflection>>,
+    limit_deg: Option<f64>,
+    theme: Theme,
+    now: Duration,
+) -> Vec<Line<'static>> {
+    let (mark, role) = angles.map_or((" ", TextRole::Label), |angles| age_mark(&angles, now));
+    let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
+    let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
+    let text = |value: Option<f64>| value.map_or_else(|| "--".to_owned(), |value| fixed(value, 1));
+    let stop =
+        limit_deg.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
+    vec![
+        Line::from(vec![
+            Span::styled(format!(" {name:<5}"), theme.style(TextRole::Label)),
+            Span::styled(format!("{mark}o{:>6} #{:>6}", text(commanded), text(measured)), theme.style(role)),
+            Span::styled(" deg", theme.style(TextRole::Label)),
+        ]),
+        Line::from(vec![
+            Span::styled(
+                format!(" {}", gimbal_bar(commanded, measured, limit_deg.unwrap_or(DEFAULT_SCALE_DEG))),
+                theme.style(role),
+            ),
+            Span::styled(stop, theme.style(TextRole::Label)),
+        ]),
+    ]
+}
+
+/// The labels at the ends of the bar; without numbers while the limit is unknown.
+fn gimbal_scale(limit_deg: Option<f64>) -> String {
+    let (left, right) = limit_deg.map(shortest).map_or_else(
+        || ("-".to_owned(), "+".to_owned()),
+        |limit| (format!("-{limit}"), format!("+{limit} deg")),
+    );
+    format!(" {left:<10}0{right:>10}")
+}
+
+/// A mark beyond the scale is drawn at its end.
+fn gimbal_bar(commanded_deg: Option<f64>, measured_deg: Option<f64>, scale_deg: f64) -> String {
+    let mut cells = ['-'; BAR_COLUMNS];
+    cells[BAR_COLUMNS / 2] = '|';
+    let cell = |deg: f64| {
+        let share = (deg.clamp(-scale_deg, scale_deg) + scale_deg) / (2.0 * scale_deg);
+        ((share * (BAR_COLUMNS - 1) as f64).round() as usize).min(BAR_COLUMNS - 1)
+    };
+    for (angle, mark) in [(commanded_deg, 'o'), (measured_deg, '#')] {
+        if let Some(deg) = angle.filter(|deg| deg.is_finite()) {
+            cells[cell(deg)] = mark;
+        }
+    }
+    cells.iter().collect()
+}
+
+// The panel of the touchdown, predicted or reached, with its limits.
+
+/// Title and rows: the verdict once there is one, before that the prediction. The last row says it in words.
+pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
+    if let Some(verdict) = model.vehicle.verdict {
+        let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
+        rows.extend(
+            ending_role(model, now).map(|(ending, role)| Line::styled(ending.word(), theme.style(role))),
+        );
+        let by_legs = model.vehicle.limits.as_ref().is_some_and(are_of_legs);
+        return (if by_legs { "Verdict by the legs" } else { "Verdict" }, rows);
+    }
+    let Some(prediction) = model.vehicle.prediction else {
+        return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(TextRole::Label))]);
+    };
+    let (mark, role) = age_mark(&prediction, now);
+    let mut rows = limit_lines(model, &prediction.value.touchdown, theme, mark, role);
+    let in_s = model.vehicle.touchdown_in_s(now);
+    let in_s = in_s.map_or_else(|| "--".to_owned(), |left| fixed(left.value, 1));
+    rows.push(Line::from(vec![
+        Span::styled("in      ", theme.style(TextRole::Label)),
+        Span::styled(format!("{mark}{in_s:>6}"), theme.style(role)),
+        Span::styled(" s", theme.style(TextRole::Label)),
+    ]));
+    rows.push(match prediction.value.touchdown.violations() {
+        None => Line::styled("inside every limit", theme.style(TextRole::Good)),
+        Some(names) => Line::styled(format!("OUTSIDE {names}"), theme.style(TextRole::Alarm)),
+    });
+    ("Touchdown predicted", rows)
+}
+
+/// The same with a bar for each limit that says how much of it is used, where there is room beside the rows.
+pub fn touchdown_panel_with_bars(
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    columns: usize,
+) -> (&'static str, Vec<Line<'static>>) {
+    let (title, mut rows) = touchdown_panel(model, theme, now);
+    let vehicle = &model.vehicle;
+    let judged = vehicle.verdict.map(|verdict| verdict.value.touchdown);
+    let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
+    let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits.as_ref()) else { return (title, rows) };
+    let used = limits_used(&touchdown, limits);
+    let widest = rows.iter().take(used.len()).map(Line::width).max().unwrap_or(0);
+    let room = columns.saturating_sub(widest);
+    if room >= LIMIT_BAR_COLUMNS_MIN {
+        for (row, used) in rows.iter_mut().zip(used) {
+            let gap = widest - row.width();
+            row.spans.push(Span::raw(" ".repeat(gap)));
+            row.spans.push(limit_bar(used, room, theme));
+        }
+    }
+    (title, rows)
+}
+
+/// How the flight ended.
+pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
+    let ending = Ending::of(&model.vehicle, now)?;
+    let role = match ending {
+        Ending::Landed => TextRole::Good,
+        Ending::UnderParachute => TextRole::Caution,
+        Ending::Hard | Ending::Lost => TextRole::Alarm,
+    };
+    Some((ending, role))
+}
+
+fn limit_lines(
+    model: &Model,
+    touchdown: &Touchdown,
+    theme: Theme,
+    mark: &'static str,
+    role: TextRole,
+) -> Vec<Line<'static>> {
+    let rows = limit_rows(touchdown, model.vehicle.limits.as_ref());
+    let line = |row: &LimitRow| {
+        let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+        Line::from(vec![
+            Span::styled(word, theme.style(word_role)),
+            Span::styled(format!(" {:<8}", row.name), theme.style(TextRole::Label)),
+            Span::styled(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), theme.style(role)),
+            Span::styled(
+                format!(" {} {}", theme.either_side(&row.limit), row.unit),
+                theme.style(TextRole::Label),
+            ),
+        ])
+    };
+    rows.iter().map(line).collect()
+}
+
+// Each limit of a touchdown with the value reached, as text for the screens and for the closing lines.
+
+/// One limit and the value compared with it, in the units of the screen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitRow {
+    pub name: &'static str,
+    /// In degrees where it is an angle. Only the height and the sink rate have a sign.
+    pub value: f64,
+    /// The unit of value and limit.
+    pub unit: &'static str,
+    /// The limit as text; `--` until the vehicle has reported it.
+    pub limit: String,
+    /// Whether the vehicle says that the limit is kept.
+    pub kept: bool,
+}
+
+/// The six limits in the order of the state. Limits and judgement are the vehicle's own.
+pub fn limit_rows(touchdown: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
+    let texts = limits.map(limit_texts);
+    let values = [
+        (touchdown.x_m.abs(), "m"),
+        (touchdown.altitude_m, "m"),
+        (touchdown.tilt_rad().to_degrees(), "deg"),
+        (-touchdown.u_m_s, "m/s"),
+        (touchdown.w_m_s.abs(), "m/s"),
+        (touchdown.q_rad_s.abs().to_degrees(), "deg/s"),
+    ];
+    std::array::from_fn(|place| {
+        let ((name, bit), (value, unit)) = (LIMITS[place], values[place]);
+        LimitRow {
+            name,
+            value,
+            unit,
+            limit: texts.as_ref().map_or_else(|| "--".to_owned(), |texts| texts[place].clone()),
+            kept: !touchdown.violated.contains(bit),
+        }
+    })
+}
+
+fn limit_texts(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [String; 6] {
+    [
+        either_side(f64::from(limits.x_m)),
+        range(f64::from(limits.altitude_min_m), f64::from(limits.altitude_max_m)),
+        either_side(f64::from(limits.pitch_error_rad).to_degrees()),
+        either_side(f64::from(limits.u_m_s)),
+        either_side(f64::from(limits.w_m_s)),
+        either_side(f64::from(limits.q_rad_s).to_degrees()),
+    ]
+}
+
+/// A limit to either side, as in `±0.4`.
+fn either_side(limit: f64) -> String {
+    format!("±{}", shortest(limit))
+}
+
+/// A range, as in `85..95`.
+fn range(lowest: f64, highest: f64) -> String {
+    format!("{}..{}", shortest(lowest), shortest(highest))
+}
+
+/// How many decimals a value gets, so that it takes five characters with its sign.
+pub(super) fn decimals(value: f64) -> usize {
+    match value.abs() {
+        0.0..10.0 => 2,
+        10.0..100.0 => 1,
+        _ => 0,
+    }
+}
+
+// A bar for each limit of a touchdown: how much of the limit is used.
+
+/// The least columns of a bar with its brackets.
+pub const LIMIT_BAR_COLUMNS_MIN: usize = 6;
+/// A cell filled from the left, in eighths.
+const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
+/// The most columns: a longer one says no more.
+const LIMIT_BAR_COLUMNS_MAX: usize = 24;
+
+/// How much of each limit is used, in the order of the rows: 0 for a perfect landing, 1 at the limit.
+pub fn limits_used(touchdown: &Touchdown, limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [f64; 6] {
+    let share = |value: f64, most: f32| value.abs() / f64::from(most);
+    // From the ground towards the edge on its side; one edge may be the ground itself.
+    let edge_m = if touchdown.altitude_m < 0.0 { limits.altitude_min_m } else { limits.altitude_max_m };
+    [
+        share(touchdown.x_m, limits.x_m),
+        if touchdown.altitude_m.abs() > 0.0 { share(touchdown.altitude_m, edge_m.abs()) } else { 0.0 },
+        share(touchdown.pitch_rad - std::f64::consts::FRAC_PI_2, limits.pitch_error_rad),
+        share(touchdown.u_m_s, limits.u_m_s),
+        share(touchdown.w_m_s, limits.w_m_s),
+        share(touchdown.q_rad_s, limits.q_rad_s),
+    ]
+}
+
+/// A bar of this many columns; beyond the limit it ends in `>`. It has one colour and blanks: six of them with more are
+/// too much for a slow line when the page changes.
+pub fn limit_bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
+    let cells = columns.min(LIMIT_BAR_COLUMNS_MAX).saturating_sub(3);
+    // Not finite: the vehicle has sent no such limit.
+    let (share, end, role) = match used {
+        used if !used.is_finite() => (0.0, "?", TextRole::Label),
+        used if used > 1.0 => (1.0, ">", TextRole::Alarm),
+        used => (used, "]", TextRole::Plain),
+    };
+    // A short bar still shows eighths of a cell, where the terminal has them.
+    let steps = if theme.ascii { 1 } else { EIGHTHS.len() };
+    let filled = ((share * (cells * steps) as f64).round() as usize).min(cells * steps);
+    let mut text = "█".repeat(filled / steps);
+    if !filled.is_multiple_of(steps) {
+        text.push(EIGHTHS[filled % steps]);
+    }
+    Span::styled(format!(" [{text:<cells$}{end}"), theme.style(role))
+}
+
+// The panel of the predicted position after the link is lost in flight.
+
+/// Whether the position of a vehicle in flight is stale.
+pub fn is_lost(model: &Model, now: Duration) -> bool {
+    is_unheard(&model.vehicle, now)
+}
+
+/// The rows of the prediction; none while the vehicle is heard.
+pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    if !is_lost(model, now) {
+        return Vec::new();
+    }
+    let Some(at) = predict_position(&model.vehicle, now) else {
+        return vec![
+            Line::styled(" position unknown:", theme.style(TextRole::Alarm)),
+            Line::styled(" not heard since the pad", theme.style(TextRole::Caution)),
+        ];
+    };
+    let row = |label: &str, value: f64| {
+        Line::from(vec![
+            Span::styled(format!(" {label:<6}pred"), theme.style(TextRole::Label)),
+            Span::styled(
+                theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1))),
+                theme.style(TextRole::Stale),
+            ),
+        ])
+    };
+    let source = match at.basis {
+        Basis::Plan => "along the last plan",
+        Basis::LastThrust => "last acceleration",
+        Basis::FallThenBurn => "fall, then the burn",
+        Basis::Fall => "fall, last drag",
+        Basis::FreeFall => "free fall; no plan",
+    };
+    let across = if model.vehicle.in_space {
+        vec![row("north", at.x_m), row("east", at.y_m)]
+    } else {
+        vec![row("x", at.x_m)]
+    };
+    let mut rows = vec![row("alt", at.altitude_m)];
+    rows.extend(across);
+    rows.extend([
+        Line::styled(format!(" {source}"), theme.style(TextRole::Label)),
+        Line::styled(format!(" last heard {} ago", seconds(at.age)), theme.style(TextRole::Caution)),
+    ]);
+    rows
+}
+
+#[cfg(test)]
+mod actuators_tests {
+    use super::*;
+
+    #[test]
+    fn the_bar_marks_command_and_measurement() {
+        assert_eq!(gimbal_bar(None, None, 20.0), "----------|----------");
+        assert_eq!(gimbal_bar(Some(-20.0), Some(0.0), 20.0), "o---------#----------");
+        assert_eq!(gimbal_bar(Some(90.0), Some(f64::NAN), 20.0), "----------|---------o");
+        assert_eq!(gimbal_bar(Some(-5.0), Some(2.5), 5.0), "o---------|----#-----");
+    }
+
+    #[test]
+    fn the_scale_shows_the_vehicles_limit_or_no_numbers() {
+        assert_eq!(gimbal_scale(Some(f64::from(0.261_799_4_f32).to_degrees())), " -15       0   +15 deg");
+        assert_eq!(gimbal_scale(None), " -         0         +");
+    }
+}
+
+#[cfg(test)]
+mod limit_rows_tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    use protocol::dialect::TdLimit;
+
+    fn limit_words(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> Vec<String> {
+        let touchdown = Touchdown {
+            x_m: 0.0,
+            altitude_m: 0.0,
+            pitch_rad: FRAC_PI_2,
+            u_m_s: 0.0,
+            w_m_s: 0.0,
+            q_rad_s: 0.0,
+            violated: TdLimit::empty(),
+        };
+        limit_rows(&touchdown, limits).into_iter().map(|row| row.limit).collect()
+    }
+
+    #[test]
+    fn limits_are_the_vehicles_own_and_unknown_before_it_reports_them() {
+        assert_eq!(limit_words(None), ["--"; 6]);
+        let limits = TD_TOUCHDOWN_LIMITS_DATA {
+            x_m: 3.0,
+            altitude_min_m: -0.1,
+            altitude_max_m: 0.25,
+            pitch_error_rad: 7.5_f32.to_radians(),
+            u_m_s: 1.5,
+            w_m_s: 0.6,
+            q_rad_s: 12.0_f32.to_radians(),
+            gimbal_limit_rad: 0.1,
+        };
+        assert_eq!(limit_words(Some(&limits)), ["±3", "-0.1..0.25", "±7.5", "±1.5", "±0.6", "±12"]);
+    }
+}
+
+#[cfg(test)]
+mod limit_bar_tests {
+    use super::*;
+    use protocol::dialect::TdLimit;
+
+    use crate::view::theme::Palette;
+
+    fn text(used: f64, columns: usize) -> String {
+        let theme = Theme { palette: Palette::None, ascii: false };
+        limit_bar(used, columns, theme).content.into_owned()
+    }
+
+    #[test]
+    fn a_bar_is_full_at_the_limit_and_pointed_beyond_it() {
+        assert_eq!(text(0.0, 13), " [          ]");
+        assert_eq!(text(0.5, 13), " [█████     ]");
+        assert_eq!(text(0.5, 6), " [█▌ ]");
+        assert_eq!(text(0.04, 6), " [▏  ]");
+        assert_eq!(text(1.0, 13), " [██████████]");
+        assert_eq!(text(1.01, 13), " [██████████>");
+        assert_eq!(text(f64::NAN, 8), " [     ?");
+        for columns in 0..40 {
+            for used in [0.0, 0.3, 7.0, f64::INFINITY] {
+                assert!(text(used, columns).chars().count() <= columns.max(3), "{columns}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_limit_is_used_from_a_perfect_landing_to_its_edge() {
+        let limits = TD_TOUCHDOWN_LIMITS_DATA {
+            x_m: 3.0,
+            altitude_min_m: -0.1,
+            altitude_max_m: 0.3,
+            pitch_error_rad: 0.1,
+            u_m_s: 1.5,
+            w_m_s: 0.6,
+            q_rad_s: 0.2,
+            gimbal_limit_rad: 0.1,
+        };
+        let at = |x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s| {
+            let violated = TdLimit::empty();
+            limits_used(&Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated }, &limits)
+        };
+        let upright = std::f64::consts::FRAC_PI_2;
+        let close = |found: [f64; 6], expected: f64| found.iter().all(|used| (used - expected).abs() < 1e-6);
+        assert!(close(at(0.0, 0.0, upright, 0.0, 0.0, 0.0), 0.0));
+        assert!(close(at(-3.0, -0.1, upright - 0.1, -1.5, 0.6, -0.2), 1.0));
+        assert!(close(at(6.0, 0.6, upright + 0.2, 3.0, 1.2, 0.4), 2.0));
+    }
+}

@@ -1,0 +1,448 @@
+//! The lines around a page: what happens next, the link, the alarm, the bar of the flight, the pinned numbers.
+
+use std::time::Duration;
+
+use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
+use protocol::log::record::EventLevel;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::Modifier;
+use ratatui::text::{Line, Span};
+
+use super::draw_line;
+use super::theme::{TextRole, Theme};
+use super::widgets::{STALE_MARK, age_mark, fixed, shortest};
+use crate::model::alarm::Alarm;
+use crate::model::link::RADIO_FRESH;
+use crate::model::motion::GRAVITY_M_S2;
+use crate::model::vehicle::{Vehicle, is_on_pad};
+use crate::model::{Model, Playback, Role, safety, words};
+
+/// A vehicle that is slower than this is not falling, m/s.
+const FALLS_M_S: f64 = 0.5;
+
+/// The next event of a flight; `None` on the pad, where the crew decides.
+pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let phase = model.vehicle.phase()?;
+    let (event, rest) = event(&model.vehicle, phase.value, now)?;
+    let stale = phase.is_stale(now);
+    let (mark, role) = if stale { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Title) };
+    Some(Line::from(vec![
+        Span::styled(" next", theme.style(TextRole::Label)),
+        Span::styled(format!("{mark}{event}"), theme.style(role)),
+        Span::styled(rest, theme.style(if stale { TextRole::Stale } else { TextRole::Plain })),
+    ]))
+}
+
+/// The event, and what else is known about it.
+fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String)> {
+    let words = |event: &str, rest: &str| Some((event.to_owned(), rest.to_owned()));
+    match phase {
+        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => None,
+        TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
+        TdPhase::TD_PHASE_COAST => {
+            let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
+            let left_s = climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64());
+            let attached =
+                vehicle.descent.as_ref().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
+            let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
+            Some((format!("{before}apogee{}", within(left_s)), after.to_owned()))
+        }
+        TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
+        TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
+        TdPhase::TD_PHASE_IGNITION => words("thrust", " within 0.5 s, or NO LIGHT"),
+        TdPhase::TD_PHASE_POWERED => {
+            let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
+            Some((format!("touchdown{}", within(left_s)), String::new()))
+        }
+        TdPhase::TD_PHASE_TOUCHDOWN => {
+            words("SAFED", " once the motor is burnt out and cool, or the pin is in")
+        }
+        TdPhase::TD_PHASE_SAFED => words("nothing", ": the flight is over"),
+        TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
+    }
+}
+
+fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String) {
+    if vehicle.interlocks().is_some() && !vehicle.may_light() {
+        let why = safety::latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
+        return ("the ground".to_owned(), format!(": the motor will NOT be lit{why}"));
+    }
+    let descent = vehicle.descent.as_ref();
+    let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
+    let chosen_m =
+        descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
+    let at = chosen_m.map_or_else(String::new, |height_m| format!(" at {} m", fixed(height_m, 0)));
+    let armed = if phase == TdPhase::TD_PHASE_LAND_ARMED { ", motor armed" } else { ", motor not armed yet" };
+    (format!("IGNITION{}", within(left_s)), format!("{at}{armed}"))
+}
+
+/// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not for long.
+fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String) {
+    let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
+    let motor = if live { ", LIVE MOTOR" } else { "" };
+    let Some(descent) = vehicle.descent.as_ref().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
+        return ("chute opens".to_owned(), format!(": fired, still falling fast{motor}"));
+    };
+    let sinks_m_s = -f64::from(descent.value.vertical_speed_m_s);
+    let falls_s = f64::from(descent.value.height_m) / sinks_m_s - descent.age(now).as_secs_f64();
+    let left_s = Some(falls_s).filter(|_| sinks_m_s > FALLS_M_S);
+    ("the ground".to_owned(), format!("{} under the parachute{motor}", within(left_s)))
+}
+
+/// As in ` in 3.4 s`; empty if the time is unknown or over.
+fn within(left_s: Option<f64>) -> String {
+    left_s
+        .filter(|left_s| left_s.is_finite() && *left_s >= 0.0)
+        .map_or_else(String::new, |left_s| format!(" in {} s", fixed(left_s, 1)))
+}
+
+// One line about the link and the log: rates, loss, rejected frames, radio, whether the log records.
+
+/// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
+pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+    if model.look_back.is_some() {
+        return Line::styled(" link: only live", theme.style(TextRole::Label));
+    }
+    if let Some(why) = &model.link.trouble {
+        return Line::styled(format!(" LINK DOWN {why}"), theme.style(TextRole::Alarm));
+    }
+    if model.link.reports.len() > 1 {
+        return several_links(model, theme, now, columns);
+    }
+    let figures = model.link.stats.figures(now);
+    let round_trip = match model.link.round_trip {
+        Some(round_trip) => format!("{:.0} ms", round_trip.as_secs_f64() * 1_000.0),
+        None => "--".to_owned(),
+    };
+    let loss = model.link.loss(now);
+    let loss_role = if loss.is_some_and(|loss| loss > 0.05) { TextRole::Caution } else { TextRole::Plain };
+    let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
+    let rejected =
+        model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
+    let span = |text: String, role: TextRole| Span::styled(text, theme.style(role));
+    let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+    let received = span(format!(" rx {:.0}{capacity} B/s", figures.rx_bytes_s), TextRole::Plain);
+    let refused = (rejected > 0 || model.link.send_drops > 0)
+        .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), TextRole::Caution));
+    // The most important parts first, so that they fit into the narrowest panel.
+    let mut pieces = vec![received, span(format!("  loss {}", percent(loss)), loss_role)];
+    pieces.push(log_state(model, theme));
+    pieces.extend(refused);
+    pieces.push(span(format!("  rtt {round_trip}"), TextRole::Plain));
+    pieces.extend(radio(model, now).map(|words| span(words, TextRole::Plain)));
+    pieces.push(span(format!("  tx {:.0} B/s", figures.tx_bytes_s), TextRole::Plain));
+    let mut used = 0;
+    let fits = |piece: &Span| {
+        used += piece.width();
+        used <= columns
+    };
+    Line::from(pieces.into_iter().take_while(fits).collect::<Vec<_>>())
+}
+
+/// A loss in percent; unknown while nothing arrives.
+pub fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "unknown".to_owned(), |share| format!("{:.1} %", share * 100.0))
+}
+
+/// A radio's report about itself: signal and noise at both ends, in its own units.
+fn radio(model: &Model, now: Duration) -> Option<String> {
+    let (radio, at) = model.link.radio.as_ref()?;
+    let fresh = now.saturating_sub(*at) < RADIO_FRESH;
+    fresh.then(|| {
+        let [rssi, remote, noise, remote_noise] =
+            [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(signal_or_unknown);
+        format!("  rssi {rssi}/{remote} noise {noise}/{remote_noise}")
+    })
+}
+
+/// 255 means unknown.
+fn signal_or_unknown(value: u8) -> String {
+    if value == u8::MAX { "--".to_owned() } else { value.to_string() }
+}
+
+/// The line for several links: the loss over all of them, then each link as far as there is room.
+fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+    let all = model.link.loss(now);
+    let role = |loss: f64| if loss > 0.05 { TextRole::Caution } else { TextRole::Plain };
+    let mut spans = vec![
+        Span::styled(
+            format!(" {} links, loss {}", model.link.reports.len(), percent(all)),
+            theme.style(role(all.unwrap_or(0.0))),
+        ),
+        log_state(model, theme),
+    ];
+    if let Some(refused) = model.link.signing.map(|signing| signing.rejected()).filter(|refused| *refused > 0)
+    {
+        spans.push(Span::styled(format!("  refused {refused}"), theme.style(TextRole::Caution)));
+    }
+    let mut used: usize = spans.iter().map(Span::width).sum();
+    for report in &model.link.reports {
+        let kind = report.name.split(':').next().unwrap_or_default();
+        let span = if report.trouble.is_some() {
+            Span::styled(format!("  {kind} DOWN"), theme.style(TextRole::Alarm))
+        } else {
+            let (rate, loss) = (report.figures.rx_bytes_s, report.figures.loss);
+            let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+            let known = (report.figures.rx_frames_s > 0.0).then_some(loss);
+            let words = format!("  {kind} {rate:.0}{capacity} B/s {}", percent(known));
+            Span::styled(words, theme.style(role(loss)))
+        };
+        used += span.width();
+        if used > columns {
+            break;
+        }
+        spans.push(span);
+    }
+    if let Some(words) = radio(model, now).filter(|words| used + words.len() <= columns) {
+        spans.push(Span::styled(words, theme.style(TextRole::Plain)));
+    }
+    Line::from(spans)
+}
+
+fn log_state(model: &Model, theme: Theme) -> Span<'static> {
+    let (words, role) = if model.settings.role == Role::Replaying {
+        ("  replay".to_owned(), TextRole::Plain)
+    } else if model.settings.log_path.is_none() {
+        ("  no log".to_owned(), TextRole::Caution)
+    } else if model.log.failed {
+        ("  STATION LOG FAILED".to_owned(), TextRole::Alarm)
+    } else if model.log.dropped > 0 {
+        (format!("  log runs, {} DROPPED", model.log.dropped), TextRole::Caution)
+    } else {
+        ("  log ok".to_owned(), TextRole::Good)
+    };
+    Span::styled(words, theme.style(role))
+}
+
+// The alarm line above the page names, with the foremost alarm or the newest event.
+
+/// The key that acknowledges the shown alarm.
+const KEY: &str = " Space: seen ";
+/// On a narrower line the key is left out.
+const KEY_FROM_COLUMNS: usize = 40;
+/// The shortest useful part of a text.
+const TEXT_COLUMNS_MIN: usize = 12;
+
+/// Draws the foremost alarm; without one, the newest event.
+pub fn draw_alarm_line(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    if let Some(playing) = &model.playing {
+        return draw_line(frame, area, replay_line(playing, theme));
+    }
+    if let Some(alarm) = alarm_text(model, theme, now, usize::from(area.width)) {
+        return draw_line(frame, area, alarm);
+    }
+    let last = model.events.newest(1).next().map_or_else(Line::default, |event| {
+        let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
+        let head = format!(" {:.1} ", event.at.as_secs_f64());
+        Line::styled(format!("{head}{}{}", event.mark().trim_start(), event.text), theme.style(role))
+    });
+    draw_line(frame, area, last);
+}
+
+/// The position of a replay, and its keys.
+pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
+    let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
+    let state = if playing.paused { "PAUSED" } else { "plays" };
+    Line::styled(
+        format!(
+            " REPLAY {state} {at:.1} of {of:.1} s x{}  Space  Left Right 5 s  [ ] phase  + -",
+            shortest(playing.speed)
+        ),
+        theme.style(TextRole::Title),
+    )
+}
+
+/// The foremost alarm, its age and the number of further alarms. Only the text of the alarm is shortened; the key
+/// that acknowledges a new alarm is never cut.
+pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
+    let alarm = model.alarms.foremost()?;
+    let more = match model.alarms.list().len() {
+        1 => String::new(),
+        count => format!(" (+{})", count - 1),
+    };
+    let key = if alarm.acknowledged || columns < KEY_FROM_COLUMNS { "" } else { KEY };
+    let AlarmState { word, age, role } = alarm_state(alarm, now);
+    let taken = 1 + word.len() + 1 + 1 + age.len() + more.len() + key.len();
+    // On the narrowest screens the text is more important than its age.
+    let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
+    let text = cut(&alarm.text, room);
+    let line = format!(" {word} {text} {age}{more}");
+    let columns = columns.saturating_sub(key.len());
+    let mut spans = vec![Span::styled(format!("{line:<columns$}"), theme.style(role))];
+    if !key.is_empty() {
+        spans.push(Span::styled(key, theme.style(TextRole::Key)));
+    }
+    Some(Line::from(spans))
+}
+
+/// The present state of an alarm, for showing.
+pub struct AlarmState {
+    /// Says whether the alarm holds and whether a person has seen it.
+    pub word: &'static str,
+    /// How long the alarm has held, or how long ago it ended; in whole seconds.
+    pub age: String,
+    pub role: TextRole,
+}
+
+/// Describes the present state of an alarm.
+pub fn alarm_state(alarm: &Alarm, now: Duration) -> AlarmState {
+    let since = |at: Duration| now.saturating_sub(at).as_secs();
+    let (word, role) = match alarm.ended_at {
+        None if alarm.acknowledged => ("alarm seen:", TextRole::Caution),
+        None => ("ALARM", TextRole::Alarm),
+        Some(_) if alarm.past => ("past alarm:", TextRole::Caution),
+        Some(_) => ("ended alarm:", TextRole::Caution),
+    };
+    let age = match alarm.ended_at {
+        None => format!("{} s", since(alarm.raised_at)),
+        Some(at) => format!("ended {} s ago", since(at)),
+    };
+    AlarmState { word, age, role }
+}
+
+/// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept, unless that would lose more
+/// than a third of what fits.
+pub fn cut(text: &str, columns: usize) -> String {
+    if text.chars().count() <= columns {
+        return text.to_owned();
+    }
+    let room = columns.saturating_sub(2);
+    let fits: String = text.chars().take(room).collect();
+    let ends_a_word = text.chars().nth(room).is_none_or(|next| next == ' ');
+    let words = fits.rsplit_once(' ').map(|(words, _)| words).filter(|_| !ends_a_word);
+    let kept = words.filter(|words| 3 * words.chars().count() >= 2 * room).unwrap_or(&fits);
+    format!("{}..", kept.trim_end())
+}
+
+// The bar of the whole flight: its phases along time, warnings and errors, and the shown moment.
+
+/// How long the bar of a flight in progress is, so that it is rarely drawn anew, s.
+const LENGTHS_S: [f64; 8] = [30.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
+/// The mark of the shown moment, of a warning or an error, and of the time that has passed.
+const NOW: char = '•';
+const EVENT: char = '!';
+const PASSED: char = '─';
+
+/// A part of the flight that the bar shows.
+struct Shown {
+    from: Duration,
+    length_s: f64,
+}
+
+/// Whether there is a flight to show.
+pub fn shows_flight_bar(model: &Model) -> bool {
+    model.playing.is_some() || flight_began(model).is_some()
+}
+
+/// When the flight began.
+fn flight_began(model: &Model) -> Option<Duration> {
+    model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
+}
+
+/// Draws the bar up to the present, with a mark at the shown moment.
+pub fn draw_flight_bar(
+    model: &Model,
+    theme: Theme,
+    (now, shown_at): (Duration, Duration),
+    frame: &mut Frame,
+    area: Rect,
+) {
+    if area.height > 0 && shows_flight_bar(model) {
+        draw_line(frame, area, flight_bar_line(model, theme, (now, shown_at), usize::from(area.width)));
+    }
+}
+
+fn flight_bar_line(
+    model: &Model,
+    theme: Theme,
+    (now, shown_at): (Duration, Duration),
+    columns: usize,
+) -> Line<'static> {
+    let columns = columns.saturating_sub(2).max(1);
+    let (phases, span): (&[(TdPhase, Duration)], Shown) = if let Some(playing) = &model.playing {
+        let length_s = playing.length.as_secs_f64().max(1.0);
+        (&playing.phases, Shown { from: Duration::ZERO, length_s })
+    } else {
+        let from = flight_began(model).unwrap_or(now);
+        let passed_s = now.saturating_sub(from).as_secs_f64();
+        let length_s = LENGTHS_S.into_iter().find(|length_s| passed_s < *length_s).unwrap_or(passed_s);
+        (&model.history.timeline, Shown { from, length_s })
+    };
+    let column = |at: Duration| {
+        let share = at.saturating_sub(span.from).as_secs_f64() / span.length_s;
+        ((share * columns as f64) as usize).min(columns.saturating_sub(1))
+    };
+    let mut cells = vec![' '; columns];
+    for cell in cells.iter_mut().take(column(now) + 1) {
+        *cell = PASSED;
+    }
+    let mut free_from = 0;
+    for (phase, at) in phases.iter().filter(|(phase, at)| !is_on_pad(*phase) || *at >= span.from) {
+        let begin = column(*at);
+        let name = words::phase(*phase);
+        if begin < free_from || begin + name.len() >= columns {
+            continue;
+        }
+        for (cell, letter) in cells[begin..].iter_mut().zip(name.chars()) {
+            *cell = letter;
+        }
+        free_from = begin + name.len() + 1;
+    }
+    for event in model.events.newest(usize::MAX) {
+        let cell = &mut cells[column(event.at).min(columns.saturating_sub(1))];
+        if event.level != EventLevel::Info && event.at >= span.from && (*cell == PASSED || *cell == ' ') {
+            *cell = EVENT;
+        }
+    }
+    let here = column(shown_at);
+    if let Some(cell) = cells.get_mut(here).filter(|cell| !cell.is_alphabetic()) {
+        *cell = NOW;
+    }
+    let part = |cells: &[char], role| Span::styled(cells.iter().collect::<String>(), theme.style(role));
+    let (before, rest) = cells.split_at(here);
+    Line::from(vec![
+        Span::raw(" "),
+        part(before, TextRole::Plain),
+        part(&rest[..1], TextRole::Key).patch_style(Modifier::REVERSED),
+        part(&rest[1..], TextRole::Plain),
+    ])
+}
+
+// The line of the pinned numbers.
+
+/// Columns of one number with its name, so that nothing moves when it changes.
+const COLUMNS: usize = 26;
+
+pub fn pinned_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let spans = model.pages.pinned.iter().flat_map(|quantity| {
+        let sample = quantity.read(model, now);
+        let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
+        let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
+        let name = format!(" {}", quantity.name);
+        let room = COLUMNS.saturating_sub(name.chars().count());
+        let role = if role == TextRole::Plain { TextRole::Title } else { role };
+        [
+            Span::styled(name, theme.style(TextRole::Label)),
+            Span::styled(format!("{:<room$}", format!("{mark}{value} {}", quantity.unit)), theme.style(role)),
+        ]
+    });
+    Line::from(spans.collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_cut_behind_a_whole_word() {
+        let text = "LINK LOST: the vehicle is not heard";
+        assert_eq!(cut(text, 35), text);
+        assert_eq!(cut(text, 34), "LINK LOST: the vehicle is not..");
+        assert_eq!(cut(text, 31), "LINK LOST: the vehicle is not..");
+        assert_eq!(cut(text, 30), "LINK LOST: the vehicle is..");
+        assert_eq!(cut("ABORT LATCHED on the vehicle", 12), "ABORT LATC..");
+        assert_eq!(cut("no-whole-word-fits", 12), "no-whole-w..");
+        assert_eq!(cut("a no-whole-word-fits", 12), "a no-whole..");
+    }
+}

@@ -1,0 +1,350 @@
+//! Numbers, scales, the height gauge and sparklines. Numbers have a bounded width, whatever arrives over the radio.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Sparkline;
+
+use super::draw_line;
+use super::theme::{TextRole, Theme};
+use crate::model::Model;
+use crate::model::dead_reckoning::{is_unheard, predict_position};
+use crate::model::quantity::Quantity;
+use crate::model::vehicle::Sample;
+
+/// The mark before a value that is too old.
+pub const STALE_MARK: &str = "~";
+/// The width of a value in a row, without its mark.
+const VALUE_WIDTH: usize = 9;
+const LABEL_WIDTH: usize = 10;
+
+/// A number with fixed decimals; `--` for NaN and infinity.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        "--".to_owned()
+    } else if value.abs() >= 1e6 {
+        format!("{value:.1e}")
+    } else {
+        // A value that rounds to zero has no minus sign.
+        let text = format!("{value:.decimals$}");
+        match text.strip_prefix('-') {
+            Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
+            _ => text,
+        }
+    }
+}
+
+/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the error of an `f32`.
+pub fn shortest(value: f64) -> String {
+    let text = fixed(value, 3);
+    match text.split_once('.') {
+        Some((_, decimals)) if decimals.bytes().all(|digit| digit.is_ascii_digit()) => {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        }
+        _ => text,
+    }
+}
+
+/// The mark and the role of a value by its age.
+pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole) {
+    if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) }
+}
+
+/// A row with label, value and unit. A stale value is marked; a missing one is `--`.
+pub fn row(
+    theme: Theme,
+    label: &str,
+    value: Option<Sample<f64>>,
+    decimals: usize,
+    unit: &'static str,
+    now: Duration,
+) -> Line<'static> {
+    let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
+    let (mark, role) = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now));
+    text_row(theme, label, mark, &text, role, unit)
+}
+
+/// A row with label and text, aligned like the numbers.
+pub fn text_row(
+    theme: Theme,
+    label: &str,
+    mark: &'static str,
+    text: &str,
+    role: TextRole,
+    unit: &'static str,
+) -> Line<'static> {
+    Line::from(vec![
+        Span::styled(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}"), theme.style(TextRole::Label)),
+        Span::styled(format!("{mark}{text:>VALUE_WIDTH$}"), theme.style(role)),
+        Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
+    ])
+}
+
+/// A duration in seconds, as in `3.2 s`.
+pub fn seconds(duration: Duration) -> String {
+    let seconds = duration.as_secs_f64();
+    if seconds < 100.0 { format!("{seconds:.1} s") } else { format!("{seconds:.0} s") }
+}
+
+// Round numbers for scales: 1, 2 or 5 times a power of ten.
+
+/// The smallest round step that divides a span into at most this many parts.
+pub fn tick_step(span: f64, parts_max: usize) -> f64 {
+    let least = span / parts_max.max(1) as f64;
+    if !(least.is_finite() && least > 0.0) {
+        return 1.0;
+    }
+    let decade = libm::exp10(libm::floor(libm::log10(least)));
+    [1.0, 2.0, 5.0].into_iter().map(|step| step * decade).find(|step| *step >= least).unwrap_or(10.0 * decade)
+}
+
+/// The multiples of a step from one value to another, ends included.
+pub fn ticks(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
+    let (first, last) = (libm::ceil(from / step), libm::floor(to / step));
+    // A scale of more ticks than columns would be an error of the caller; it must not hang.
+    let count = (last - first + 1.0).clamp(0.0, 1_000.0) as u32;
+    (0..count).map(move |k| (first + f64::from(k)) * step)
+}
+
+/// The decimals that a step needs.
+pub fn tick_decimals(step: f64) -> usize {
+    (-libm::floor(libm::log10(step))).clamp(0.0, 6.0) as usize
+}
+
+// The height gauge: a scale from the pad upwards with the ignition band and the vehicle.
+
+/// The least height of the scale, m.
+const TOP_MIN_M: f64 = 25.0;
+/// Heights of a row within a decade, and how many rows make a tick, so that every tick is round.
+const ROW_HEIGHTS: [(f64, usize); 5] = [(1.0, 5), (2.0, 5), (2.5, 4), (4.0, 5), (5.0, 4)];
+
+/// One line per row, the greatest height first.
+pub fn gauge_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
+    if rows < 3 {
+        return Vec::new();
+    }
+    let descent = model.vehicle.descent.as_ref();
+    // If the motor will not be lit there is no ignition band.
+    let to_light = descent.filter(|_| model.vehicle.may_light());
+    let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);
+    let band = to_light
+        .and_then(|d| finite(f64::from(d.value.band_low_m)).zip(finite(f64::from(d.value.band_high_m))));
+    let chosen = to_light.and_then(|d| finite(f64::from(d.value.chosen_height_m)));
+    // On the way up there is no commit height yet, and on the way down no apogee any more.
+    let above_ground = |height: f32| finite(f64::from(height)).filter(|height_m| *height_m > 0.0);
+    let apogee = descent.and_then(|d| above_ground(d.value.apogee_m));
+    let commit = descent.and_then(|d| above_ground(d.value.commit_height_m));
+    let lost = predict_position(&model.vehicle, now);
+    let (height, mark, role) = match (lost, model.vehicle.height_m()) {
+        (Some(at), _) => (finite(at.altitude_m), "pred ", TextRole::Stale),
+        (None, Some(height)) if !is_unheard(&model.vehicle, now) => {
+            let (mark, role) = age_mark(&height, now);
+            (finite(height.value.max(0.0)), mark, role)
+        }
+        // The position is unknown.
+        (None, _) => (None, " ", TextRole::Label),
+    };
+    let marks = [height, band.map(|band| band.1), chosen, commit, apogee];
+    let (per_row, tick_rows) = gauge_scale(marks.into_iter().flatten().fold(0.0, f64::max), rows - 1);
+    (0..rows)
+        .rev()
+        .map(|row| {
+            let (low, high) = ((row as f64 - 0.5) * per_row, (row as f64 + 0.5) * per_row);
+            let here = |height: Option<f64>| height.is_some_and(|height| (low..high).contains(&height));
+            let inside = band.is_some_and(|(bottom, top)| bottom < high && top >= low);
+            let is_tick = row % tick_rows == 0;
+            let tick = if is_tick { fixed(row as f64 * per_row, 0) } else { String::new() };
+            let bar = match (inside, is_tick) {
+                (true, _) => "▐█▌",
+                (false, true) => "─┤ ",
+                (false, false) => " │ ",
+            };
+            let mut spans = vec![
+                Span::styled(format!("{tick:>6} "), theme.style(TextRole::Label)),
+                Span::styled(bar, theme.style(TextRole::Plain)),
+            ];
+            if here(height) {
+                let text = height.map_or_else(String::new, |height| fixed(height, 1));
+                let role = if role == TextRole::Stale { role } else { TextRole::Title };
+                spans.push(Span::styled(format!("<{mark}{text} "), theme.style(role)));
+            }
+            for (at, name) in [(chosen, "IGNITE"), (commit, "commit"), (apogee, "apogee")] {
+                if here(at) {
+                    let text = at.map_or_else(String::new, |height| fixed(height, 0));
+                    spans.push(Span::styled(format!("-{name} {text} "), theme.style(TextRole::Caution)));
+                }
+            }
+            Line::from(spans)
+        })
+        .collect()
+}
+
+/// The least height of a row for which a height fits into this many rows, m, and how many rows make a tick.
+fn gauge_scale(highest_m: f64, rows: usize) -> (f64, usize) {
+    let least_m = highest_m.clamp(TOP_MIN_M, 1e6) / rows as f64;
+    let decade = libm::exp10(libm::floor(libm::log10(least_m)));
+    // A hundredth, because a power of ten is not exact.
+    let fits = ROW_HEIGHTS.into_iter().find(|(height, _)| height * decade >= 0.99 * least_m);
+    fits.map_or((10.0 * decade, 5), |(height, tick_rows)| (height * decade, tick_rows))
+}
+
+// A quantity over the last minute, in one or a few rows, with its name, its range and its present value.
+
+/// How far back a sparkline reaches.
+const SPAN: Duration = Duration::from_mins(1);
+/// Rows of one sparkline with its heading.
+pub const SPARKLINE_ROWS: u16 = 4;
+/// Steps of the height of a bar; a terminal shows eight a row.
+const STEPS: f64 = 100.0;
+
+/// Draws as many sparklines as fit, one below the other.
+pub fn draw_sparklines(
+    names: &[&str],
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    let known = names.iter().filter_map(|name| Quantity::named(name));
+    for (quantity, y) in known.zip((area.y..area.bottom()).step_by(usize::from(SPARKLINE_ROWS))) {
+        let at = Rect { y, height: SPARKLINE_ROWS, ..area };
+        if at.bottom() <= area.bottom() {
+            draw_sparkline(quantity, model, theme, now, frame, at);
+        }
+    }
+}
+
+/// Draws one sparkline: a heading and the bars.
+pub fn draw_sparkline(
+    quantity: &Quantity,
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    let [heading, bars] = area.layout(&Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]));
+    let columns = usize::from(bars.width.saturating_sub(2));
+    let values = resampled(quantity, model, now, columns);
+    let known = || values.iter().flatten().copied();
+    let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+    let sample = quantity.read(model, now);
+    let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
+    let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
+    let mut spans = vec![
+        Span::styled(format!(" {}", quantity.name), theme.style(TextRole::Label)),
+        Span::styled(format!("{mark}{value} {}", quantity.unit), theme.style(role)),
+    ];
+    if least <= most {
+        let range =
+            format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
+        let used: usize = spans.iter().map(Span::width).sum();
+        if used + range.len() <= usize::from(heading.width) {
+            spans.push(Span::styled(range, theme.style(TextRole::Label)));
+        }
+    }
+    draw_line(frame, heading, Line::from(spans));
+    let span = (most - least).max(f64::MIN_POSITIVE);
+    let heights =
+        values.iter().map(|value| value.map(|value| (1.0 + (STEPS - 1.0) * (value - least) / span) as u64));
+    let bars = Rect { x: bars.x + 1, width: bars.width.saturating_sub(2), ..bars };
+    let widget = Sparkline::default()
+        .data(heights.collect::<Vec<_>>())
+        .absent_value_symbol(" ")
+        .max(STEPS as u64)
+        .style(theme.ground().fg(theme.ink(crate::view::theme::Ink::Planned)));
+    frame.render_widget(widget, bars);
+}
+
+/// The last value in each of so many equal parts of the last minute; `None` where none is known.
+fn resampled(quantity: &Quantity, model: &Model, now: Duration, columns: usize) -> Vec<Option<f64>> {
+    // Steps of a whole part, so that the bars do not tremble while time passes.
+    let part = SPAN.as_secs_f64() / columns.max(1) as f64;
+    let last = libm::floor(now.as_secs_f64() / part);
+    let first = last - columns as f64 + 1.0;
+    let mut values = vec![None; columns];
+    let from = Duration::from_secs_f64((first * part).max(0.0));
+    for (at, value) in model.history.trace.values(quantity, from, now) {
+        let place = libm::floor(at.as_secs_f64() / part) - first;
+        if let Some(slot) = (place >= 0.0).then(|| values.get_mut(place as usize)).flatten() {
+            *slot = Some(value);
+        }
+    }
+    values
+}
+
+#[cfg(test)]
+mod number_tests {
+    use super::*;
+
+    #[test]
+    fn numbers_never_grow_wide() {
+        let wild = [0.0, -0.0, -0.001, 1.0, f64::MAX, f64::MIN, f64::NAN, f64::INFINITY, -999_999.99];
+        for value in wild {
+            assert!(fixed(value, 2).len() <= 10, "{value} became {}", fixed(value, 2));
+        }
+        assert_eq!(fixed(-0.001, 2), "0.00");
+        assert_eq!(fixed(-0.01, 2), "-0.01");
+    }
+
+    #[test]
+    fn numbers_have_no_unneeded_digits() {
+        let cases = [(20.0, "20"), (f64::from(0.1_f32), "0.1"), (82.5, "82.5"), (0.0, "0"), (f64::NAN, "--")];
+        for (value, expected) in cases {
+            assert_eq!(shortest(value), expected);
+        }
+        assert_eq!(shortest(1e9), "1.0e9");
+    }
+}
+
+#[cfg(test)]
+mod ticks_tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round_and_few() {
+        for (span, parts, expected) in
+            [(100.0, 5, 20.0), (90.0, 4, 50.0), (0.7, 5, 0.2), (1.0, 1, 1.0), (301.0, 10, 50.0)]
+        {
+            assert!(
+                (tick_step(span, parts) - expected).abs() < 1e-12,
+                "{span} in {parts}: {}",
+                tick_step(span, parts)
+            );
+        }
+        for odd in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!((tick_step(odd, 4) - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn ticks_are_the_multiples_inside() {
+        assert_eq!(ticks(-12.0, 31.0, 10.0).collect::<Vec<_>>(), [-10.0, 0.0, 10.0, 20.0, 30.0]);
+        assert_eq!(ticks(1.0, 4.0, 5.0).count(), 0);
+        assert_eq!(ticks(0.0, 1e9, 1e-9).count(), 1_000);
+        assert_eq!([tick_decimals(0.2), tick_decimals(5.0), tick_decimals(0.05)], [1, 0, 2]);
+    }
+}
+
+#[cfg(test)]
+mod gauge_tests {
+    use super::*;
+
+    #[test]
+    fn every_tick_is_a_round_height() {
+        for rows in [10, 11, 16, 29, 48] {
+            for highest_m in [0.0, 25.0, 26.0, 99.0, 101.0, 299.0, 4_321.0, f64::MAX] {
+                let (per_row, tick_rows) = gauge_scale(highest_m, rows);
+                let tick_m = per_row * tick_rows as f64;
+                let digits = tick_m / libm::exp10(libm::floor(libm::log10(tick_m) + 1e-9));
+                assert!([1.0, 2.0, 5.0].iter().any(|round| (digits - round).abs() < 1e-6), "{tick_m}");
+                let top_m = per_row * rows as f64;
+                assert!(top_m >= 0.98 * highest_m.clamp(TOP_MIN_M, 1e6), "{top_m} for {highest_m}");
+                assert!(top_m <= 2.1 * highest_m.clamp(TOP_MIN_M, 1e6), "{top_m} for {highest_m}");
+            }
+        }
+    }
+}
