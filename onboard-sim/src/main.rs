@@ -36,10 +36,8 @@ enum Command {
         after_help = "Examples:\n  onboard-sim fly --profile mk2 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
     Fly(cli::fly::FlyArguments),
-    /// Map where a vehicle lands, over two quantities.
-    ///
-    /// A profile: where a plan exists that ends inside the touchdown limits, one solve for each cell. A mission: where its
-    /// own guidance lands, one simulated flight for each cell, or with `--ask attainable` where a clairvoyant could.
+    /// Map where a mission lands, over two quantities: one simulated flight for each cell, or with `--ask attainable` what
+    /// perfect information could land.
     #[command(after_help = "Example: onboard-sim landability --profile mk2 --svg mk2.svg")]
     Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.

@@ -2,7 +2,6 @@
 #![expect(clippy::expect_used, reason = "a missing built-in profile is a failed test")]
 
 use flight::guidance::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
-use flight::guidance::landing::landing_problem;
 use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
@@ -71,16 +70,14 @@ impl Motor for Fading {
 
 #[test]
 fn warm_searches_for_the_final_time_do_not_allocate() {
-    let profile = vehicles::profile::builtin("paper-calibrated").expect("a built-in profile");
     let mut problem = FreeTimeProblem {
-        landing: landing_problem(&profile, profile.start.planar_state(), 0.0, 0, 1.0),
+        landing: nmpc::paper::problem(nmpc::paper::start(), 0),
         intervals: 50,
         earliest_s: 0.5,
         latest_s: 6.0,
         target_drift_m_s: 0.0,
         max_solves: 8,
     };
-    problem.landing.final_box = None;
     let mut workspace = FreeTimeWorkspace::default();
     let (mut best, mut next) = (FreeTimeSolution::default(), FreeTimeSolution::default());
     for found in [&mut best, &mut next] {

@@ -13,6 +13,7 @@
 //! * `workspace`: the solver's buffers, between a problem and its solution.
 //! * `resample`: converts a solution into a start for a problem with other nodes.
 //! * [`free_time`]: a search for the best final time, around the solver.
+//! * [`paper`]: the landing paper's vehicle and problem.
 //! * [`space`]: the landing in space, with a lean in any direction and the fins.
 //!
 //! The crate `reference-solver` solves the same problem in another way, for tests and comparisons.
@@ -31,8 +32,7 @@ pub mod dynamics;
 pub mod free_time;
 mod intervals;
 mod model;
-#[cfg(test)]
-mod paper;
+pub mod paper;
 pub mod problem;
 mod resample;
 pub mod rollout;

@@ -1,9 +1,9 @@
 //! Compares our solutions with those of an independent solver, `CasADi` with IPOPT, on the landing paper's own problem.
 #![expect(clippy::unwrap_used, reason = "a table that cannot be read is a failed test")]
 
-use flight::guidance::landing::landing_problem;
-use flight::vehicle::dynamics::PlanarState;
-use nmpc::{Problem, SolveStatus, solve};
+use nmpc::dynamics::PlanarState;
+use nmpc::paper::{HORIZON, problem, start};
+use nmpc::{SolveStatus, solve};
 
 /// The table; its header says how it was made.
 const TABLE: &str = include_str!("data/casadi_ipopt.csv");
@@ -20,24 +20,14 @@ fn rows() -> Vec<Row> {
         let numbers: Vec<f64> = line.split(',').map(|number| number.parse().unwrap()).collect();
         let &[pitch_deg, w_m_s, q_deg_s, cost, ref end @ ..] = numbers.as_slice() else { panic!("{line}") };
         let start = PlanarState {
-            x_m: 0.0,
-            z_m: 15.0,
             theta_rad: pitch_deg.to_radians(),
-            u_m_s: -5.0,
             w_m_s,
             q_rad_s: q_deg_s.to_radians(),
+            ..start()
         };
         Row { start, cost, end: PlanarState::from_array(end.try_into().unwrap()) }
     };
     lines.map(row).collect()
-}
-
-/// The paper's own problem: at the end only Table 2's distance and height, and no floor.
-fn papers_own(start: PlanarState) -> Problem {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.nmpc.limits.final_box = None;
-    profile.nmpc.limits.altitude_min_m = None;
-    landing_problem(&profile, start, 0.0, profile.nmpc.horizon_steps, 1.0)
 }
 
 /// The mirror image about the vertical: the same landing seen from the other side.
@@ -60,7 +50,7 @@ fn val_casadi_ipopt_costs_and_final_states() {
     let rows = rows();
     assert_eq!(rows.len(), 7);
     for row in rows {
-        let solution = solve(&papers_own(row.start), None);
+        let solution = solve(&problem(row.start, HORIZON), None);
         assert_eq!(solution.status, SolveStatus::Converged, "{:?}", row.start);
         // Both stop at residuals of 1e-6 or below. Costs agree to the square of that, states to its order.
         assert!(

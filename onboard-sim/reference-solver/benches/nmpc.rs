@@ -1,50 +1,38 @@
-//! Times the landing controller: its layers, cold and warm solves, and every tick of a whole landing.
+//! Times the solver: its layers, cold and warm solves, and every solve of a whole landing.
 //!
 //! `cargo bench -p reference-solver` prints divan's table and two more results. It compares the interior-point method
 //! with the reference solver on the landing paper's problem (each case is the best of several runs; the result is the
 //! ratio of geometric means). And it flies one closed-loop landing many times and prints the wall time of each of its
-//! ticks as median, 99th percentile and worst.
-#![expect(clippy::expect_used, reason = "a bench without its built-in profile cannot run")]
+//! solves as median, 99th percentile and worst.
+#![expect(clippy::expect_used, reason = "a bench without a solved path cannot run")]
 #![expect(clippy::print_stdout, reason = "the table is the result")]
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use flight::guidance::controller::{
-    ControllerConfig, ControllerInput, ControllerOutput, ControllerState, step,
-};
-use flight::guidance::landing::landing_problem;
-use flight::rules::phase::Phase;
-use flight::vehicle::dynamics::PlanarState;
-use flight::vehicle::profile::Profile;
+use nmpc::dynamics::PlanarState;
+use nmpc::paper::{HORIZON, SAMPLE_S, THRUST_N, model, problem as papers_own, settled, start};
 use nmpc::{Problem, Solution, SolveStatus, WarmStart, Workspace, solve, solve_into};
 
-fn profile() -> Profile {
-    vehicles::profile::builtin("paper-calibrated").expect("a built-in profile")
-}
-
 fn problem() -> Problem {
-    let profile = profile();
-    landing_problem(&profile, profile.start.planar_state(), 0.0, 50, 1.0)
+    settled(start(), HORIZON)
 }
 
 fn main() {
     divan::main();
     against_the_reference();
-    tick_times();
+    solve_times();
 }
 
 #[divan::bench]
 fn rk4_step(bencher: divan::Bencher) {
-    let profile = profile();
-    let (model, state) = (profile.planar_model(), profile.start.planar_state());
+    let (model, state) = (model(), start());
     bencher.bench(|| model.rk4_step(black_box(&state), black_box(0.1), 33.3, 0.1));
 }
 
 #[divan::bench]
 fn stage_jacobian_and_hessian(bencher: divan::Bencher) {
-    let profile = profile();
-    let (model, state) = (profile.planar_model(), profile.start.planar_state().to_array());
+    let (model, state) = (model(), start().to_array());
     bencher.bench(|| {
         let jacobian = model.jacobian(black_box(&state), black_box(0.1), 33.3);
         let hessian = model.weighted_hessian(black_box(&state), black_box(0.1), 33.3, &[1.0; 6]);
@@ -128,9 +116,7 @@ fn kick(state: &mut PlanarState, [u, w, q]: [f64; 3]) {
 /// Compares the interior-point method with the reference, interleaved, on the landing paper's own problem: the seven
 /// starts cold, disturbed in four directions at eight instants, and undisturbed.
 fn against_the_reference() {
-    let mut profile = profile();
-    profile.nmpc.limits.final_box = None;
-    let nominal = profile.start.planar_state();
+    let nominal = start();
     let pitched = |deg: f64| PlanarState { theta_rad: deg.to_radians(), ..nominal };
     let sideways = |w_m_s| PlanarState { w_m_s, ..nominal };
     let turning = |deg_s: f64| PlanarState { q_rad_s: deg_s.to_radians(), ..nominal };
@@ -138,7 +124,7 @@ fn against_the_reference() {
         [nominal, pitched(60.0), pitched(120.0), sideways(-1.0), sideways(1.0), turning(-5.0), turning(5.0)];
     let (mut cold, mut kicked, mut undisturbed) = (Vec::new(), Vec::new(), Vec::new());
     for start in starts {
-        let problem = landing_problem(&profile, start, 0.0, 50, 1.0);
+        let problem = papers_own(start, HORIZON);
         cold.push((problem.clone(), None));
         for samples in (1..49).step_by(6) {
             for signs in [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]] {
@@ -195,27 +181,24 @@ fn micros(time: Duration) -> f64 {
     1e6 * time.as_secs_f64()
 }
 
-/// Flies landings from slightly different starts and prints the times of their ticks.
-fn tick_times() {
+/// Flies landings from slightly different starts and prints the times of their solves.
+fn solve_times() {
     const FLIGHTS: u32 = 40;
-    let config = ControllerConfig::from_profile(&profile());
-    let (mut nominal, mut dispersed, mut rehearsals) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut nominal, mut dispersed, mut cold) = (Vec::new(), Vec::new(), Vec::new());
     for flight in 0..FLIGHTS {
-        let mut start = profile().start.planar_state();
-        fly(&config, start, &mut rehearsals, &mut nominal);
-        // A fixed pattern within two sigma of `paper-dispersed`.
+        fly(start(), &mut cold, &mut nominal);
+        // A fixed pattern within two sigma of 0.2 m/s, 3 deg and 2 deg/s.
         let pattern = |step: u32| f64::from((flight * step) % FLIGHTS) / f64::from(FLIGHTS) * 2.0 - 1.0;
+        let mut start = start();
         start.w_m_s += 0.4 * pattern(7);
         start.theta_rad += 6.0_f64.to_radians() * pattern(11);
         start.q_rad_s += 4.0_f64.to_radians() * pattern(17);
-        fly(&config, start, &mut rehearsals, &mut dispersed);
+        fly(start, &mut cold, &mut dispersed);
     }
-    println!("\nwall time of controller::step, ms          median      p99    worst");
-    for (name, mut times) in [
-        ("first rehearsal (cold)", rehearsals),
-        ("powered ticks, nominal start", nominal),
-        ("powered ticks, dispersed starts", dispersed),
-    ] {
+    println!("\nwall time of a solve in the closed loop, ms   median      p99    worst");
+    for (name, mut times) in
+        [("first (cold)", cold), ("later, nominal start", nominal), ("later, dispersed starts", dispersed)]
+    {
         times.sort();
         let at = |fraction: f64| {
             let index = (fraction * (times.len() - 1) as f64).round() as usize;
@@ -225,45 +208,21 @@ fn tick_times() {
     }
 }
 
-fn fly(
-    config: &ControllerConfig,
-    start: PlanarState,
-    rehearsals: &mut Vec<Duration>,
-    ticks: &mut Vec<Duration>,
-) {
-    let profile = config.profile();
-    let model = profile.planar_model();
-    let mut controller = ControllerState::new(config);
-    let mut input = ControllerInput {
-        tick: 0,
-        time_s: 0.0,
-        phase: Phase::PadIdle,
-        time_since_ignition_s: 0.0,
-        state: profile.start.planar_state(),
-        gimbal_applied_rad: 0.0,
-        thrust_scale: 1.0,
-        degraded: false,
-        lands_here: false,
-        deadline_missed: false,
-    };
-    rehearsals.push(timed(&mut controller, &input).1);
-    input.phase = Phase::Powered;
-    input.state = start;
-    for tick in 0_u32..49 {
-        input.tick = u64::from(tick);
-        input.time_since_ignition_s = f64::from(tick) * config.sample_time_s();
-        let (output, time) = timed(&mut controller, &input);
-        ticks.push(time);
+/// Solves once a sample, one sample ahead, and flies a hundred times finer.
+fn fly(mut state: PlanarState, cold: &mut Vec<Duration>, later: &mut Vec<Duration>) {
+    let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
+    let mut gimbal_rad = 0.0;
+    for sample in 1..HORIZON {
+        let problem = settled(model().rk4_step(&state, gimbal_rad, THRUST_N, SAMPLE_S), HORIZON - sample);
+        let warm = (sample > 1).then(|| solution.shifted(1));
+        let solved = || solve_into(black_box(&problem), warm.as_ref(), &mut workspace, &mut solution);
+        let times = if sample == 1 { &mut *cold } else { &mut *later };
+        times.push(time_of(solved).1);
         for _ in 0..100 {
-            input.state =
-                model.rk4_step(&input.state, input.gimbal_applied_rad, profile.motor.thrust_n, 1e-3);
+            state = model().rk4_step(&state, gimbal_rad, THRUST_N, 0.01 * SAMPLE_S);
         }
-        input.gimbal_applied_rad = output.gimbal_command_rad;
+        gimbal_rad = solution.inputs_rad.first().copied().expect("an input");
     }
-}
-
-fn timed(controller: &mut ControllerState, input: &ControllerInput) -> (ControllerOutput, Duration) {
-    time_of(|| step(controller, black_box(input)))
 }
 
 #[expect(clippy::disallowed_methods, reason = "a bench reads the clock; the crate under test does not")]

@@ -176,9 +176,7 @@ mod tests {
     const VARIABLES: usize = 7;
 
     fn problem(kind: ModelKind) -> Problem {
-        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        let mut problem =
-            flight::guidance::landing::landing_problem(&profile, PlanarState::default(), 0.0, 1, 1.0);
+        let mut problem = nmpc::paper::problem(PlanarState::default(), 1);
         problem.model.kind = kind;
         problem
     }

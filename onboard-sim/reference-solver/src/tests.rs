@@ -3,21 +3,15 @@ use proptest::prelude::*;
 
 use super::condense::Linearised;
 use super::*;
-use flight::guidance::landing::landing_problem;
 use nmpc::dynamics::PlanarState;
+use nmpc::paper::{HORIZON, problem, settled, start};
 use nmpc::rollout::Trajectory;
-
-fn start() -> PlanarState {
-    vehicles::profile::builtin("paper-calibrated").unwrap().start.planar_state()
-}
 
 /// The landing that a start with 5 deg/s does not converge to: the second cost in the solver study.
 #[test]
 fn val_solver_study_the_other_branch_from_a_turning_start() {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.nmpc.limits.final_box = None;
     let turning = PlanarState { q_rad_s: 5.0_f64.to_radians(), ..start() };
-    let problem = landing_problem(&profile, turning, 0.0, 50, 1.0);
+    let problem = problem(turning, HORIZON);
     let inputs_rad = guess::bent(&problem, 0.3);
     let solution = sqp::solve_from(&problem, &WarmStart { inputs_rad, ..WarmStart::default() });
     assert!((solution.cost - 8467.22).abs() < 0.006, "{}", solution.cost);
@@ -47,9 +41,8 @@ proptest! {
         multipliers in prop::collection::vec(-100.0..100.0_f64, 26),
         theta_deg in 60.0..120.0_f64,
     ) {
-        let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        profile.nmpc.limits.altitude_min_m = Some(0.0);
-        let problem = landing_problem(&profile, PlanarState { theta_rad: theta_deg.to_radians(), ..start() }, 4.4, 6, 1.0);
+        let tilted = PlanarState { theta_rad: theta_deg.to_radians(), ..start() };
+        let problem = Problem { altitude_min_m: Some(0.0), ..settled(tilted, 6) };
         let conditions = problem.conditions();
         prop_assert!(conditions.len() <= multipliers.len() + 5);
         let trajectory = Trajectory::of(&problem, &inputs_rad);

@@ -1,12 +1,11 @@
 //! Maps where a vehicle lands, over two quantities of the start, the motor or the day.
 //!
-//! There are three questions, cheapest first: whether a plan exists from an ignition in the plane ([`map`], profiles),
-//! whether a clairvoyant could land a mission, and whether the mission's own guidance does ([`map_mission`]). Cells are independent, so a map does not depend on how many of them are computed at the
-//! same time.
+//! There are three questions, cheapest first: whether a plan exists for the landing paper's vehicle ([`crate::paper::map`]),
+//! whether a mission can be landed with perfect information, and whether its own guidance lands it ([`map_mission`]).
+//! Cells are independent, so a map does not depend on how many of them are computed at the same time.
 
 mod axis;
 mod picture;
-mod plane;
 mod space;
 
 use std::io::{self, Write};
@@ -16,7 +15,6 @@ use sim::sortie::SetUpError;
 
 pub use axis::{Axis, AxisError, Quantity};
 pub use picture::svg;
-pub use plane::map;
 pub use space::{Question as SpaceQuestion, map as map_mission};
 
 /// The result of one cell.
@@ -84,7 +82,7 @@ pub struct Map {
 
 /// A map whose cells `of` computes on `jobs` threads from a value of `x` and one of `y`; `progress` is called with the
 /// cells done, from any of them.
-fn map_of<E: Send>(
+pub(crate) fn map_of<E: Send>(
     [x, y]: [Axis; 2],
     jobs: usize,
     progress: &(dyn Fn(usize) + Sync),
@@ -124,7 +122,7 @@ fn names(quantities: &[Quantity]) -> String {
 }
 
 /// Checks that two quantities are different and among those that are possible.
-fn check(whose: &str, axes: [Axis; 2], possible: &'static [Quantity]) -> Result<(), MapError> {
+pub(crate) fn check(whose: &str, axes: [Axis; 2], possible: &'static [Quantity]) -> Result<(), MapError> {
     let [x, y] = axes.map(|axis| axis.quantity);
     if x == y {
         return Err(MapError::SameQuantity(x));
@@ -187,52 +185,5 @@ impl Map {
             writeln!(out, "{x_value},{y_value},{},{}", cell.finding.name(), cell.touchdown_speed_m_s)?;
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn small_map(jobs: usize) -> Map {
-        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        let x = Axis { quantity: Quantity::ThrustToWeight, from: 0.95, to: 1.2, count: 6 };
-        let y = Axis { quantity: Quantity::Height, from: 11.0, to: 19.0, count: 5 };
-        map(&profile, [x, y], jobs, &|_| ()).unwrap()
-    }
-
-    #[test]
-    fn the_map_does_not_depend_on_the_number_of_jobs() {
-        assert_eq!(small_map(1), small_map(3));
-    }
-
-    /// 33.3 N from 15 m lands (thrust to weight 1.13); 30 N (1.02) and less than the weight do not.
-    #[test]
-    fn val_hand_integration_and_study_agree_with_the_map() {
-        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        let weight_n = profile.vehicle.mass_kg * profile.environment.gravity_m_s2;
-        let at = |thrust_n: f64| {
-            let x = Axis { quantity: Quantity::ThrustToWeight, from: thrust_n / weight_n, to: 2.0, count: 1 };
-            let y = Axis { quantity: Quantity::Height, from: 15.0, to: 15.0, count: 1 };
-            map(&profile, [x, y], 1, &|_| ()).unwrap().cells[0]
-        };
-        assert_eq!(at(33.3).finding, Finding::Lands);
-        assert_eq!(at(30.0).finding, Finding::NotLandable);
-        assert!((at(30.0).touchdown_speed_m_s - 4.3).abs() < 0.05);
-        assert_eq!(at(25.0).finding, Finding::NotLandable);
-    }
-
-    #[test]
-    fn table_and_csv_hold_every_cell() {
-        let map = small_map(2);
-        let (mut table, mut csv) = (Vec::new(), Vec::new());
-        map.write_table(&mut table).unwrap();
-        map.write_csv(&mut csv).unwrap();
-        let [table, csv] = [table, csv].map(|bytes| String::from_utf8(bytes).unwrap());
-        assert_eq!(csv.lines().count(), 31);
-        assert!(csv.starts_with("thrust_to_weight,height_m,finding,touchdown_speed_m_s\n"));
-        let signs = table.lines().filter_map(|line| line.split_once('|')).map(|(_, signs)| signs.len());
-        assert_eq!(signs.sum::<usize>(), 30);
-        assert!(svg(&map, "paper-calibrated").unwrap().contains("paper-calibrated"));
     }
 }

@@ -1,6 +1,10 @@
-//! The paper's experiments and the numbers it prints for them (its Tables 3 to 6).
+//! The paper's experiments, the numbers it prints for them (its Tables 3 to 6), and what counts as a landing (Table 2).
 
-use flight::vehicle::dynamics::PlanarState;
+use core::f64::consts::FRAC_PI_2;
+
+use nmpc::Problem;
+use nmpc::dynamics::PlanarState;
+use nmpc::paper::{self, HORIZON};
 
 /// Which of the paper's tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,6 +92,17 @@ impl Case {
         }
     }
 
+    /// The paper's own problem: its conditions at the end and no others.
+    pub fn problem(&self) -> Problem {
+        let start = PlanarState {
+            theta_rad: self.pitch_deg.to_radians(),
+            w_m_s: self.w_m_s,
+            q_rad_s: self.pitch_rate_deg_s.to_radians(),
+            ..paper::start()
+        };
+        Problem { input_weight: self.input_weight, ..paper::problem(start, HORIZON) }
+    }
+
     /// Upright, without lateral velocity or rate, P = 1: the row that every table repeats.
     pub fn is_nominal(&self) -> bool {
         *self == Self { table: self.table, paper: self.paper, paper_cost: self.paper_cost, ..NOMINAL }
@@ -142,4 +157,90 @@ pub(super) fn all() -> Vec<Case> {
         rate,
         Case { pitch_rate_deg_s: 5.0, paper: Some(row(19.85, 4.17e-12, 82.50, -0.99, -0.069, 1.77)), ..rate },
     ]
+}
+
+/// Table 2: names, lowest and highest values, units.
+const TABLE_2: [(&str, f64, f64, &str); 6] = [
+    ("x", -20.0, 20.0, "m"),
+    ("altitude", 0.0, 0.2, "m"),
+    ("pitch error", -5.0, 5.0, "deg"),
+    ("u", -0.4, 0.4, "m/s"),
+    ("w", -0.1, 0.1, "m/s"),
+    ("pitch rate", -2.0, 2.0, "deg/s"),
+];
+
+/// How far below the ground a plan may end and still count as ending on it, m: it meets the ground only within its solver's
+/// tolerance.
+const HEIGHT_TOLERANCE_M: f64 = 1e-3;
+
+/// The limits of Table 2 that a final state breaks, in words; none means that it lands.
+pub(super) fn broken(state: &PlanarState) -> Vec<String> {
+    let on_ground = (-HEIGHT_TOLERANCE_M..0.0).contains(&state.z_m);
+    let values = [
+        state.x_m,
+        if on_ground { 0.0 } else { state.z_m },
+        (state.theta_rad - FRAC_PI_2).to_degrees(),
+        state.u_m_s,
+        state.w_m_s,
+        state.q_rad_s.to_degrees(),
+    ];
+    let limits = TABLE_2.iter().zip(values);
+    limits
+        .filter(|((_, lowest, highest, _), value)| !(lowest..=highest).contains(&value))
+        .map(|((name, lowest, highest, unit), value)| {
+            format!("{name} {value:.3} {unit} (limit {lowest:.3} to {highest:.3})")
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tables 3 to 6 of the landing paper under its own Table 2: 3 of the 7 distinct start states land.
+    #[test]
+    fn val_landing_paper_tables_4_to_6_judged_by_table_2() {
+        // (x m, theta deg, u m/s, w m/s, q deg/s), z is zero in all.
+        let rows = [
+            ("nominal", -0.27, 87.28, 0.11, 0.040, 0.80, true),
+            ("theta0 = 60", -8.02, 90.47, -0.29, 0.011, 1.03, true),
+            ("theta0 = 120", 0.41, 89.65, 0.019, 0.0020, -0.039, true),
+            ("w0 = -1", -6.84, 88.18, 0.48, 0.010, 1.69, false),
+            ("w0 = +1", 6.35, 91.50, 0.46, 0.0039, -1.86, false),
+            ("q0 = -5", -18.08, 93.96, -1.00, 0.083, -0.41, false),
+            ("q0 = +5", 19.85, 82.50, -0.99, -0.069, 1.77, false),
+        ];
+        for (name, x_m, pitch_deg, u_m_s, w_m_s, rate_deg_s, lands) in rows {
+            let broken = broken(&row(x_m, 0.0, pitch_deg, u_m_s, w_m_s, rate_deg_s).state());
+            assert_eq!(broken.is_empty(), lands, "{name}: {broken:?}");
+        }
+    }
+
+    #[test]
+    fn each_limit_can_fail_alone_and_a_plan_may_end_slightly_below_the_ground() {
+        let upright = PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() };
+        let failed = |state| {
+            let broken = broken(&state);
+            broken
+                .iter()
+                .map(|words| {
+                    words.split(|c: char| c == '-' || c.is_ascii_digit()).next().unwrap().trim().to_owned()
+                })
+                .collect::<Vec<_>>()
+        };
+        assert!(failed(upright).is_empty());
+        assert!(failed(PlanarState { z_m: -1e-12, ..upright }).is_empty());
+        for (name, state) in [
+            ("x", PlanarState { x_m: -20.1, ..upright }),
+            ("altitude", PlanarState { z_m: 0.21, ..upright }),
+            ("altitude", PlanarState { z_m: -0.002, ..upright }),
+            ("pitch error", PlanarState { theta_rad: FRAC_PI_2 - 0.1, ..upright }),
+            ("u", PlanarState { u_m_s: -0.41, ..upright }),
+            ("w", PlanarState { w_m_s: 0.11, ..upright }),
+            ("pitch rate", PlanarState { q_rad_s: 0.036, ..upright }),
+        ] {
+            assert_eq!(failed(state), [name]);
+        }
+        assert_eq!(broken(&PlanarState { u_m_s: f64::NAN, ..upright }).len(), 1);
+    }
 }

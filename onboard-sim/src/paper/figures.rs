@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn the_figures_have_the_papers_numbers_axes_and_cases() {
-        let figures = figures(&experiments().unwrap().rows).unwrap();
+        let figures = figures(&experiments().rows).unwrap();
         let names: Vec<&str> = figures.iter().map(|(name, _)| *name).collect();
         assert_eq!(names, ["fig5.svg", "fig6.svg", "fig7.svg", "fig8.svg", "fig9.svg"]);
         for (text, place) in [

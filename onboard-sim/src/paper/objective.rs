@@ -6,7 +6,7 @@
 
 use nmpc::Problem;
 
-use super::{Case, Row, Table};
+use super::{Row, Table};
 
 /// What a definition makes of one landing.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,9 +119,9 @@ impl Landing<'_> {
 
 impl Objective {
     /// From the rows of Table 3.
-    pub(super) fn new(rows: &[Row], problem: impl Fn(&Case) -> Problem) -> Self {
+    pub(super) fn new(rows: &[Row]) -> Self {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.case.table == Table::InputWeights).collect();
-        let problems: Vec<Problem> = rows.iter().map(|row| problem(&row.case)).collect();
+        let problems: Vec<Problem> = rows.iter().map(|row| row.case.problem()).collect();
         let definitions = DEFINITIONS.map(|(name, parts)| {
             let value = |(row, problem): (&&Row, &Problem)| {
                 let path = &row.open_loop.path;
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     fn objective() -> Objective {
-        experiments().unwrap().objective
+        experiments().objective
     }
 
     /// The landing of P = 1 costs at most twice as much with P = 2, and J is concave in P. The printed 4.57 is above

@@ -1,13 +1,10 @@
 //! The paper's numbers and equations exactly as printed: what they predict, and what really happens.
 
-use flight::guidance::landing::landing_problem;
-use flight::vehicle::dynamics::{PlanarModel, PlanarState};
-use flight::vehicle::profile::{ModelKind, Profile};
-use nmpc::{Solution, SolveStatus};
+use nmpc::dynamics::{ModelKind, PlanarModel, PlanarState};
+use nmpc::paper::{HORIZON, PRINTED_THRUST_N, model, problem, start};
+use nmpc::{Problem, SolveStatus};
 
-use super::{PaperError, builtin};
-use sim::plane::draw::draw;
-use sim::plane::plant::{Plant, STEP_S};
+use super::flown::contact;
 
 /// Iterations that the printed equations need; they are harder for the solver than the corrected ones.
 const MAX_ITERATIONS: usize = 1000;
@@ -37,71 +34,39 @@ pub struct AsPrinted {
 }
 
 /// Solves and flies the landing with the equations as printed.
-///
-/// # Errors
-/// A built-in profile is missing: a defect of the build.
-pub fn as_printed() -> Result<AsPrinted, PaperError> {
-    let profile = builtin("paper-as-printed")?;
-    let intervals = profile.nmpc.horizon_steps;
-    let initial = profile.start.planar_state();
-    let true_problem = landing_problem(&profile, initial, 0.0, intervals, 1.0);
-    let promise = promise(&profile);
-    let promised = promise.states.last().copied().unwrap_or(initial);
-    let printed_model = PlanarModel { kind: ModelKind::AsPrinted, ..profile.planar_model() };
-    Ok(AsPrinted {
-        thrust_n: profile.motor.thrust_n,
-        best_touchdown_speed_m_s: nmpc::best_touchdown_speed_m_s(&true_problem),
-        limit_m_s: profile.touchdown_limits.u_m_s,
+pub fn as_printed() -> AsPrinted {
+    let of_kind = |kind| PlanarModel { kind, ..model() };
+    let in_truth = Problem { thrust_n: vec![PRINTED_THRUST_N; HORIZON], ..problem(start(), HORIZON) };
+    let mut believed = Problem { model: of_kind(ModelKind::AsPrinted), ..in_truth.clone() };
+    believed.solver.max_iterations = MAX_ITERATIONS;
+    // The bound that proves "not landable" follows from physics, which the printed equations violate.
+    believed.touchdown_speed_max_m_s = f64::INFINITY;
+    let promise = nmpc::solve(&believed, None);
+    let promised = promise.states.last().copied().unwrap_or(in_truth.initial);
+    AsPrinted {
+        thrust_n: PRINTED_THRUST_N,
+        best_touchdown_speed_m_s: nmpc::best_touchdown_speed_m_s(&in_truth),
+        limit_m_s: in_truth.touchdown_speed_max_m_s,
         energy_error_j_kg: [ModelKind::AsPrinted, ModelKind::Consistent]
-            .map(|kind| coasting_energy_error(&profile, kind)),
+            .map(of_kind)
+            .map(coasting_energy_error),
         promised,
-        promised_vertical_m_s: printed_model.derivative(&promised.to_array(), 0.0, 0.0)[1],
+        promised_vertical_m_s: believed.model.derivative(&promised.to_array(), 0.0, 0.0)[1],
         promised_lowest_m: promise.states.iter().map(|state| state.z_m).fold(f64::INFINITY, f64::min),
         promise_converged: promise.status == SolveStatus::Converged,
-        happens: fly_plan(&profile, &promise.inputs_rad),
-    })
-}
-
-/// The plan of a solver that uses the printed equations.
-fn promise(profile: &Profile) -> Solution {
-    let mut believed = profile.clone();
-    believed.nmpc.model = ModelKind::AsPrinted;
-    believed.nmpc.limits.final_box = None;
-    believed.nmpc.solver.max_iterations = MAX_ITERATIONS;
-    let initial = believed.start.planar_state();
-    let mut problem = landing_problem(&believed, initial, 0.0, believed.nmpc.horizon_steps, 1.0);
-    // The bound that proves "not landable" follows from physics, which the printed equations violate.
-    problem.touchdown_speed_max_m_s = f64::INFINITY;
-    nmpc::solve(&problem, None)
+        happens: contact(model(), start(), PRINTED_THRUST_N, &promise.inputs_rad).map(|(_, state)| state),
+    }
 }
 
 /// Change of specific energy over 1 s without thrust and drag, from 30 degrees of tilt.
-fn coasting_energy_error(profile: &Profile, kind: ModelKind) -> f64 {
-    let mut model = PlanarModel { kind, ..profile.planar_model() };
+fn coasting_energy_error(mut model: PlanarModel) -> f64 {
     model.params.drag_per_m = 0.0;
-    let tilted = PlanarState { theta_rad: 60f64.to_radians(), ..profile.start.planar_state() };
+    let tilted = PlanarState { theta_rad: 60f64.to_radians(), ..start() };
     let mut state = tilted;
     for _ in 0..1000 {
         state = model.rk4_step(&state, 0.0, 0.0, 0.001);
     }
     model.specific_energy_j_kg(&state) - model.specific_energy_j_kg(&tilted)
-}
-
-/// The true vehicle under the plan's inputs.
-fn fly_plan(profile: &Profile, inputs_rad: &[f64]) -> Option<PlanarState> {
-    let mut plant = Plant::new(profile, &draw(profile, 0));
-    plant.release(profile.start.planar_state());
-    plant.ignite();
-    let steps_per_sample = (profile.nmpc.sample_time_s / STEP_S).round() as usize;
-    for input_rad in inputs_rad.iter().chain(std::iter::repeat_n(&0.0, 50)) {
-        plant.command(*input_rad, [profile.fins.deployed_rad(); 4]);
-        for _ in 0..steps_per_sample {
-            if let Some(impact) = plant.step() {
-                return Some(impact.state);
-            }
-        }
-    }
-    None
 }
 
 #[cfg(test)]
@@ -111,14 +76,14 @@ mod tests {
     /// 30 N on 3 kg from 15 m at -5 m/s: at best -4.3 m/s at the ground, by hand integration.
     #[test]
     fn val_hand_integration_the_printed_thrust_cannot_land() {
-        let printed = as_printed().unwrap();
+        let printed = as_printed();
         assert!((printed.best_touchdown_speed_m_s - 4.3).abs() < 0.05, "{printed:?}");
         assert!(printed.best_touchdown_speed_m_s > printed.limit_m_s);
     }
 
     #[test]
     fn the_printed_equations_create_energy_and_the_corrected_ones_do_not() {
-        let [printed, mended] = as_printed().unwrap().energy_error_j_kg;
+        let [printed, mended] = as_printed().energy_error_j_kg;
         assert!(printed.abs() > 1.0, "{printed}");
         assert!(mended.abs() < 1e-9, "{mended}");
     }
@@ -127,7 +92,7 @@ mod tests {
     /// stop it.
     #[test]
     fn the_landing_predicted_by_the_printed_equations_does_not_happen() {
-        let printed = as_printed().unwrap();
+        let printed = as_printed();
         assert!(printed.promise_converged && printed.promised.z_m.abs() < 1e-6, "{printed:?}");
         assert!(printed.promised_vertical_m_s > 0.0, "{printed:?}");
         let happens = printed.happens.unwrap();

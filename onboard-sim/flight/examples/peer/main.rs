@@ -36,22 +36,18 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
-use flight::guidance::landing::landing_problem;
-use flight::vehicle::dynamics::PlanarState;
-use flight::vehicle::profile::Profile;
-use nmpc::{Problem, Solution, WarmStart, Workspace, solve, solve_into};
+use nmpc::dynamics::PlanarState;
+use nmpc::{Problem, Solution, SolverLimits, WarmStart, Workspace, paper, solve, solve_into};
 use one_guess::OneGuess;
 use space::Space;
 use stages::Status;
-
-const HORIZON: usize = 50;
 
 /// Number of runs that are averaged, and of repeats, when the layers of an iteration are timed.
 const RUNS: u32 = 50;
 const REPEATS: u32 = 40;
 
 fn main() -> Result<()> {
-    let mut peer = Peer::new()?;
+    let mut peer = Peer::new();
     for line in std::io::stdin().lock().lines() {
         let line = line?;
         let answer = peer.answer(&line).with_context(|| format!("command '{line}'"))?;
@@ -62,7 +58,7 @@ fn main() -> Result<()> {
 }
 
 struct Peer {
-    profile: Profile,
+    solver: SolverLimits,
     workspace: Workspace,
     last: Solution,
     plan: Solution,
@@ -70,19 +66,15 @@ struct Peer {
 }
 
 impl Peer {
-    fn new() -> Result<Self> {
-        let mut profile =
-            vehicles::profile::builtin("paper-calibrated").context("built-in profile paper-calibrated")?;
-        profile.nmpc.limits.final_box = None;
-        profile.nmpc.limits.altitude_min_m = None;
-        let space = Space::new(profile.nmpc.solver);
-        Ok(Self {
-            profile,
-            space,
+    fn new() -> Self {
+        let solver = paper::problem(paper::start(), 0).solver;
+        Self {
+            solver,
+            space: Space::new(solver),
             workspace: Workspace::default(),
             last: Solution::default(),
             plan: Solution::default(),
-        })
+        }
     }
 
     fn answer(&mut self, line: &str) -> Result<String> {
@@ -90,13 +82,13 @@ impl Peer {
         match words.next() {
             Some("price") => {
                 let price = number(words.next(), "price")?;
-                self.profile.nmpc.solver.terminal_penalty = price;
+                self.solver.terminal_penalty = price;
                 self.space.set_price(price);
                 Ok("priced".to_owned())
             }
             Some("cold") => {
                 let which = words.next().context("which guess is missing")?;
-                let problem = self.problem(state(words)?, HORIZON);
+                let problem = self.problem(state(words)?, paper::HORIZON);
                 match which {
                     "both" => self.timed(&problem, None),
                     "0" => timed_from_one(&OneGuess { problem: &problem, index: 0 }),
@@ -146,7 +138,7 @@ impl Peer {
     }
 
     fn problem(&self, start: PlanarState, intervals: usize) -> Problem {
-        landing_problem(&self.profile, start, 0.0, intervals, 1.0)
+        Problem { solver: self.solver, ..paper::problem(start, intervals) }
     }
 
     fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> Result<String> {
@@ -171,7 +163,7 @@ impl Peer {
     }
 
     fn layers(&mut self, start: PlanarState) -> String {
-        let mut problem = self.problem(start, HORIZON);
+        let mut problem = self.problem(start, paper::HORIZON);
         let solution = solve(&problem, None);
         let warm = solution.shifted(0);
         let workspace = &mut self.workspace;

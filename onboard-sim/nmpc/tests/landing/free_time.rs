@@ -61,9 +61,8 @@ impl Motor for Curve {
 
 /// The ignition of the study: 66 m, 40.2 m/s, tail first.
 fn study(gimbal_deg: f64) -> FreeTimeProblem {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     let start = PlanarState { z_m: 66.0, u_m_s: -40.2, ..nominal_start() };
-    let mut landing = from_ignition(&profile, start);
+    let mut landing = settled(start, HORIZON);
     landing.model.params.mass_kg = FULL_MASS_KG;
     landing.model.params.drag_per_m = AIR_KG_M3 * DRAG_AREA_M2 / (2.0 * FULL_MASS_KG);
     landing.gimbal_limit_rad = gimbal_deg.to_radians();

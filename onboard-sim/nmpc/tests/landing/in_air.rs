@@ -5,8 +5,7 @@ use super::*;
 /// The flown landing with everything that the paper leaves out: a vehicle that loses 6 % of its mass, with air forces
 /// across the body, in a wind of 2 m/s, 3 m off the pad.
 fn windy_problem(wind_m_s: f64) -> Problem {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let mut problem = from_ignition(&profile, nominal_start());
+    let mut problem = settled(nominal_start(), HORIZON);
     problem.model.params.lateral_drag_per_m = 0.01;
     problem.model.params.crossflow_per_m = 0.03;
     problem.mass_kg = (0..50).map(|k| 3.0 - 0.18 * (f64::from(k) + 0.5) / 50.0).collect();
@@ -47,8 +46,7 @@ fn a_landing_in_wind_stands_still_over_the_ground() {
 /// If thrust and mass are scaled by the same factor, the motion in vacuum is the same, except for the larger torque.
 #[test]
 fn the_same_scale_of_thrust_and_mass_gives_the_same_fall() {
-    let profile = paper_profile();
-    let mut problem = from_ignition(&profile, nominal_start());
+    let mut problem = problem(nominal_start(), HORIZON);
     problem.model.params.drag_per_m = 0.0;
     let heavy = Trajectory::of(&problem, &[0.0; 50]);
     problem.mass_kg = vec![1.5; 50];
@@ -61,9 +59,8 @@ fn the_same_scale_of_thrust_and_mass_gives_the_same_fall() {
 
 #[test]
 fn resampling_by_whole_intervals_equals_a_shift() {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.nmpc.limits.altitude_min_m = Some(0.0);
-    let solution = solve(&from_ignition(&profile, nominal_start()), None);
+    let problem = Problem { altitude_min_m: Some(0.0), ..settled(nominal_start(), HORIZON) };
+    let solution = solve(&problem, None);
     for steps in [0, 1, 7, 30] {
         let mut shifted = solution.shifted(steps);
         let resampled = solution.resampled(0.1 * steps as f64, 0.1, 50 - steps);
@@ -77,14 +74,13 @@ fn resampling_by_whole_intervals_equals_a_shift() {
 /// than a cold one and reaches the cost of the best cold solve.
 #[test]
 fn a_resampled_start_converges_to_the_cold_solution() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let first = solve(&from_ignition(&profile, nominal_start()), None);
+    let first = solve(&settled(nominal_start(), HORIZON), None);
     for (steps, intervals, step_s) in [(6, 43, 0.1023), (6, 44, 0.0995), (10, 38, 0.105), (20, 25, 0.12)] {
         let start = first.states[steps];
         let from_s = 0.1 * steps as f64;
-        let mut problem = landing_problem(&profile, start, from_s, intervals, 1.0);
+        let mut problem = settled(start, intervals);
         problem.step_s = step_s;
-        problem.thrust_n.fill(33.3);
+
         let warm = solve(&problem, Some(&first.resampled(from_s, step_s, intervals)));
         let cold = solve(&problem, None);
         println!("{intervals} x {step_s}: {} iterations warm, {} cold", warm.iterations, cold.iterations);
@@ -97,7 +93,7 @@ fn a_resampled_start_converges_to_the_cold_solution() {
 #[test]
 fn a_resampled_empty_solution_is_empty() {
     assert_eq!(Solution::default().resampled(0.0, 0.1, 10), WarmStart::default());
-    let solution = solve(&from_ignition(&paper_profile(), nominal_start()), None);
+    let solution = solve(&problem(nominal_start(), HORIZON), None);
     for (from_s, step_s) in [(f64::NAN, 0.1), (0.0, 0.0), (0.0, f64::NAN), (f64::INFINITY, 0.1)] {
         assert_eq!(solution.resampled(from_s, step_s, 10), WarmStart::default());
     }

@@ -5,25 +5,12 @@ mod free_time;
 mod in_air;
 mod robust;
 
-use flight::guidance::landing::landing_problem;
-use flight::vehicle::profile::Profile;
 use nmpc::dynamics::{ModelKind, PlanarState};
+use nmpc::paper::{HORIZON, PRINTED_THRUST_N, THRUST_N, model, problem, settled, start as nominal_start};
 use nmpc::rollout::Trajectory;
 use nmpc::{
     Problem, Solution, SolveStatus, WarmStart, Workspace, best_touchdown_speed_m_s, solve, solve_into,
 };
-
-/// The landing problem of the landing paper: only end height, end distance and gimbal limit.
-fn paper_profile() -> Profile {
-    let mut profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    profile.nmpc.limits.final_box = None;
-    profile.nmpc.limits.altitude_min_m = None;
-    profile
-}
-
-fn nominal_start() -> PlanarState {
-    paper_profile().start.planar_state()
-}
 
 fn pitched(deg: f64) -> PlanarState {
     PlanarState { theta_rad: deg.to_radians(), ..nominal_start() }
@@ -37,9 +24,8 @@ fn turning(deg_s: f64) -> PlanarState {
     PlanarState { q_rad_s: deg_s.to_radians(), ..nominal_start() }
 }
 
-fn from_ignition(profile: &Profile, start: PlanarState) -> Problem {
-    landing_problem(profile, start, 0.0, 50, 1.0)
-}
+/// A problem from a state, over a number of intervals.
+type Pose = fn(PlanarState, usize) -> Problem;
 
 /// A start's name, its state and its best known cost.
 type Case = (&'static str, fn() -> PlanarState, f64);
@@ -58,9 +44,8 @@ const BEST_COSTS: [Case; 7] = [
 
 #[test]
 fn val_solver_study_best_costs_of_the_seven_starts() {
-    let profile = paper_profile();
     for (name, start, best_cost) in BEST_COSTS {
-        let solution = solve(&from_ignition(&profile, start()), None);
+        let solution = solve(&problem(start(), HORIZON), None);
         let end = solution.states.last().unwrap();
         println!(
             "{name}: J = {:.4}, {} iterations, residuals {:.1e} {:.1e}, end {end:?}",
@@ -78,21 +63,19 @@ fn val_solver_study_best_costs_of_the_seven_starts() {
 /// Mirroring start and solution left to right changes nothing.
 #[test]
 fn mirrored_starts_have_the_same_cost() {
-    let profile = paper_profile();
     for (one, other) in [(pitched(60.0), pitched(120.0)), (sideways(-1.0), sideways(1.0))] {
-        let [one, other] = [one, other].map(|start| solve(&from_ignition(&profile, start), None).cost);
+        let [one, other] = [one, other].map(|start| solve(&problem(start, HORIZON), None).cost);
         assert!((one - other).abs() < 1e-6, "{one} {other}");
     }
 }
 
 #[test]
 fn a_shifted_solution_without_a_disturbance_needs_no_iteration() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let first = solve(&from_ignition(&profile, nominal_start()), None);
+    let first = solve(&settled(nominal_start(), HORIZON), None);
     assert_eq!(first.status, SolveStatus::Converged);
     for steps in [0, 1, 7, 48, 49] {
         let start = first.states[steps];
-        let problem = landing_problem(&profile, start, 0.1 * steps as f64, 50 - steps, 1.0);
+        let problem = settled(start, HORIZON - steps);
         let later = solve(&problem, Some(&first.shifted(steps)));
         assert_eq!((later.status, later.iterations), (SolveStatus::Converged, 0), "after {steps}");
         assert_eq!(later.inputs_rad, first.inputs_rad[steps..]);
@@ -101,8 +84,7 @@ fn a_shifted_solution_without_a_disturbance_needs_no_iteration() {
 
 #[test]
 fn a_disturbed_warm_start_converges_in_a_few_iterations() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let first = solve(&from_ignition(&profile, nominal_start()), None);
+    let first = solve(&settled(nominal_start(), HORIZON), None);
     for steps in [1, 10, 25, 40] {
         let planned = first.states[steps];
         let kicked = PlanarState {
@@ -111,7 +93,7 @@ fn a_disturbed_warm_start_converges_in_a_few_iterations() {
             q_rad_s: planned.q_rad_s + 0.5_f64.to_radians(),
             ..planned
         };
-        let problem = landing_problem(&profile, kicked, 0.1 * steps as f64, 50 - steps, 1.0);
+        let problem = settled(kicked, HORIZON - steps);
         let later = solve(&problem, Some(&first.shifted(steps)));
         println!("kick at {steps}: {:?} in {} iterations", later.status, later.iterations);
         assert_eq!(later.status, SolveStatus::Converged, "after {steps}");
@@ -122,8 +104,7 @@ fn a_disturbed_warm_start_converges_in_a_few_iterations() {
 /// optima than the plan's are.
 #[test]
 fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
-    let profile = paper_profile();
-    let plan = solve(&from_ignition(&profile, nominal_start()), None);
+    let plan = solve(&problem(nominal_start(), HORIZON), None);
     let off_rad = |iterations: usize| {
         let mut sum = 0.0;
         for (samples, sign) in [(1, 1.0), (1, -1.0), (7, 1.0), (7, -1.0), (19, 1.0), (19, -1.0), (31, 1.0)] {
@@ -135,7 +116,7 @@ fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
                 ..planned
             };
             let remaining = plan.inputs_rad.len() - samples;
-            let mut problem = landing_problem(&profile, kicked, 0.1 * samples as f64, remaining, 1.0);
+            let mut problem = problem(kicked, remaining);
             problem.touchdown_speed_max_m_s = f64::MAX;
             let warm = plan.shifted(samples);
             let best = solve(&problem, Some(&warm)).inputs_rad[0];
@@ -157,8 +138,8 @@ fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
 /// (v^2 = 25 - 2 (10 - 9.81) 15). The bound, which includes a little drag, agrees.
 #[test]
 fn val_closed_form_the_printed_thrust_cannot_land() {
-    let profile = vehicles::profile::builtin("paper-as-printed").unwrap();
-    let solution = solve(&from_ignition(&profile, nominal_start()), None);
+    let thrust_n = vec![PRINTED_THRUST_N; HORIZON];
+    let solution = solve(&Problem { thrust_n, ..settled(nominal_start(), HORIZON) }, None);
     assert_eq!(solution.status, SolveStatus::NotLandable);
     let without_drag = libm::sqrt(25.0 - 2.0 * (10.0 - 9.81) * 15.0);
     let bound = solution.best_touchdown_speed_m_s;
@@ -167,9 +148,8 @@ fn val_closed_form_the_printed_thrust_cannot_land() {
 
 #[test]
 fn the_bound_does_not_refuse_a_problem_with_a_landing() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     for (name, start, _) in BEST_COSTS {
-        let bound = best_touchdown_speed_m_s(&from_ignition(&profile, start()));
+        let bound = best_touchdown_speed_m_s(&settled(start(), HORIZON));
         assert!(bound <= 0.0, "{name}: {bound}");
     }
 }
@@ -177,14 +157,13 @@ fn the_bound_does_not_refuse_a_problem_with_a_landing() {
 /// Sinking at 1.1 m/s from 0.6 m with two seconds to go: without a floor the optimal path goes below the ground.
 #[test]
 fn the_floor_holds_where_the_path_would_go_below_the_ground() {
-    let mut profile = paper_profile();
     let low = PlanarState { z_m: 0.6, u_m_s: -1.1, ..nominal_start() };
-    let solved = |profile: &Profile| solve(&landing_problem(profile, low, 3.0, 20, 1.0), None);
+    let low_problem = |altitude_min_m| Problem { altitude_min_m, ..problem(low, 20) };
+    let solved = |altitude_min_m| solve(&low_problem(altitude_min_m), None);
     let lowest =
         |solution: &Solution| solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m));
-    let free = solved(&profile);
-    profile.nmpc.limits.altitude_min_m = Some(0.0);
-    let floored = solved(&profile);
+    let free = solved(None);
+    let floored = solved(Some(0.0));
     assert_eq!((free.status, floored.status), (SolveStatus::Converged, SolveStatus::Converged));
     assert!(lowest(&free) < -0.02, "{}", lowest(&free));
     assert!(lowest(&floored) > -1e-6, "{}", lowest(&floored));
@@ -192,26 +171,25 @@ fn the_floor_holds_where_the_path_would_go_below_the_ground() {
     assert!(floored.cost > free.cost);
 }
 
-/// Without the box at the end the optimum goes below the ground and comes back up, as the profile's comment says.
+/// Without the box at the end the optimum goes below the ground and comes back up, as its comment says.
 #[test]
 fn the_paper_optimum_goes_below_the_ground_and_the_flown_plan_does_not() {
-    let lowest = |profile: &Profile| {
-        let solution = solve(&from_ignition(profile, nominal_start()), None);
+    let lowest = |problem: Pose| {
+        let solution = solve(&problem(nominal_start(), HORIZON), None);
         solution.states.iter().fold(f64::INFINITY, |z, state| z.min(state.z_m))
     };
-    assert!(lowest(&paper_profile()) < -0.005);
-    assert!(lowest(&vehicles::profile::builtin("paper-calibrated").unwrap()) > -1e-6);
+    assert!(lowest(problem) < -0.005);
+    assert!(lowest(settled) > -1e-6);
 }
 
 /// An unreachable condition is missed at its price: its multiplier equals the price, and the solve still converges.
 #[test]
 fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
-    let profile = paper_profile();
     let start = PlanarState { z_m: 0.5, u_m_s: -0.5, ..nominal_start() };
-    let problem = landing_problem(&profile, start, 4.7, 3, 1.0);
+    let problem = problem(start, 3);
     let solution = solve(&problem, None);
     assert_eq!(solution.status, SolveStatus::Converged);
-    let price = profile.nmpc.solver.terminal_penalty;
+    let price = problem.solver.terminal_penalty;
     assert!(solution.condition_miss > 0.1);
     assert!((solution.terminal_multiplier().abs() - price).abs() < 1e-9);
 }
@@ -219,10 +197,10 @@ fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
 /// The printed equations can be solved, too, in hundreds of iterations, because their gravity curves the wrong way.
 #[test]
 fn the_printed_model_can_be_solved_for_replication() {
-    let mut profile = paper_profile();
-    profile.nmpc.model = ModelKind::AsPrinted;
-    profile.nmpc.solver.max_iterations = 400;
-    let solution = solve(&from_ignition(&profile, nominal_start()), None);
+    let mut problem = problem(nominal_start(), HORIZON);
+    problem.model.kind = ModelKind::AsPrinted;
+    problem.solver.max_iterations = 400;
+    let solution = solve(&problem, None);
     assert_eq!(solution.status, SolveStatus::Converged);
 }
 
@@ -230,13 +208,10 @@ fn the_printed_model_can_be_solved_for_replication() {
 /// on the path rolled out from the inputs.
 #[test]
 fn val_reference_solver_agrees_that_the_solutions_are_optimal() {
-    let paper = paper_profile();
-    let flown = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let mut floored = flown.clone();
-    floored.nmpc.limits.altitude_min_m = Some(0.0);
+    let floored: Pose = |start, intervals| Problem { altitude_min_m: Some(0.0), ..settled(start, intervals) };
     for (name, start, _) in BEST_COSTS {
-        for profile in [&paper, &flown, &floored] {
-            let problem = from_ignition(profile, start());
+        for pose in [problem as Pose, settled, floored] {
+            let problem = pose(start(), HORIZON);
             let solution = solve(&problem, None);
             let checked = reference_solver::solve(&problem, Some(&solution.shifted(0)));
             let moved = solution
@@ -260,9 +235,8 @@ fn val_reference_solver_agrees_that_the_solutions_are_optimal() {
 /// Compares the states with the path of the inputs, integrated by the model itself.
 #[test]
 fn the_states_match_the_rollout_of_the_inputs() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     for (name, start, _) in BEST_COSTS {
-        let problem = from_ignition(&profile, start());
+        let problem = settled(start(), HORIZON);
         let solution = solve(&problem, None);
         let flown = Trajectory::of(&problem, &solution.inputs_rad);
         for (state, flown) in solution.states.iter().zip(&flown.states) {
@@ -275,26 +249,24 @@ fn the_states_match_the_rollout_of_the_inputs() {
 
 #[test]
 fn a_used_workspace_gives_the_same_bits_for_the_same_problem() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-    let problem = from_ignition(&profile, pitched(70.0));
+    let problem = settled(pitched(70.0), HORIZON);
     let fresh = solve(&problem, None);
     let (mut workspace, mut solution) = (Workspace::default(), Solution::default());
     for start in [nominal_start(), sideways(1.0), pitched(70.0)] {
-        solve_into(&from_ignition(&profile, start), None, &mut workspace, &mut solution);
+        solve_into(&settled(start, HORIZON), None, &mut workspace, &mut solution);
     }
     assert_eq!(format!("{fresh:?}"), format!("{solution:?}"));
 }
 
 #[test]
 fn bad_numbers_give_a_status_and_not_a_panic() {
-    let profile = paper_profile();
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         for start in [sideways(bad), PlanarState { z_m: bad, ..nominal_start() }, pitched(bad)] {
-            let solution = solve(&from_ignition(&profile, start), None);
+            let solution = solve(&problem(start, HORIZON), None);
             assert!(solution.status != SolveStatus::Converged, "{start:?}");
             assert!(solution.cost.is_finite());
         }
     }
-    let no_intervals = solve(&landing_problem(&profile, nominal_start(), 5.0, 0, 1.0), None);
+    let no_intervals = solve(&problem(nominal_start(), 0), None);
     assert!(no_intervals.inputs_rad.is_empty());
 }

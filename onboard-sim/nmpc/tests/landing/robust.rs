@@ -6,7 +6,6 @@ use super::*;
 #[test]
 fn cold_starts_from_the_box_around_the_nominal_converge() {
     const STARTS: u32 = 1000;
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     let mut draw = draws(1);
     let mut between = |least: f64, most: f64| least + (most - least) * draw();
     let (mut landed, mut converged, mut refused) = (0, 0, 0_u32);
@@ -20,7 +19,7 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
             q_rad_s: between(-60.0, 60.0).to_radians(),
             ..nominal
         };
-        let solution = solve(&from_ignition(&profile, start), None);
+        let solution = solve(&settled(start, HORIZON), None);
         match solution.status {
             SolveStatus::NotLandable => refused += 1,
             SolveStatus::Converged => {
@@ -37,7 +36,6 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
 /// Of the first 10,000 starts of the test above, the three whose best descent ends at its cap, beside a saddle.
 #[test]
 fn cold_starts_beside_a_saddle_converge() {
-    let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
     for [z_m, theta_rad, u_m_s, w_m_s, q_rad_s] in [
         [
             16.225_608_928_503_65,
@@ -62,7 +60,7 @@ fn cold_starts_beside_a_saddle_converge() {
         ],
     ] {
         let start = PlanarState { z_m, theta_rad, u_m_s, w_m_s, q_rad_s, ..nominal_start() };
-        let solution = solve(&from_ignition(&profile, start), None);
+        let solution = solve(&settled(start, HORIZON), None);
         assert_eq!(solution.status, SolveStatus::Converged, "{start:?}");
     }
 }
@@ -82,21 +80,20 @@ fn draws(seed: u64) -> impl FnMut() -> f64 {
 /// the last steps the end is out of reach and is missed at its price.
 #[test]
 fn no_solve_fails_in_the_disturbed_closed_loop() {
-    let flown = vehicles::profile::builtin("paper-calibrated").unwrap();
-    for profile in [&paper_profile(), &flown] {
-        let model = profile.planar_model();
+    let model = model();
+    for pose in [problem as Pose, settled] {
         let mut draw = draws(1);
         let mut normal = || (0..12).map(|_| draw()).sum::<f64>() - 6.0;
         let (mut workspace, mut solution, mut solves) = (Workspace::default(), Solution::default(), 0);
         for (name, start, _) in BEST_COSTS {
             let mut state = start();
-            workspace.solve(&from_ignition(profile, state), None, &mut solution);
-            for k in 1..50 {
-                state = model.rk4_step(&state, solution.inputs_rad[0], 33.3, 0.1);
+            workspace.solve(&pose(state, HORIZON), None, &mut solution);
+            for k in 1..HORIZON {
+                state = model.rk4_step(&state, solution.inputs_rad[0], THRUST_N, 0.1);
                 state.u_m_s += 0.002 * normal();
                 state.w_m_s += 0.002 * normal();
                 state.q_rad_s += 0.05_f64.to_radians() * normal();
-                let problem = landing_problem(profile, state, 0.1 * f64::from(k), 50 - k as usize, 1.0);
+                let problem = pose(state, HORIZON - k);
                 let warm = solution.shifted(1);
                 workspace.solve(&problem, Some(&warm), &mut solution);
                 assert_eq!(solution.status, SolveStatus::Converged, "{name} after {k}");

@@ -1,10 +1,13 @@
-//! Prints the tables for people.
+//! Prints the tables and the map of `paper --stability`, for people and as JSON.
 
 use std::io::{self, Write};
 
-use flight::vehicle::dynamics::PlanarState;
+use nmpc::dynamics::PlanarState;
+use serde_json::{Value, json};
 
 use super::objective::chord;
+use super::passive::HEIGHT_M;
+use super::stability::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
 use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
 
 /// Writes Tables 3 to 6 and the results of the printed equations.
@@ -32,8 +35,8 @@ pub fn write_tables(out: &mut impl Write, experiments: &Experiments, printed: &A
     writeln!(
         out,
         "inside Table 2: open loop {} of {n}, closed loop {} of {n}; the paper {} of the {} rows it prints",
-        landed(|row| row.open_loop.verdict.landed()),
-        landed(|row| row.closed_loop.verdict.landed()),
+        landed(|row| row.open_loop.landed()),
+        landed(|row| row.closed_loop.landed()),
         landed(|row| row.paper_landed == Some(true)),
         landed(|row| row.paper_landed.is_some()),
         n = rows.len(),
@@ -100,10 +103,10 @@ fn write_row(out: &mut impl Write, row: &Row) -> io::Result<()> {
 }
 
 fn write_finish(out: &mut impl Write, which: &str, finish: &Finish) -> io::Result<()> {
-    let verdict = match (finish.verdict.landed(), finish.converged) {
+    let verdict = match (finish.landed(), finish.converged) {
         (true, true) => "inside".to_owned(),
         (true, false) => "inside, not converged".to_owned(),
-        (false, _) => format!("OUTSIDE: {}", finish.verdict.summary()),
+        (false, _) => format!("OUTSIDE: {}", finish.broken.join(", ")),
     };
     write_state(out, "", which, &finish.state, Some(finish.cost), &verdict)
 }
@@ -173,4 +176,147 @@ fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
         }
         None => writeln!(out, "  The vehicle that flies this plan is still in the air 5 s after the burn."),
     }
+}
+
+/// Writes the map, the highest opening first, and the static margins; and what becomes of the same vehicle with a heavy
+/// tail.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn write_stability(
+    out: &mut impl Write,
+    stability: &Stability,
+    heavy_tail: &Stability,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        "The paper's vehicle (centre of gravity {} m above the nozzle) falling passively from rest at {HEIGHT_M} m,",
+        stability.cg_station_m
+    )?;
+    writeln!(
+        out,
+        "tilted at the start in {} directions about its axis: # settles in all, o in some, . flips in all",
+        ROLLS_DEG.len()
+    )?;
+    writeln!(out, "fins deg")?;
+    for (opening, opening_deg) in OPENINGS_DEG.iter().enumerate().rev() {
+        let signs = (0..TILTS_DEG.len()).map(|tilt| stability.fate(opening, tilt).sign());
+        let signs: String = signs.flat_map(|sign| [' ', ' ', sign]).collect();
+        writeln!(out, "{opening_deg:>8} |{signs}")?;
+    }
+    let ticks = TILTS_DEG.map(|tilt_deg| format!("{tilt_deg:>3}")).concat();
+    writeln!(out, "{:>8}  {ticks}  tilt at the start, deg", "")?;
+    let cells = stability.fates.len();
+    writeln!(
+        out,
+        "{} of {cells} cells settle, {} depend on the direction, {} flip",
+        stability.count(Fate::Settles),
+        stability.count(Fate::DependsOnRoll),
+        stability.count(Fate::Flips)
+    )?;
+    writeln!(out)?;
+    writeln!(
+        out,
+        "Static margin: centre of pressure above the centre of gravity, mm (above 0: stable); worst and best plane"
+    )?;
+    let angles = ANGLES_DEG.map(|angle_deg| format!("{:>14}", format!("{angle_deg} deg"))).concat();
+    writeln!(out, "fins deg {angles}  to the wind")?;
+    for (opening_deg, margins_m) in OPENINGS_DEG.iter().zip(&stability.margins_m).rev() {
+        let margins = margins_m.iter().map(|[least_m, most_m]| {
+            format!("{:>14}", format!("{:+.0} {:+.0}", 1e3 * least_m, 1e3 * most_m))
+        });
+        writeln!(out, "{opening_deg:>8} {}", margins.collect::<Vec<_>>().concat())?;
+    }
+    writeln!(
+        out,
+        "The fins' force across the axis grows with the sine of the angle, the body's, which acts at its middle, 0.17 m"
+    )?;
+    writeln!(out, "below the centre of gravity, with its square: beyond some angle the body wins.")?;
+    writeln!(out)?;
+    writeln!(
+        out,
+        "With the centre of gravity {} m above the nozzle, a quarter of the length from the tail instead of the nose, every",
+        heavy_tail.cg_station_m
+    )?;
+    writeln!(
+        out,
+        "margin is {:.0} mm larger: {} of {cells} cells settle.",
+        1e3 * (stability.cg_station_m - heavy_tail.cg_station_m),
+        heavy_tail.count(Fate::Settles)
+    )
+}
+
+/// Everything as one JSON value; units in the names, angles in degrees as in the paper.
+pub fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
+    json!({
+        "rows": experiments.rows.iter().map(row_json).collect::<Vec<_>>(),
+        "objective": objective_json(&experiments.objective),
+        "as_printed": {
+            "thrust_n": printed.thrust_n,
+            "landable": printed.best_touchdown_speed_m_s <= printed.limit_m_s,
+            "best_touchdown_speed_m_s": printed.best_touchdown_speed_m_s,
+            "limit_m_s": printed.limit_m_s,
+            "coasting_energy_error_j_kg": {
+                "as_printed": printed.energy_error_j_kg[0],
+                "consistent": printed.energy_error_j_kg[1],
+            },
+            "promised": state_json(&printed.promised),
+            "promised_vertical_m_s": printed.promised_vertical_m_s,
+            "promised_lowest_m": printed.promised_lowest_m,
+            "promise_converged": printed.promise_converged,
+            "happens": printed.happens.as_ref().map(state_json),
+        },
+    })
+}
+
+fn objective_json(objective: &Objective) -> Value {
+    let ours = objective
+        .definitions
+        .iter()
+        .map(|definition| json!({ "definition": definition.name.trim_start(), "values": definition.values }));
+    json!({
+        "input_weights": objective.weights,
+        "paper": objective.paper,
+        "cost_rate_at_the_papers_final_states": objective.at_paper_finals,
+        "ours": ours.collect::<Vec<_>>(),
+    })
+}
+
+fn row_json(row: &Row) -> Value {
+    json!({
+        "table": row.case.table.title(),
+        "case": row.case.name(),
+        "start": {
+            "pitch_deg": row.case.pitch_deg,
+            "w_m_s": row.case.w_m_s,
+            "pitch_rate_deg_s": row.case.pitch_rate_deg_s,
+        },
+        "input_weight": row.case.input_weight,
+        "paper": row.case.paper.map(|paper| json!({
+            "state": state_json(&paper.state()),
+            "inside_table_2": row.paper_landed,
+        })),
+        "open_loop": finish_json(&row.open_loop),
+        "closed_loop": finish_json(&row.closed_loop),
+    })
+}
+
+fn finish_json(finish: &Finish) -> Value {
+    json!({
+        "state": state_json(&finish.state),
+        "cost": finish.cost,
+        "converged": finish.converged,
+        "inside_table_2": finish.landed(),
+    })
+}
+
+fn state_json(state: &PlanarState) -> Value {
+    json!({
+        "x_m": state.x_m,
+        "z_m": state.z_m,
+        "pitch_deg": state.theta_rad.to_degrees(),
+        "u_m_s": state.u_m_s,
+        "w_m_s": state.w_m_s,
+        "pitch_rate_deg_s": state.q_rad_s.to_degrees(),
+    })
 }
