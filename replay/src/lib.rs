@@ -5,9 +5,9 @@
 //!
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
-//! * [`controller`]: builds the flight computer or planar controller that a log's ticks came from.
+//! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every tick again on its recorded input and compares the results bit for bit.
-//! * [`settings`]: other settings for a recorded flight, named as in its profile.
+//! * [`settings`]: other settings for a recorded flight, named as in its mission.
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
 //! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
 //! * [`sweep`](mod@sweep): flies many flights with many settings and ranks them; finds the smallest change of a setting
@@ -19,7 +19,6 @@
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`frames`]: a flight as the frames that a board reads.
-//! * [`shadow`](mod@shadow): holds the telemetry of a vehicle in flight against what this build expects.
 //! * [`export`], [`import`]: convert logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`audit`]: proves the books of ground stations.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
@@ -43,7 +42,6 @@ pub mod recover;
 pub mod refly;
 pub mod report;
 pub mod settings;
-pub mod shadow;
 pub mod sweep;
 pub mod table;
 pub mod tick;

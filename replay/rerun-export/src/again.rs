@@ -1,39 +1,29 @@
-//! Runs the controller of the log again on its recorded inputs and compares it with the record.
+//! Runs the flight computer of the log again on its recorded inputs and compares it with the record.
 
 use prost::Message as _;
 use protocol::log::flight_v1::{PilotStart, PilotTick};
-use protocol::log::v1::ControllerTick;
-use replay::controller::{LoggedController, LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
+use replay::controller::{LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
 use replay::log::{FrameOrder, Gap};
 
 use crate::survey::Survey;
 
-/// The controller being run again.
+/// The flight computer being run again.
 #[derive(Default)]
 pub(crate) struct Again {
-    controller: Controller,
-    /// The first tick with a different result.
+    running: Option<Running>,
+    /// The first frame with a different result.
     pub(crate) first_different: Option<u64>,
-    /// Ticks run again, and how many of them were identical bit for bit.
+    /// Frames run again, and how many of them were identical bit for bit.
     pub(crate) ticks: u64,
     pub(crate) identical: u64,
     /// Why it was not run to the end, if so.
     pub(crate) obstacle: Option<String>,
 }
 
-#[derive(Default)]
-enum Controller {
-    #[default]
-    None,
-    Planar {
-        controller: Box<LoggedController>,
-        next: u64,
-    },
-    Pilot {
-        pilot: Box<LoggedPilot>,
-        plans: NewPlans,
-        order: FrameOrder,
-    },
+struct Running {
+    pilot: Box<LoggedPilot>,
+    plans: NewPlans,
+    order: FrameOrder,
 }
 
 /// A frame of a flight computer, run again.
@@ -44,20 +34,6 @@ pub(crate) struct FrameAgain {
 }
 
 impl Again {
-    /// The controller of a planar landing, if the log has its profile.
-    pub(crate) fn of(survey: &Survey) -> Self {
-        let mut again = Self::default();
-        if let (Some(profile), Some(toml)) = (&survey.profile, &survey.profile_toml) {
-            match LoggedController::recorded(profile, toml, &survey.run) {
-                Ok(controller) => {
-                    again.controller = Controller::Planar { controller: Box::new(controller), next: 0 };
-                }
-                Err(error) => again.give_up(error.to_string()),
-            }
-        }
-        again
-    }
-
     /// Starts the flight computer.
     pub(crate) fn let_go(&mut self, survey: &Survey, start: &PilotStart) {
         let Some(mission_toml) = &survey.profile_toml else {
@@ -66,37 +42,15 @@ impl Again {
         match LoggedPilot::recorded(mission_toml, start, &survey.run, &[]) {
             Ok(pilot) => {
                 let (plans, order) = (NewPlans::default(), FrameOrder::default());
-                self.controller = Controller::Pilot { pilot: Box::new(pilot), plans, order };
+                self.running = Some(Running { pilot: Box::new(pilot), plans, order });
             }
             Err(error) => self.give_up(error.to_string()),
         }
     }
 
-    /// Runs a tick of a planar landing again.
-    pub(crate) fn tick(&mut self, recorded: &ControllerTick) -> Option<ControllerTick> {
-        let Controller::Planar { controller, next } = &mut self.controller else { return None };
-        let number = recorded.input.tick;
-        if number != *next {
-            let reason = format!("tick {number} comes where tick {next} should");
-            self.give_up(reason);
-            return None;
-        }
-        *next += 1;
-        match controller.run_again(recorded) {
-            Ok(again) => {
-                self.compare(number, again.encode_to_vec() == recorded.encode_to_vec());
-                Some(again)
-            }
-            Err(error) => {
-                self.give_up(error.to_string());
-                None
-            }
-        }
-    }
-
     /// Runs a frame of a flight computer again; `record` is the sequence number of its record in the channel.
     pub(crate) fn frame(&mut self, recorded: &PilotTick, record: u32) -> Option<FrameAgain> {
-        let Controller::Pilot { pilot, plans, order } = &mut self.controller else { return None };
+        let Running { pilot, plans, order } = self.running.as_mut()?;
         let number = recorded.input.frame;
         if let Some(Gap { after, before }) = order.note(number, record) {
             self.give_up(format!("the frames between {after} and {before} are lost"));
@@ -139,7 +93,7 @@ impl Again {
     }
 
     fn give_up(&mut self, reason: String) {
-        self.controller = Controller::None;
+        self.running = None;
         self.obstacle.get_or_insert(reason);
     }
 }

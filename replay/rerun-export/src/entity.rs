@@ -26,13 +26,10 @@ pub const THRUST: &str = "world/rocket/nozzle/thrust";
 pub const FLOWN: &str = "world/path/flown";
 /// The path up to now, one piece for each record.
 pub const TRAIL: &str = "world/path/trail";
-/// The path the controller plans at each tick. A flight computer's plans are not in its log: these are made by running
-/// it again.
+/// The path that the flight computer plans. Its plans are not in its log: these are made by running it again.
 pub const PREDICTED: &str = "world/path/predicted";
 /// The end of that path.
 pub const PREDICTED_TOUCHDOWN: &str = "world/path/predicted_touchdown";
-/// The path that the controller of a planar landing, run again on the recorded inputs, plans at each tick.
-pub const PREDICTED_REPLAYED: &str = "world/path/predicted_replayed";
 /// The first plan under thrust, at all times: the intended flight.
 pub const FIRST_PLAN: &str = "world/path/first_plan";
 

@@ -5,9 +5,7 @@ use std::io::{Read, Write};
 
 use flight::guidance::controller::ControlLevel;
 use protocol::log::flight_v1::{PilotTick, TruthSample};
-use protocol::log::v1::{
-    ControllerTick, LandingVerdict as RecordedVerdict, PlanarState, PlantTruth, Telemetry,
-};
+use protocol::log::v1::{LandingVerdict as RecordedVerdict, Telemetry};
 use replay::log::{Entry, FlightLog, StampedEntry};
 use rerun::{RecordingStream, RecordingStreamResult};
 
@@ -15,10 +13,10 @@ use crate::ExportError;
 use crate::again::{Again, FrameAgain};
 use crate::identity;
 use crate::layout::send_layout;
-use crate::plot_list::{FROM_APOGEE, PLANAR, Plot, limits_of};
+use crate::plot_list::{Plot, limits_of, plots_of};
 use crate::plots::{Plots, Whose};
 use crate::pose::{
-    Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket, world_from_rocket_in_space,
+    Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket_in_space, world_from_telemetry,
 };
 use crate::rrd::{Batches, RrdWriter};
 use crate::scene::{Extent, Scene, Seen};
@@ -29,7 +27,7 @@ use crate::words;
 /// Summary of an export.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Exported {
-    /// Controller ticks.
+    /// Frames of the flight computer.
     pub ticks: u64,
     /// Records that carry the pose of the rocket.
     pub poses: u64,
@@ -114,8 +112,11 @@ pub(crate) struct Shown {
 impl Shown {
     /// Everything that a flight may have, in the space where it is expected.
     pub(crate) fn expected(survey: &Survey) -> Self {
-        let known: &'static [Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
-        Self { extent: Extent::expected(survey), plots: known.iter().collect(), phases_as_text: true }
+        Self {
+            extent: Extent::expected(survey),
+            plots: plots_of(survey).iter().collect(),
+            phases_as_text: true,
+        }
     }
 
     pub(crate) fn send(&self, recording: &RecordingStream) -> RecordingStreamResult<()> {
@@ -160,7 +161,7 @@ impl<'a> Export<'a> {
             times: Times::default(),
             scene: Scene::new(recording, survey, whose)?,
             plots: Plots::new(recording, whose),
-            again: Again::of(survey),
+            again: Again::default(),
             planning: false,
             verdict: None,
             done: Exported {
@@ -178,8 +179,6 @@ impl<'a> Export<'a> {
             }
             self.pose_source = self.pose_source.max(source_of(&entry));
             match entry {
-                Entry::Tick(tick) => self.tick(&tick, log_time_ns)?,
-                Entry::Truth(truth) => self.truth(&truth, log_time_ns)?,
                 Entry::Telemetry(telemetry) => self.telemetry(&telemetry, log_time_ns)?,
                 Entry::Verdict(verdict) => {
                     self.times.at_vehicle_time(self.recording, verdict.time_s);
@@ -220,44 +219,14 @@ impl<'a> Export<'a> {
         let remarks = words::Remarks { damage: done.damage.as_deref(), again: again.as_deref() };
         words::report(recording, log.name(), survey, verdict.as_ref(), remarks)?;
         let extent = scene.finish()?;
-        let known: &'static [Plot] = if survey.from_apogee { &FROM_APOGEE } else { &PLANAR };
-        let plots = known.iter().filter(|plot| plots.has(plot)).collect();
+        let plots = plots_of(survey).iter().filter(|plot| plots.has(plot)).collect();
         Ok((
             done,
             Shown { extent, plots, phases_as_text: self.pace == Pace::Live || survey.events.is_empty() },
         ))
     }
 
-    fn tick(&mut self, tick: &ControllerTick, log_time_ns: u64) -> RecordingStreamResult<()> {
-        self.times.learn(tick.input.time_s, log_time_ns);
-        self.times.tick(tick.input.tick);
-        self.times.at_vehicle_time(self.recording, tick.input.time_s);
-        self.done.ticks += 1;
-        self.phase(tick.input.phase)?;
-        let alone = self.pose_source == PoseSource::Estimate;
-        self.plots.tick(tick, alone)?;
-        let again = self.run_again(|again| again.tick(tick))?;
-        self.scene.plan(tick, again.as_ref())?;
-        if let Some(again) = &again {
-            self.plots.tick_again(again)?;
-        }
-        if alone {
-            let gimbal_rad = Some(tick.input.gimbal_applied_rad);
-            self.planar_rocket(&tick.input.state, gimbal_rad, None)?;
-        }
-        Ok(())
-    }
-
-    fn truth(&mut self, truth: &PlantTruth, log_time_ns: u64) -> RecordingStreamResult<()> {
-        self.times.learn(truth.time_s, log_time_ns);
-        self.times.at_vehicle_time(self.recording, truth.time_s);
-        self.phase(truth.phase)?;
-        self.plots.truth(truth)?;
-        let weights = self.scene.in_weights(truth.thrust_n, truth.mass_kg);
-        self.planar_rocket(&truth.state, Some(truth.gimbal_actual_rad), Some(weights))
-    }
-
-    /// A frame of a flight from apogee; its values are plotted with the truth.
+    /// A frame of the flight computer; its values are plotted with the truth.
     fn frame(&mut self, tick: &PilotTick, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
         self.times.learn(tick.input.time_s, log_time_ns);
         self.times.tick(tick.input.frame);
@@ -272,9 +241,9 @@ impl<'a> Export<'a> {
         self.plots.frame_again(&again, plan.as_ref().map(|(_, iterations)| *iterations))?;
         let planning = again.output.level != u32::from(ControlLevel::Idle.index());
         match plan {
-            Some((path_m, _)) => self.scene.path(path_m, again.output.phase, false)?,
+            Some((path_m, _)) => self.scene.path(path_m, again.output.phase)?,
             // A plan that is no longer followed is no longer shown.
-            None if self.planning && !planning => self.scene.path(Vec::new(), again.output.phase, false)?,
+            None if self.planning && !planning => self.scene.path(Vec::new(), again.output.phase)?,
             None => {}
         }
         self.planning = planning;
@@ -321,21 +290,10 @@ impl<'a> Export<'a> {
         let (Some(z_m), Some(theta_rad)) = (telemetry.altitude_m, telemetry.pitch_rad) else {
             return Ok(());
         };
-        let x_m = telemetry.x_m.unwrap_or(0.0);
-        let state = PlanarState { x_m, z_m, theta_rad, ..PlanarState::default() };
-        let gimbal_rad = telemetry.gimbal_measured_rad;
-        self.planar_rocket(&state, gimbal_rad, None)
-    }
-
-    fn planar_rocket(
-        &mut self,
-        state: &PlanarState,
-        gimbal_rad: Option<f64>,
-        thrust_in_weights: Option<f64>,
-    ) -> RecordingStreamResult<()> {
-        let gimbal_rad = gimbal_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0);
+        let rocket = world_from_telemetry(telemetry.x_m.unwrap_or(0.0), z_m, theta_rad);
+        let gimbal_rad = telemetry.gimbal_measured_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0);
         let nozzle = rocket_from_nozzle(gimbal_rad, self.scene.pivot_x_m());
-        self.rocket(world_from_rocket(state), nozzle, thrust_in_weights)
+        self.rocket(rocket, nozzle, None)
     }
 
     fn rocket(
@@ -369,8 +327,7 @@ impl<'a> Export<'a> {
 /// The pose that a record brings.
 fn source_of(entry: &Entry) -> PoseSource {
     match entry {
-        Entry::World(_) | Entry::Truth(_) => PoseSource::Truth,
-        Entry::Tick(_) => PoseSource::Estimate,
+        Entry::World(_) => PoseSource::Truth,
         Entry::Telemetry(_) => PoseSource::Telemetry,
         _ => PoseSource::None,
     }

@@ -1,5 +1,5 @@
-//! Exports flight logs as recordings for the Rerun viewer (<https://rerun.io>): the flight in space, the path that the
-//! controller planned at every tick, plots with their limits, and the events.
+//! Exports flight logs as recordings for the Rerun viewer (<https://rerun.io>): the flight in space, the paths that
+//! its computer planned, plots with their limits, and the events.
 //!
 //! In reading order:
 //!
@@ -7,10 +7,10 @@
 //! * [`follow_file`]: the same while the log is being written, into a growing file or a running viewer.
 //! * [`survey`]: reads the log once before the export, for facts that the first record already needs.
 //! * [`entity`]: the entity paths of the recording, with their units.
-//! * [`pose`]: converts the planar state to the viewer's space.
+//! * [`pose`]: converts states to the viewer's space.
 //!
 //! The recording has two timelines: `flight_time` (a duration, vehicle time) and `tick` (a sequence, the number of the
-//! controller's current tick).
+//! flight computer's frame).
 //!
 //! This is a separate crate because Rerun costs more to compile than everything else here together.
 

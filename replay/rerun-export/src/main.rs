@@ -15,7 +15,7 @@ use replay_rerun::{
 
 /// Turns a flight log into a recording for the Rerun viewer.
 ///
-/// The recording has the flight in space, the path planned at every controller tick, plots with their limits, the
+/// The recording has the flight in space, the planned paths, plots with their limits, the
 /// events and the verdict, on the timelines `flight_time` and `tick`, and the layout to show them. Open it with
 /// `rerun FLIGHT.rrd`, Rerun 0.36 or newer.
 ///
@@ -95,7 +95,7 @@ fn run(cli: &Cli) -> Result<()> {
     warn(&cli.log.display().to_string(), &exported);
     let Exported { ticks, poses, events, .. } = exported;
     let output = cli.connect.clone().unwrap_or_else(|| output.display().to_string());
-    say(&format!("{output}: {poses} poses, {ticks} controller ticks, {events} events"));
+    say(&format!("{output}: {poses} poses, {ticks} frames, {events} events"));
     Ok(())
 }
 

@@ -1,8 +1,6 @@
 //! The list of plots, and the limits of their values.
 
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
-use flight::vehicle::dynamics::PlanarState as FlightState;
-use protocol::log::v1::LandingVerdict as RecordedVerdict;
+use protocol::log::v1::{LandingVerdict as RecordedVerdict, LimitResult};
 
 use crate::survey::Survey;
 
@@ -14,8 +12,8 @@ pub(crate) struct Plot {
     pub(crate) legend: bool,
 }
 
-/// Every plot of a planar landing, in the order of the layout.
-pub(crate) const PLANAR: [Plot; 10] = [
+/// Every plot of a ground station's telemetry, in the order of the layout.
+const TELEMETRY: [Plot; 10] = [
     Plot { name: "altitude_m", title: "Altitude, m", legend: true },
     Plot { name: "x_m", title: "Horizontal position, m", legend: false },
     Plot { name: "u_m_s", title: "Axial velocity u, m/s", legend: false },
@@ -28,8 +26,8 @@ pub(crate) const PLANAR: [Plot; 10] = [
     Plot { name: "level", title: "Control level (0 idle, 2 converged, 5 stabiliser)", legend: false },
 ];
 
-/// Every plot of a flight from apogee, in the order of the layout.
-pub(crate) const FROM_APOGEE: [Plot; 12] = [
+/// Every plot of a vehicle's own log, in the order of the layout.
+const VEHICLE: [Plot; 12] = [
     Plot { name: "altitude_m", title: "Height of the feet, m", legend: false },
     Plot { name: "vertical_m_s", title: "Vertical speed, m/s", legend: false },
     Plot { name: "x_m", title: "Position x, m", legend: false },
@@ -43,6 +41,11 @@ pub(crate) const FROM_APOGEE: [Plot; 12] = [
     Plot { name: "solve_time_ms", title: "Time of a frame that plans, ms", legend: false },
     Plot { name: "iterations", title: "Newton iterations, run again", legend: false },
 ];
+
+/// Every plot that a log may have.
+pub(crate) fn plots_of(survey: &Survey) -> &'static [Plot] {
+    if survey.of_vehicle { &VEHICLE } else { &TELEMETRY }
+}
 
 /// The plots of a gimbal with two axes.
 pub(crate) const GIMBAL_IN_SPACE: [&str; 2] = ["gimbal_pitch_deg", "gimbal_yaw_deg"];
@@ -74,37 +77,19 @@ pub(crate) fn plot_of_verdict(name: &str) -> Option<&'static str> {
     })
 }
 
-/// The limits of the landing, from the recorded verdict or else from the profile, and those of the gimbal.
+/// The limits of the landing, from the recorded verdict, and those of the gimbal.
 pub(crate) fn limits_of(survey: &Survey, verdict: Option<&RecordedVerdict>) -> Vec<PlotLimit> {
-    let profile = survey.profile.as_ref();
-    let limit =
-        |name: &str, lowest, highest| plot_of_verdict(name).map(|plot| PlotLimit { plot, lowest, highest });
-    let mut limits: Vec<PlotLimit> = match (verdict, profile) {
-        (Some(verdict), _) => verdict
-            .limits
-            .iter()
-            .filter_map(|judged| limit(&judged.name, judged.minimum, judged.maximum))
-            .collect(),
-        (None, Some(profile)) => {
-            let judged =
-                LandingVerdict::judge(&TouchdownLimits::from_profile(profile), &FlightState::default());
-            judged
-                .results
-                .iter()
-                .filter_map(|judged| limit(judged.name, judged.lowest, judged.highest))
-                .collect()
-        }
-        (None, None) => Vec::new(),
+    let limit = |judged: &LimitResult| {
+        let (lowest, highest) = (judged.minimum, judged.maximum);
+        plot_of_verdict(&judged.name).map(|plot| PlotLimit { plot, lowest, highest })
     };
+    let mut limits: Vec<PlotLimit> =
+        verdict.iter().flat_map(|verdict| &verdict.limits).filter_map(limit).collect();
     if let Some(mission) = &survey.mission {
         let limit_deg = mission.airframe.gimbal.limit_rad().to_degrees();
         for plot in GIMBAL_IN_SPACE {
             limits.push(PlotLimit { plot, lowest: -limit_deg, highest: limit_deg });
         }
-    }
-    if let Some(profile) = profile {
-        let limit_deg = profile.gimbal.limit_deg;
-        limits.push(PlotLimit { plot: "gimbal_deg", lowest: -limit_deg, highest: limit_deg });
     }
     limits
 }
@@ -115,14 +100,19 @@ mod tests {
 
     #[test]
     fn every_number_of_the_verdict_has_a_plot() {
-        let limits = TouchdownLimits::from_profile(&vehicles::profile::builtin("paper-calibrated").unwrap());
-        for result in LandingVerdict::judge(&limits, &FlightState::default()).results {
-            let plot = plot_of_verdict(result.name).unwrap();
-            assert!(PLANAR.iter().any(|known| known.name == plot), "{plot}");
-        }
-        for judged in ["vertical speed", "lateral speed", "tilt"] {
+        for (judged, plots) in [
+            ("x", &TELEMETRY[..]),
+            ("altitude", &TELEMETRY),
+            ("pitch error", &TELEMETRY),
+            ("u", &TELEMETRY),
+            ("w", &TELEMETRY),
+            ("pitch rate", &TELEMETRY),
+            ("vertical speed", &VEHICLE),
+            ("lateral speed", &VEHICLE),
+            ("tilt", &VEHICLE),
+        ] {
             let plot = plot_of_verdict(judged).unwrap();
-            assert!(FROM_APOGEE.iter().any(|known| known.name == plot), "{plot}");
+            assert!(plots.iter().any(|known| known.name == plot), "{plot}");
         }
         assert_eq!(plot_of_verdict("colour"), None);
     }

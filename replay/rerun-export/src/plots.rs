@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
-use protocol::log::v1::{ControllerTick, PlanarState, PlantTruth, Telemetry};
+use protocol::log::v1::Telemetry;
 use rerun::archetypes::{Scalars, SeriesLines, StateChange};
 use rerun::components::InterpolationMode;
 use rerun::datatypes::Rgba32;
@@ -39,7 +39,6 @@ pub(crate) enum Whose {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Line {
     Truth,
-    Estimate,
     Telemetry,
     Commanded,
     Actual,
@@ -54,7 +53,6 @@ impl Line {
     fn name(self) -> &'static str {
         match self {
             Self::Truth => "true",
-            Self::Estimate => "estimated",
             Self::Telemetry => "telemetry",
             Self::Commanded => "commanded",
             Self::Actual => "actual",
@@ -69,7 +67,7 @@ impl Line {
     fn style(self, whose: Whose) -> SeriesLines {
         let (own, beside, width) = match self {
             Self::Truth | Self::Actual | Self::Measured => (BLUE, PINK, 1.5),
-            Self::Estimate | Self::Commanded => (ORANGE, BROWN, 1.0),
+            Self::Commanded => (ORANGE, BROWN, 1.0),
             Self::Telemetry => (GREEN, TURQUOISE, 1.0),
             Self::Replayed => (VIOLET, BROWN, 0.75),
             Self::Deadline | Self::Lowest | Self::Highest => (RED, RED, 0.75),
@@ -79,7 +77,7 @@ impl Line {
             Whose::Beside => (beside, format!("{} (beside)", self.name())),
         };
         let style = SeriesLines::new().with_colors([color]).with_widths([width]).with_names([name]);
-        // The decision of a tick holds until the next tick.
+        // The decision of a frame holds until the next one.
         let steps = matches!(self, Self::Commanded | Self::Measured | Self::Replayed);
         if steps { style.with_interpolation_mode(InterpolationMode::StepAfter) } else { style }
     }
@@ -100,14 +98,7 @@ impl<'a> Plots<'a> {
         Self { recording, whose, styled: BTreeSet::new(), level: None, level_replayed: None, phase: None }
     }
 
-    /// Records the true state of the plant.
-    pub(crate) fn truth(&mut self, truth: &PlantTruth) -> RecordingStreamResult<()> {
-        self.state(&truth.state, Line::Truth)?;
-        self.draw("gimbal_deg", Line::Commanded, truth.gimbal_commanded_rad.to_degrees())?;
-        self.draw("gimbal_deg", Line::Actual, truth.gimbal_actual_rad.to_degrees())
-    }
-
-    /// Records the true state of a flight from apogee, and the commands to its servos.
+    /// Records the true state, and the commands to its servos.
     pub(crate) fn in_space(&mut self, truth: &TruthSample) -> RecordingStreamResult<()> {
         let (at, moving) = (&truth.state.position_m, &truth.state.velocity_m_s);
         let degrees = |angles_rad: &[f64], axis: usize| angles_rad.get(axis).copied().map(f64::to_degrees);
@@ -124,20 +115,6 @@ impl<'a> Plots<'a> {
         }
         self.maybe("fins_mean_deg", Line::Commanded, mean_deg(&truth.fins_commanded_rad))?;
         self.maybe("fins_mean_deg", Line::Actual, mean_deg(&truth.fins_actual_rad))
-    }
-
-    /// Records the controller's input and output. `alone`: no other source has the gimbal angles.
-    pub(crate) fn tick(&mut self, tick: &ControllerTick, alone: bool) -> RecordingStreamResult<()> {
-        self.state(&tick.input.state, Line::Estimate)?;
-        if alone {
-            self.draw("gimbal_deg", Line::Commanded, tick.output.gimbal_command_rad.to_degrees())?;
-            self.draw("gimbal_deg", Line::Actual, tick.input.gimbal_applied_rad.to_degrees())?;
-        }
-        self.draw("solve_time_ms", Line::Measured, 1e3 * tick.solve_time_s)?;
-        self.draw("solve_time_ms", Line::Deadline, 1e3 * tick.deadline_s)?;
-        self.draw("iterations", Line::Measured, f64::from(tick.output.solver.iterations))?;
-        self.draw("level", Line::Measured, f64::from(tick.output.level))?;
-        self.level(tick.output.level)
     }
 
     /// Records what the ground station knows. `alone`: the log has no better source.
@@ -191,15 +168,6 @@ impl<'a> Plots<'a> {
         Ok(())
     }
 
-    fn state(&mut self, state: &PlanarState, line: Line) -> RecordingStreamResult<()> {
-        self.draw("altitude_m", line, state.z_m)?;
-        self.draw("x_m", line, state.x_m)?;
-        self.draw("u_m_s", line, state.u_m_s)?;
-        self.draw("w_m_s", line, state.w_m_s)?;
-        self.draw("pitch_error_deg", line, pitch_error_deg(state.theta_rad))?;
-        self.draw("q_deg_s", line, state.q_rad_s.to_degrees())
-    }
-
     /// Records the current control level.
     pub(crate) fn level(&mut self, level: u32) -> RecordingStreamResult<()> {
         if self.level.replace(level) == Some(level) {
@@ -213,14 +181,6 @@ impl<'a> Plots<'a> {
             return Ok(());
         }
         self.recording.log(entity::LEVEL_REPLAYED, &level_state(level))
-    }
-
-    /// Records the decision of a re-run tick of a planar landing.
-    pub(crate) fn tick_again(&mut self, again: &ControllerTick) -> RecordingStreamResult<()> {
-        let output = &again.output;
-        self.draw("gimbal_deg", Line::Replayed, output.gimbal_command_rad.to_degrees())?;
-        self.draw("iterations", Line::Replayed, f64::from(output.solver.iterations))?;
-        self.replayed_level(output.level)
     }
 
     /// Records the decision of a re-run frame of a flight computer, and the iterations of its plan.

@@ -1,13 +1,13 @@
-//! The planar state in the viewer's space.
+//! States in the viewer's space.
 //!
 //! The world is x as in the log, y to the left of it and z up. The rocket's own axes are x towards the nose, y as
 //! the world's, and z to complete them; the pitch from the horizontal turns about -y. In these axes the second
-//! body axis of the equations of motion is -z. A flight from apogee has the viewer's axes already.
+//! body axis of the equations of motion is -z. A vehicle's own log has the viewer's axes already; what a ground station
+//! knows of its attitude is the pitch.
 
 use std::f64::consts::FRAC_PI_2;
 
 use protocol::log::flight_v1::RigidState;
-use protocol::log::v1::PlanarState;
 
 /// Where something is and how it is turned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,9 +18,9 @@ pub struct Pose {
     pub quaternion_xyzw: [f32; 4],
 }
 
-/// The pose of the rocket.
-pub fn world_from_rocket(state: &PlanarState) -> Pose {
-    Pose { translation_m: point_in_world_m(state), quaternion_xyzw: about_y_xyzw(-state.theta_rad) }
+/// The pose of the rocket, from its place and its pitch above the horizontal.
+pub fn world_from_telemetry(x_m: f64, z_m: f64, theta_rad: f64) -> Pose {
+    Pose { translation_m: [x_m as f32, 0.0, z_m as f32], quaternion_xyzw: about_y_xyzw(-theta_rad) }
 }
 
 /// The pose of the nozzle in the rocket. Its x axis is the direction of the thrust: a positive gimbal angle pushes
@@ -48,16 +48,6 @@ pub fn rocket_from_nozzle_in_space([pitch_rad, yaw_rad]: [f64; 2], pivot_x_m: f6
         translation_m: [pivot_x_m as f32, 0.0, 0.0],
         quaternion_xyzw: quaternion.map(|value| value as f32),
     }
-}
-
-/// The position of a state, m.
-pub fn point_in_world_m(state: &PlanarState) -> [f32; 3] {
-    [state.x_m as f32, 0.0, state.z_m as f32]
-}
-
-/// The path through some states, m; states that are not numbers are left out.
-pub fn path_in_world_m(states: &[PlanarState]) -> Vec<[f32; 3]> {
-    states.iter().map(point_in_world_m).filter(|point| point.iter().all(|value| value.is_finite())).collect()
 }
 
 /// Pitch away from upright, positive nose up from the x axis, degrees.
@@ -93,7 +83,7 @@ mod tests {
     }
 
     fn nose(theta_rad: f64) -> [f32; 3] {
-        let pose = world_from_rocket(&PlanarState { theta_rad, ..PlanarState::default() });
+        let pose = world_from_telemetry(0.0, 0.0, theta_rad);
         rotate(pose.quaternion_xyzw, [1.0, 0.0, 0.0])
     }
 
@@ -106,8 +96,7 @@ mod tests {
 
     #[test]
     fn a_position_is_x_and_altitude() {
-        let state = PlanarState { x_m: -3.5, z_m: 12.25, ..PlanarState::default() };
-        assert_close(world_from_rocket(&state).translation_m, [-3.5, 0.0, 12.25]);
+        assert_close(world_from_telemetry(-3.5, 12.25, 0.0).translation_m, [-3.5, 0.0, 12.25]);
     }
 
     /// The velocity over the ground is the same whether the equations of motion turn it or the pose does.
@@ -118,7 +107,7 @@ mod tests {
             let (u_m_s, w_m_s) = (1.25, -0.5);
             let (vx, vz) =
                 FlightState { theta_rad, u_m_s, w_m_s, ..FlightState::default() }.ground_velocity_m_s();
-            let pose = world_from_rocket(&PlanarState { theta_rad, ..PlanarState::default() });
+            let pose = world_from_telemetry(0.0, 0.0, theta_rad);
             let turned = rotate(pose.quaternion_xyzw, [u_m_s as f32, 0.0, -w_m_s as f32]);
             assert_close(turned, [vx as f32, 0.0, vz as f32]);
         }
@@ -153,18 +142,7 @@ mod tests {
         let delta_rad: f64 = 0.2;
         let thrust = rotate(rocket_from_nozzle(delta_rad, -0.5).quaternion_xyzw, [1.0, 0.0, 0.0]);
         assert_close(thrust, [libm::cos(delta_rad) as f32, 0.0, libm::sin(delta_rad) as f32]);
-        let upright = world_from_rocket(&PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() })
-            .quaternion_xyzw;
+        let upright = world_from_telemetry(0.0, 0.0, FRAC_PI_2).quaternion_xyzw;
         assert!(rotate(upright, thrust)[0] < -0.1, "the tail goes back, so the nose pitches down");
-    }
-
-    #[test]
-    fn a_path_keeps_its_order_and_leaves_out_states_that_are_not_numbers() {
-        let states = [(0.0, 15.0), (f64::NAN, 10.0), (-1.0, 0.0)].map(|(x_m, z_m)| PlanarState {
-            x_m,
-            z_m,
-            ..PlanarState::default()
-        });
-        assert_eq!(path_in_world_m(&states), [[0.0, 0.0, 15.0], [-1.0, 0.0, 0.0]]);
     }
 }

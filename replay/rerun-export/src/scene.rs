@@ -1,9 +1,7 @@
 //! The flight in space: rocket, nozzle, thrust, paths, pad.
 
-use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
-use protocol::log::v1::ControllerTick;
 use rerun::archetypes::{Arrows3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates};
 use rerun::components::Radius;
 use rerun::datatypes::{Quaternion, Rgba32};
@@ -12,7 +10,7 @@ use rerun::{RecordingStream, RecordingStreamResult};
 use crate::entity;
 use crate::flown::FlownPath;
 use crate::plots::Whose;
-use crate::pose::{Pose, path_in_world_m};
+use crate::pose::Pose;
 use crate::shape::RocketShape;
 use crate::survey::Survey;
 
@@ -23,8 +21,6 @@ const FLAME: Rgba32 = Rgba32::from_rgb(255, 110, 30);
 const FLOWN: Rgba32 = Rgba32::from_rgb(84, 102, 122);
 const TRAIL: Rgba32 = Rgba32::from_rgb(110, 190, 255);
 const PREDICTED: Rgba32 = Rgba32::from_rgb(255, 205, 70);
-const REPLAYED: Rgba32 = Rgba32::from_rgb(190, 150, 255);
-const REHEARSED: Rgba32 = Rgba32::from_rgb(150, 140, 90);
 const FIRST_PLAN: Rgba32 = Rgba32::from_rgb(120, 95, 40);
 const FLOWN_BESIDE: Rgba32 = Rgba32::from_rgb(122, 84, 102);
 const TRAIL_BESIDE: Rgba32 = Rgba32::from_rgb(255, 120, 190);
@@ -57,11 +53,10 @@ impl Extent {
     /// Where a flight is expected before it is flown: between the height of its start and the pad.
     pub(crate) fn expected(survey: &Survey) -> Self {
         let shape = shape_of(survey);
-        let top_m = match (&survey.mission, &survey.profile) {
-            (Some(mission), _) => mission.start.height_m as f32,
-            (None, Some(profile)) => profile.start.altitude_m as f32,
-            (None, None) => 4.0 * shape.length_m(),
-        };
+        let top_m = survey
+            .mission
+            .as_ref()
+            .map_or(4.0 * shape.length_m(), |mission| mission.start.height_m as f32);
         Self { top_m, x_m: (0.0, 0.0), ground_z_m: ground_z_m(survey, &shape), rocket_m: shape.length_m() }
     }
 
@@ -76,19 +71,15 @@ impl Extent {
     }
 }
 
-/// The altitude of a planar landing is 0 when it stands; heights from apogee are above the pad.
+/// The altitude of telemetry is 0 when the vehicle stands; a vehicle's own heights are above the pad.
 fn ground_z_m(survey: &Survey, shape: &RocketShape) -> f32 {
-    if survey.from_apogee { 0.0 } else { -shape.standing_height_m() }
+    if survey.of_vehicle { 0.0 } else { -shape.standing_height_m() }
 }
 
 fn shape_of(survey: &Survey) -> RocketShape {
-    match (&survey.profile, &survey.mission) {
-        (Some(profile), _) => RocketShape::of(&profile.vehicle),
-        (None, Some(mission)) => {
-            RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
-        }
-        (None, None) => RocketShape::unknown(),
-    }
+    survey.mission.as_ref().map_or_else(RocketShape::unknown, |mission| {
+        RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
+    })
 }
 
 /// The space being recorded.
@@ -109,7 +100,6 @@ impl<'a> Scene<'a> {
         survey: &Survey,
         whose: Whose,
     ) -> RecordingStreamResult<Self> {
-        let profile = survey.profile.as_ref();
         let shape = shape_of(survey);
         recording.log_static(entity::WORLD, &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         recording.log_static(entity::BODY, &shape.body())?;
@@ -127,16 +117,13 @@ impl<'a> Scene<'a> {
             entity::PAD,
             &LineStrips3D::new(strips).with_colors([PAD]).with_radii([Radius::new_ui_points(1.0)]),
         )?;
-        let limits = survey.mission.as_ref().map(|mission| &mission.touchdown_limits);
-        if let Some(limits) = profile.map(|profile| &profile.touchdown_limits).or(limits) {
-            let limit = circle(limits.x_m as f32, ground_z_m);
+        if let Some(mission) = &survey.mission {
+            let limit = circle(mission.touchdown_limits.x_m as f32, ground_z_m);
             let limit = LineStrips3D::new([limit]).with_colors([LIMIT]);
             recording.log_static(entity::PAD_LIMIT, &limit.with_radii([Radius::new_ui_points(1.0)]))?;
         }
-        let gravity_m_s2 = profile
-            .map(|profile| profile.environment.gravity_m_s2)
-            .or(survey.mission.as_ref().map(|mission| mission.gravity_m_s2))
-            .unwrap_or(STANDARD_GRAVITY_M_S2);
+        let gravity_m_s2 =
+            survey.mission.as_ref().map_or(STANDARD_GRAVITY_M_S2, |mission| mission.gravity_m_s2);
         Ok(Self {
             recording,
             whose,
@@ -175,28 +162,8 @@ impl<'a> Scene<'a> {
         Ok(())
     }
 
-    /// Records the plan of a tick, and its plan when it is run again.
-    pub(crate) fn plan(
-        &mut self,
-        tick: &ControllerTick,
-        again: Option<&ControllerTick>,
-    ) -> RecordingStreamResult<()> {
-        if let Some(again) = again {
-            let points_m = path_in_world_m(&again.output.plan.states);
-            self.recording.log(entity::PREDICTED_REPLAYED, &strip(points_m, REPLAYED, 1.0))?;
-        }
-        let rehearsed = tick.output.level == u32::from(ControlLevel::Rehearsal.index());
-        self.path(path_in_world_m(&tick.output.plan.states), tick.input.phase, rehearsed)
-    }
-
-    /// Records a path planned in a phase; `None` clears the previous path.
-    pub(crate) fn path(
-        &mut self,
-        points_m: Vec<[f32; 3]>,
-        phase: u32,
-        rehearsed: bool,
-    ) -> RecordingStreamResult<()> {
-        let color = if rehearsed { REHEARSED } else { PREDICTED };
+    /// Records a path planned in a phase; one without points clears the previous path.
+    pub(crate) fn path(&mut self, points_m: Vec<[f32; 3]>, phase: u32) -> RecordingStreamResult<()> {
         let in_burn =
             u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn);
         if in_burn && !points_m.is_empty() && !self.planned_under_thrust {
@@ -205,10 +172,10 @@ impl<'a> Scene<'a> {
             self.recording.log_static(entity::FIRST_PLAN, &first.with_radii([Radius::new_ui_points(1.0)]))?;
         }
         let end = Points3D::new(points_m.last().copied())
-            .with_colors([color])
+            .with_colors([PREDICTED])
             .with_radii([Radius::new_ui_points(4.0)]);
         self.recording.log(entity::PREDICTED_TOUCHDOWN, &end)?;
-        self.recording.log(entity::PREDICTED, &strip(points_m, color, 1.5))
+        self.recording.log(entity::PREDICTED, &strip(points_m))
     }
 
     /// Records the whole path, and returns its extent.
@@ -241,10 +208,10 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// A path, or nothing if it has no points.
-fn strip(points_m: Vec<[f32; 3]>, color: Rgba32, radius: f32) -> LineStrips3D {
+/// A planned path, or nothing if it has no points.
+fn strip(points_m: Vec<[f32; 3]>) -> LineStrips3D {
     let strips = if points_m.is_empty() { vec![] } else { vec![points_m] };
-    LineStrips3D::new(strips).with_colors([color]).with_radii([Radius::new_ui_points(radius)])
+    LineStrips3D::new(strips).with_colors([PREDICTED]).with_radii([Radius::new_ui_points(1.5)])
 }
 
 fn transform(pose: &Pose) -> Transform3D {

@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use std::io::Read;
 
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::Profile;
 use foxglove::messages::Log;
 use foxglove::messages::log::Level;
 use prost::Message as _;
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{
-    ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_CONTROLLER_TICK, TOPIC_EVENTS,
-    TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
+    ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_EVENTS, TOPIC_PILOT_TICK,
+    TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
 };
 use protocol::text::printable;
 
@@ -27,9 +26,7 @@ pub enum PoseSource {
     None,
     /// The ground station's telemetry.
     Telemetry,
-    /// The input of the vehicle's controller.
-    Estimate,
-    /// The simulated plant.
+    /// The simulated world.
     Truth,
 }
 
@@ -65,15 +62,13 @@ pub struct Survey {
     pub run: BTreeMap<String, String>,
     /// Which build wrote it.
     pub build: BTreeMap<String, String>,
-    /// The text of the profile or mission.
+    /// The text of the mission.
     pub profile_toml: Option<String>,
-    /// The profile, if the log has one that this build can use.
-    pub profile: Option<Profile>,
-    /// The mission, if it is a flight from apogee and this build can use it.
+    /// The mission, if the log has one that this build can use.
     pub mission: Option<Mission>,
-    /// Whether it is a flight from apogee.
-    pub from_apogee: bool,
-    /// Why this build cannot use the profile, if so.
+    /// Whether it is a vehicle's own log, with frames of its flight computer or the simulated truth.
+    pub of_vehicle: bool,
+    /// Why this build cannot use the mission, if so.
     pub profile_problem: Option<String>,
     /// The source of the rocket's pose.
     pub pose_source: PoseSource,
@@ -122,14 +117,7 @@ impl Survey {
     /// The input cannot be read.
     pub fn of_beginning(input: impl Read) -> std::io::Result<Self> {
         let mut survey = Self::of(input)?;
-        if !survey.from_apogee
-            && let Some(text) = &survey.profile_toml
-            && let Ok(mission) = vehicles::mission::from_toml(text, ATTACHMENT_PROFILE)
-        {
-            survey.from_apogee = true;
-            survey.profile_problem = None;
-            survey.mission = Some(mission);
-        }
+        survey.of_vehicle |= survey.mission.is_some();
         Ok(survey)
     }
 
@@ -146,23 +134,18 @@ impl Survey {
                 return;
             }
         };
-        let problem = if self.from_apogee {
-            let parsed = vehicles::mission::from_toml(&text, ATTACHMENT_PROFILE);
-            parsed.map(|mission| self.mission = Some(mission)).map_err(|error| error.to_string())
-        } else {
-            let parsed = vehicles::profile::from_toml(&text, ATTACHMENT_PROFILE);
-            parsed.map(|profile| self.profile = Some(profile)).map_err(|error| error.to_string())
-        };
-        self.profile_problem = problem.err();
+        match vehicles::mission::from_toml(&text, ATTACHMENT_PROFILE) {
+            Ok(mission) => self.mission = Some(mission),
+            Err(error) => self.profile_problem = Some(error.to_string()),
+        }
         self.profile_toml = Some(text);
     }
 
     fn take_message(&mut self, topic: &str, schema_name: &str, log_time_ns: u64, data: &[u8]) {
         let ours = schema_name.starts_with("touchdown.");
-        self.from_apogee |= ours && matches!(topic, TOPIC_PILOT_TICK | TOPIC_TRUTH_SAMPLE);
+        self.of_vehicle |= ours && matches!(topic, TOPIC_PILOT_TICK | TOPIC_TRUTH_SAMPLE);
         let source = match topic {
-            TOPIC_PLANT_TRUTH | TOPIC_TRUTH_SAMPLE if ours => PoseSource::Truth,
-            TOPIC_CONTROLLER_TICK if ours => PoseSource::Estimate,
+            TOPIC_TRUTH_SAMPLE if ours => PoseSource::Truth,
             TOPIC_TELEMETRY if ours => PoseSource::Telemetry,
             TOPIC_EVENTS if schema_name == "foxglove.Log" => return self.take_event(log_time_ns, data),
             _ => PoseSource::None,

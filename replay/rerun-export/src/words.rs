@@ -103,9 +103,7 @@ fn report_text(
         let _ = writeln!(text, "The controller: {}.\n", cell(again));
     }
     let _ = writeln!(text, "Log `{}`", cell(log_name));
-    if let Some(profile) = &survey.profile {
-        let _ = writeln!(text, "\nProfile **{}**: {}", cell(&profile.name), cell(&profile.summary));
-    } else if let Some(mission) = &survey.mission {
+    if let Some(mission) = &survey.mission {
         let _ = writeln!(text, "\nMission **{}**: {}", cell(&mission.name), cell(&mission.summary));
     } else if let Some(problem) = &survey.profile_problem {
         let _ = writeln!(text, "\nThe profile in it cannot be used: {}", cell(problem));

@@ -16,7 +16,7 @@ use super::{Answer, answer, stop_on_interrupt, warn_of_what_is_missing};
 pub(super) struct Ask {
     /// The log, an MCAP file.
     file: PathBuf,
-    /// The setting to change, named as in the profile.
+    /// The setting to change, named as in the mission.
     path: String,
     /// Lowest value tried.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
@@ -24,7 +24,7 @@ pub(super) struct Ask {
     /// Highest value tried.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     highest: f64,
-    /// Value to begin with [default: the profile's value].
+    /// Value to begin with [default: the mission's value].
     #[arg(long, allow_negative_numbers = true)]
     value: Option<f64>,
     /// Change the plant only; the controller does not know about the change.

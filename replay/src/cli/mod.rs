@@ -16,7 +16,6 @@ mod recover;
 mod refly;
 mod report;
 mod settings;
-mod shadow;
 mod sweep;
 mod tick;
 mod verify;
@@ -46,7 +45,6 @@ pub(crate) const EXIT_NO_ANSWER: u8 = 2;
 ///   0  success: the log is described, or every tick that could be read is identical
 ///   1  verify: some tick differs, or with --strict not the whole flight was compared;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
-///      shadow: something was flagged;
 ///      gate: some flight got worse, lands no longer, diverged or is missing;
 ///      learn: NO-GO;
 ///      audit: a book is broken, or its end is not proven
@@ -84,25 +82,23 @@ enum Question {
     #[command(after_help = "Example: replay verify flight.mcap")]
     Verify(verify::Ask),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
-    #[command(after_help = "Example: replay evaluate flight.mcap --set nmpc.weights.w=90@6.5")]
+    #[command(after_help = "Example: replay evaluate flight.mcap --set powered.weights.theta=90@6.5")]
     Evaluate(evaluate::Ask),
     /// Closed loop: flies the flight again in simulation from a chosen moment, with other settings.
     ///
-    /// The plant starts in the recorded state of that moment and the controller with its memory; the record is not used
-    /// afterwards. With nothing changed, a simulated flight is reproduced bit for bit.
-    ///
-    /// A flight in space is flown again from its start with the recorded draw up to that moment, because a log does not
-    /// hold the internal states of gusts, servos and sensors. The answer says how many recorded frames were reproduced.
+    /// The flight is flown again from its start with the recorded draw up to that moment, because a log does not hold the
+    /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
+    /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
     #[command(
-        after_help = "Examples:\n  replay refly flight.mcap --plant plant.thrust_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out"
+        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out"
     )]
     Refly(refly::Ask),
     /// Flies flights again with many settings (closed loop) and ranks them by the worst flight's margin.
-    #[command(after_help = "Example: replay sweep a.mcap b.mcap --vary nmpc.weights.w=50:110:7")]
+    #[command(after_help = "Example: replay sweep a.mcap b.mcap --vary powered.weights.theta=50:110:7")]
     Sweep(sweep::Ask),
     /// Looks for the smallest change of one setting that turns landed into not landed, or back (closed loop).
     #[command(
-        after_help = "Example: replay bisect a.mcap plant.thrust_scale --of-plant --value 1 --lowest 0.9 --highest 1.1"
+        after_help = "Example: replay bisect a.mcap truth.impulse_scale --of-plant --lowest 0.9 --highest 1.1"
     )]
     Bisect(bisect::Ask),
     /// Holds a directory of flights against a baseline: every flight verified, flown again, and compared.
@@ -119,12 +115,6 @@ enum Question {
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
     #[command(after_help = "Example: replay compare old.mcap new.mcap")]
     Compare(compare::Ask),
-    /// Flies along: holds the telemetry of a vehicle in flight against what the flight computer of this build expects.
-    ///
-    /// It only listens. It prints a line for each difference as its frame arrives, records what it heard and flagged, and says
-    /// at the end which checks ran at the rates it heard. Signatures are not checked. Exit code 1 if something was flagged.
-    #[command(after_help = "Example: replay shadow --connect udpin:127.0.0.1:14560 --profile mk2 --once")]
-    Shadow(shadow::Ask),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Ask),
@@ -221,7 +211,6 @@ impl Cli {
             Question::Bisect(ask) => ask.run(),
             Question::Gate(ask) => ask.run(),
             Question::Compare(ask) => ask.run(),
-            Question::Shadow(ask) => ask.run(),
             Question::Report(ask) => ask.run(),
             Question::Export(ask) => ask.run(),
             Question::Frames(ask) => ask.run(),

@@ -20,14 +20,14 @@ pub(super) struct Ask {
     file: PathBuf,
     #[command(flatten)]
     how: FlownHow,
-    /// Begin at this tick (for a flight from apogee: this frame) instead of the landing's first.
+    /// Begin at this frame instead of the landing's first.
     #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase"])]
     tick: Option<u64>,
     /// Begin at this time in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8
     /// (since power-up), log:19.7 (since the first record).
     #[arg(long, value_name = "TIME", conflicts_with = "phase")]
     at: Option<ClockTime>,
-    /// Begin with this phase: LAND_ARMED, IGNITION or POWERED; for a flight from apogee any phase.
+    /// Begin with this phase, as in POWERED.
     #[arg(long, value_name = "PHASE", value_parser = phase_named)]
     phase: Option<Phase>,
     /// Write the flight as a new log.
@@ -46,9 +46,8 @@ pub(super) struct Ask {
 pub(super) struct FlownHow {
     #[command(flatten)]
     pub(super) settings: SettingArguments,
-    /// Another setting of the plant only, which the controller does not know about. For a planar landing for example
-    /// motor.thrust_n=31, plant.thrust_scale=0.97 (it has no wind); for a flight from apogee airframe.motor=G33,
-    /// truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
+    /// Another setting of the plant only, which the controller does not know about. For example
+    /// airframe.motor=G33, truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     plant: Vec<Setting>,
     /// The recorded state to begin from.
@@ -57,11 +56,11 @@ pub(super) struct FlownHow {
     /// The controller that flies.
     #[arg(long, value_enum, default_value_t = Controller::AsRecorded)]
     controller: Controller,
-    /// Flights in space: another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
+    /// Another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
     /// flown with it from its beginning.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<String>,
-    /// Flights in space: leave out a recorded fault, by its name or in full; `all` for every one.
+    /// Leave out a recorded fault, by its name or in full; `all` for every one.
     #[arg(long, value_name = "FAULT")]
     without_fault: Vec<String>,
     /// Seed of the plant's dispersions instead of the recorded one.
@@ -71,7 +70,7 @@ pub(super) struct FlownHow {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Origin {
-    /// The simulated plant's state, if the log has it.
+    /// The simulated plant's state.
     Truth,
     /// The controller's estimate: the plant begins where the estimate was.
     Estimate,
@@ -79,11 +78,9 @@ enum Origin {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Controller {
-    /// The landing controller, with a latched abort if there was one; the upright law if it flew alone.
+    /// As recorded.
     AsRecorded,
-    /// The upright law alone; for planar landings only.
-    Stabiliser,
-    /// The pilot itself; this one and those below are for flights from apogee only.
+    /// The pilot itself.
     Nmpc,
     /// Ignition and fins at times fixed in advance.
     OpenLoop,
@@ -103,7 +100,6 @@ impl FlownHow {
             plant_settings: self.plant.clone(),
             law: match self.controller {
                 Controller::AsRecorded => Law::AsRecorded,
-                Controller::Stabiliser => Law::Stabiliser,
                 Controller::Nmpc => Law::Nmpc,
                 Controller::OpenLoop => Law::OpenLoop,
                 Controller::Oscillating => Law::Oscillating,

@@ -9,11 +9,11 @@ use replay::settings::{Setting, settings_of_file};
 /// Other settings than the recorded ones.
 #[derive(Debug, Args)]
 pub(super) struct SettingArguments {
-    /// Another setting, named as in the profile; with @SECONDS it applies from that vehicle time on. May be given more
+    /// Another setting, named as in the mission; with @SECONDS it applies from that vehicle time on. May be given more
     /// than once.
     #[arg(long = "set", value_name = "PATH=VALUE[@SECONDS]")]
     pub(super) set: Vec<Setting>,
-    /// File of settings: a TOML file with the structure of the profile and the keys to change. --set overrides it.
+    /// File of settings: a TOML file with the structure of the mission and the keys to change. --set overrides it.
     #[arg(long, value_name = "FILE")]
     pub(super) settings: Vec<PathBuf>,
 }

@@ -55,7 +55,7 @@ impl Ask {
     pub(super) fn run(self) -> Result<Answer> {
         ensure!(
             !(self.vary.is_empty() && self.vary_plant.is_empty()),
-            "nothing to vary; give --vary nmpc.weights.w=50:110:7 or the like"
+            "nothing to vary; give --vary powered.weights.theta=50:110:7 or the like"
         );
         let points = match self.random {
             Some(count) => random(&self.vary, &self.vary_plant, count, self.random_seed)?,

@@ -36,10 +36,6 @@ impl Anchors {
             u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn)
         };
         match entry {
-            // A tick records the moment of ignition; other records in the phase only show that it has passed.
-            Entry::Tick(tick) if lit(tick.input.phase) => {
-                self.ignition_s = Some(tick.input.time_s - tick.input.time_since_ignition_s);
-            }
             Entry::PilotTick(tick) if lit(tick.output.phase) => self.ignition_s = Some(tick.input.time_s),
             Entry::Telemetry(telemetry) if telemetry.phase.is_some_and(lit) => {
                 self.ignition_s = Some(telemetry.time_s);

@@ -1,6 +1,6 @@
 //! Compares two flights signal by signal.
 //!
-//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`controller_tick.output.…`). The
+//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`pilot_tick.output.…`). The
 //! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
 //! one flight has are counted separately, because interpolation would hide a lost record.
@@ -122,7 +122,7 @@ pub fn compare(
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
     if signals.is_empty() {
-        // For example two flights of different kinds. "No differences" would be misleading here.
+        // For example two logs with different topics. "No differences" would be misleading here.
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());

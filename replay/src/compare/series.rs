@@ -17,16 +17,14 @@ const MESSAGES: &str = "mavlink_";
 const TIME_BOOT_MS: &str = "time_boot_ms";
 
 /// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
-const NO_SIGNALS: [&str; 12] = [
+const NO_SIGNALS: [&str; 10] = [
     TIME_BOOT_MS,
     "frame_sequence",
     "log_time_ns",
     "time_s",
     "input.time_s",
     "frame",
-    "input.tick",
     "input.frame",
-    "output.tick",
     "solve_time_s",
     "deadline_s",
     "state_digest",
@@ -107,7 +105,7 @@ impl Flown {
             let message = heard_message(log.channel(stamped.channel_id), &stamped);
             verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);
-            has_ticks |= matches!(stamped.entry, Entry::Tick(_) | Entry::PilotTick(_));
+            has_ticks |= matches!(stamped.entry, Entry::PilotTick(_));
         }
         let verdict = verdicts.found().as_ref().map(VerdictFacts::found);
         let name = log.name().to_owned();

@@ -8,11 +8,11 @@
 //! samples_added = 0.01    # share of the other's samples that the baseline may lack; none if left out
 //! damaged = true          # damaged logs, and logs that end before their flight did, may be compared; not if left out
 //!
-//! [signals."vehicle_truth.state.x_m"]
+//! [signals."vehicle_truth3d.state.position_m.x"]
 //! rms = 0.01              # in the signal's own unit
 //! max = 0.05
 //!
-//! [signals."controller_tick.output.*"]
+//! [signals."pilot_tick.output.*"]
 //! max = 1e-9              # of several patterns that fit a signal, the longest applies
 //! ```
 

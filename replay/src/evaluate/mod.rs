@@ -5,19 +5,18 @@
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
 
-use flight::rules::verdict::TouchdownLimits;
 use serde::Serialize;
-use tick_log::TickLogError;
 
 pub use crate::controller::Decided;
-use crate::controller::{Decides, FrameError, LoggedController, LoggedPilot, settings_in_flight};
-use crate::log::{FlightKind, Recording, RecordingError};
-use crate::settings::{Schedule, Setting, SettingError};
+use crate::controller::{FrameError, LoggedPilot, Replayed as _};
+use crate::log::{Recording, RecordingError};
+use crate::settings::{Setting, SettingError};
 
-/// Sections that the planar landing's controller never sees.
-const NOT_THE_CONTROLLERS: [&str; 4] = ["plant.", "dispersion.", "arming.", "gate."];
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 3] = ["touchdown_limits.", "leg_limits.", "truth."];
+
+/// The time between frames.
+const FRAME: &str = "estimator.frame_s";
 
 /// Why a flight cannot be evaluated.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +27,6 @@ pub enum EvaluateError {
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// This build cannot interpret a recorded input.
-    #[error(transparent)]
-    Input(#[from] TickLogError),
     /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -124,11 +120,7 @@ type Evaluated = (Vec<EvaluatedTick>, usize);
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let ticks = match recording.kind() {
-        FlightKind::InSpace => frames(recording, settings),
-        FlightKind::Planar => ticks(recording, settings),
-    };
-    let ticks = ticks?;
+    let ticks = side_by_side(recording, settings)?;
     let last_s = ticks.0.last().map_or(0.0, |tick| tick.time_s);
     match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
         Some(late) => Err(EvaluateError::AfterTheEnd {
@@ -140,65 +132,22 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     }
 }
 
-/// Evaluates the ticks of a planar landing.
-fn ticks(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
-    let recorded = recording.replayable_ticks()?;
-    let profile = recording.profile()?;
-    let recorded_s = profile.nmpc.sample_time_s;
-    refuse(settings, &NOT_THE_CONTROLLERS, ("nmpc.sample_time_s", recorded_s))?;
-    let toml = recording.profile_toml()?;
-    let then = LoggedController::recorded(&profile, toml, &recording.head.run)?;
-    let in_flight = settings_in_flight(&recording.head.run)?;
-    let all: Vec<Setting> = in_flight.iter().chain(settings).cloned().collect();
-    let schedule = Schedule::new(toml, &all)?;
-    let now = LoggedController::scheduled(&schedule).judged_by(TouchdownLimits::from_profile(&profile));
-    side_by_side(then, now, recorded)
-}
-
-/// Evaluates the frames of a flight computer.
-fn frames(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
+/// Runs two flight computers on every frame. The recorded decision comes from the record; what the record leaves out
+/// (cost and iterations of a plan) comes from `then`, which runs with the recorded settings.
+fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
     let (start, frames) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let run = &recording.head.run;
-    let then = LoggedPilot::recorded(toml, start, run, &[])?;
-    let recorded_s = then.pilot().mission().estimator.frame_s;
-    refuse(settings, &NOT_THE_PILOTS, ("estimator.frame_s", recorded_s))?;
-    let timed = |setting: &&Setting| setting.at_s.is_some() && setting.path.starts_with("estimator.");
-    if let Some(setting) = settings.iter().find(timed) {
-        return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
-    }
-    side_by_side(then, LoggedPilot::recorded(toml, start, run, settings)?, frames)
-}
-
-fn refuse(
-    settings: &[Setting],
-    not_the_controllers: &[&str],
-    (interval, recorded_s): (&'static str, f64),
-) -> Result<(), EvaluateError> {
-    for Setting { path, .. } in settings {
-        if not_the_controllers.iter().any(|section| path.starts_with(section)) {
-            return Err(EvaluateError::NotTheControllers { path: path.clone() });
-        }
-        if path == interval {
-            return Err(EvaluateError::SampleTime { path: interval, recorded_s });
-        }
-    }
-    Ok(())
-}
-
-/// Runs both computers on every tick. The recorded decision comes from the record; what the record leaves out (cost and
-/// iterations of a flight computer's plan) comes from `then`, which runs with the recorded settings.
-fn side_by_side<C: Decides>(mut then: C, mut now: C, ticks: &[C::Tick]) -> Result<Evaluated, EvaluateError>
-where
-    EvaluateError: From<C::Error>,
-{
-    let mut evaluated = Vec::with_capacity(ticks.len());
+    let mut then = LoggedPilot::recorded(toml, start, run, &[])?;
+    refuse(settings, then.pilot().mission().estimator.frame_s)?;
+    let mut now = LoggedPilot::recorded(toml, start, run, settings)?;
+    let mut evaluated = Vec::with_capacity(frames.len());
     let mut unchanged_different = 0;
-    for tick in ticks {
-        let unchanged = then.run_again(tick)?;
-        let again = now.run_again(tick)?;
-        let moment = C::moment(tick);
-        let recorded = then.decided(tick);
+    for frame in frames {
+        let unchanged = then.run_again(frame)?;
+        let again = now.run_again(frame)?;
+        let moment = LoggedPilot::moment(frame);
+        let recorded = then.decided(frame);
         unchanged_different += usize::from(then.decided(&unchanged) != recorded);
         evaluated.push(EvaluatedTick {
             tick: moment.tick,
@@ -209,6 +158,23 @@ where
         });
     }
     Ok((evaluated, unchanged_different))
+}
+
+/// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
+fn refuse(settings: &[Setting], recorded_s: f64) -> Result<(), EvaluateError> {
+    for setting in settings {
+        let path = &setting.path;
+        if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
+            return Err(EvaluateError::NotTheControllers { path: path.clone() });
+        }
+        if path == FRAME {
+            return Err(EvaluateError::SampleTime { path: FRAME, recorded_s });
+        }
+        if setting.at_s.is_some() && path.starts_with("estimator.") {
+            return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
+        }
+    }
+    Ok(())
 }
 
 /// The largest difference of two commands' angles, rad.

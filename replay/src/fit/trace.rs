@@ -142,10 +142,9 @@ impl Trace {
         let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
         let mut trace: Option<Self> = None;
         let (mut waiting, mut reported_rad) = (None, None);
-        let (mut planar, mut telemetry, mut flights) = (false, false, 0_usize);
+        let (mut telemetry, mut flights) = (false, 0_usize);
         while let Some(stamped) = log.next_entry()? {
             match stamped.entry {
-                Entry::Tick(_) => planar = true,
                 Entry::Telemetry(_) => telemetry = true,
                 Entry::PilotStart(_) => flights += 1,
                 Entry::ComputerFrame(frame) => {
@@ -179,11 +178,7 @@ impl Trace {
         if flights > 2 {
             return Err(RecordingError::SeveralFlights { name, flights }.into());
         }
-        let found = match (planar, telemetry) {
-            (true, _) => "it is the planar vehicle's, which knows its own state",
-            (_, true) => "it is a ground station's",
-            _ => "none of either",
-        };
+        let found = if telemetry { "it is a ground station's" } else { "none of either" };
         match trace.filter(|trace| !trace.frames.is_empty()) {
             None => Err(TraceError::NoFrames { name, found }),
             Some(trace) => Ok(Self { damage: log.damage().map(ToString::to_string), ..trace }),

@@ -48,7 +48,7 @@ fn log(path: &Path) -> Outcome {
         }
     };
     let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
-        // From its first frame on, the whole flight is this build's. A planar landing begins with its first tick.
+        // From its first frame on, the whole flight is this build's.
         let start = recording.frames.first().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
     });
@@ -73,10 +73,7 @@ fn flight_of(path: &Path) -> Option<String> {
     while records.len() < NAMING_RECORDS
         && let Ok(Some(stamped)) = log.next_entry()
     {
-        if matches!(
-            stamped.entry,
-            Entry::ComputerStart(_) | Entry::ComputerFrame(_) | Entry::PilotTick(_) | Entry::Tick(_)
-        ) {
+        if matches!(stamped.entry, Entry::ComputerStart(_) | Entry::ComputerFrame(_) | Entry::PilotTick(_)) {
             records.push(stamped.data);
         }
     }

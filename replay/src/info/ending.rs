@@ -34,8 +34,6 @@ impl EndingTracker {
                 self.aborted |= tick.input.abort;
                 tick.output.phase
             }
-            Entry::Tick(tick) => tick.input.phase,
-            Entry::Truth(truth) => truth.phase,
             Entry::Telemetry(telemetry) => {
                 self.aborted |= telemetry.interlocks.is_some_and(has_latched_abort);
                 let Some(phase) = telemetry.phase else { return };

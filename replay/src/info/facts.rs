@@ -7,7 +7,7 @@ use protocol::log::v1;
 use serde::Serialize;
 use sim::ending::FlightEnding;
 
-use super::{ChannelFacts, FrameFacts, PhaseTimeline, TickFacts};
+use super::{ChannelFacts, FrameFacts, PhaseTimeline};
 use crate::log::{
     AttachmentFacts, BuildComparison, Clock, ClockTime, Clocks, Cut, Flights, Found, Head, SummaryFacts,
 };
@@ -36,9 +36,7 @@ pub struct Info {
     pub span: Option<Span>,
     /// Its channels, by topic.
     pub channels: Vec<ChannelFacts>,
-    /// The controller's ticks.
-    pub ticks: Option<TickFacts>,
-    /// The frames of the flight computer from apogee to touchdown.
+    /// The frames of the flight computer from its release on.
     pub frames: Option<FrameFacts>,
     /// The phases from each source that records them, the vehicle first.
     pub phases: Vec<PhaseTimeline>,
@@ -74,9 +72,9 @@ pub struct Grade {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum GradeLevel {
-    /// The controller can be run again on its own inputs.
+    /// The flight computer can be run again on its own inputs.
     BitExact,
-    /// Ticks in full precision, but nothing to run them with.
+    /// Frames in full precision, but nothing to run them with.
     Numeric,
     /// Only what went over the air or the simulator knew.
     TelemetryOnly,
@@ -94,34 +92,12 @@ impl GradeLevel {
 }
 
 impl Grade {
-    pub(super) fn of(
-        ticks: Option<&TickFacts>,
-        profile: Option<&ProfileFacts>,
-        unreadable: Option<&str>,
-    ) -> Self {
-        let Some(ticks) = ticks else {
-            let reason = match unreadable {
-                None => "it has no controller ticks".to_owned(),
-                Some(why) => format!("it has no controller ticks that this build can read: {why}"),
-            };
-            return Self { level: GradeLevel::TelemetryOnly, reason };
+    pub(super) fn without_frames(unreadable: Option<&str>) -> Self {
+        let reason = match unreadable {
+            None => "it has no frames of a flight computer that this build knows".to_owned(),
+            Some(why) => format!("it has no frames of a flight computer that this build can read: {why}"),
         };
-        let numeric = |why: String| Self { level: GradeLevel::Numeric, reason: format!("ticks, but {why}") };
-        let profile = match profile {
-            None => return numeric("no attachment profile.toml to build the controller from".to_owned()),
-            Some(ProfileFacts { problem: Some(problem), .. }) => {
-                return numeric(format!("the profile cannot be used by this build: {problem}"));
-            }
-            Some(profile) => profile.name.as_deref().unwrap_or_default(),
-        };
-        if ticks.first != 0 {
-            return numeric(format!("they begin with tick {}, not with tick 0", ticks.first));
-        }
-        let reason = match ticks.gaps.first() {
-            None => format!("{} ticks from the first on, and their profile {profile}", ticks.count),
-            Some(gap) => format!("up to tick {}, before the first gap; profile {profile}", gap.after),
-        };
-        Self { level: GradeLevel::BitExact, reason }
+        Self { level: GradeLevel::TelemetryOnly, reason }
     }
 }
 
@@ -139,17 +115,9 @@ pub struct ProfileFacts {
 impl ProfileFacts {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
-            Ok(text) => vehicles::profile::from_toml(text, "profile.toml")
-                .map(|profile| (profile.name, profile.summary))
-                .or_else(|error| {
-                    // Try the other kind of profile; only a mission has an airframe.
-                    vehicles::mission::from_toml(text, "profile.toml")
-                        .map(|mission| (mission.name, mission.summary))
-                        .map_err(|as_mission| {
-                            let of_mission = text.contains("airframe");
-                            explained(&if of_mission { as_mission.to_string() } else { error.to_string() })
-                        })
-                }),
+            Ok(text) => vehicles::mission::from_toml(text, "profile.toml")
+                .map(|mission| (mission.name, mission.summary))
+                .map_err(|error| explained(&error.to_string())),
             Err(error) => Err(error.to_string()),
         };
         Some(match parsed {
@@ -186,8 +154,6 @@ pub struct Completeness {
     pub readable_until_s: Option<f64>,
     /// How much is missing after that, s; known only if the end of the file can be read.
     pub missing_s: Option<f64>,
-    /// Ticks missing between the first and the last that are there.
-    pub ticks_missing: u64,
     /// Messages missing before the last of their channel.
     pub messages_lost: u64,
     /// Number of flights with ticks: more than one in a joined log.
@@ -200,7 +166,6 @@ impl Completeness {
     pub(super) fn new(
         damage: Option<&Damage>,
         span: Option<&Span>,
-        ticks: Option<&TickFacts>,
         channels: &[ChannelFacts],
         summary: impl FnOnce() -> Option<SummaryFacts>,
     ) -> Self {
@@ -208,14 +173,12 @@ impl Completeness {
             let end_ns = summary()?.last_log_time_ns;
             Some(seconds(end_ns.checked_sub(span?.last_ns)?))
         });
-        let ticks_missing = ticks.map_or(0, |ticks| ticks.missing);
         let messages_lost = channels.iter().map(|channel| channel.lost).sum();
         Self {
-            complete: damage.is_none() && ticks_missing == 0 && messages_lost == 0,
+            complete: damage.is_none() && messages_lost == 0,
             damage: damage.map(ToString::to_string),
             readable_until_s: span.map(|span| span.duration_s),
             missing_s,
-            ticks_missing,
             messages_lost,
             flights: 0,
             cut: None,
@@ -240,7 +203,7 @@ pub struct VerdictFacts {
     pub time_s: f64,
     /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
     pub clock: Clock,
-    /// The limits that decide: those of the legs, or of a planar landing.
+    /// The limits that decide: those of the legs.
     pub limits: Vec<VerdictLimit>,
     /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
     pub table_2: Vec<VerdictLimit>,

@@ -6,7 +6,6 @@ mod facts;
 mod frames;
 mod phases;
 mod solve_times;
-mod ticks;
 
 pub use channels::ChannelFacts;
 pub use facts::{
@@ -15,7 +14,6 @@ pub use facts::{
 pub use frames::FrameFacts;
 pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
 pub use solve_times::SolveTimes;
-pub use ticks::{Named, TickFacts};
 
 use std::io::Read;
 use std::path::Path;
@@ -29,7 +27,6 @@ use channels::ChannelCounter;
 use ending::EndingTracker;
 use frames::FrameCounter;
 use phases::PhaseTracker;
-use ticks::TickCounter;
 
 /// Describes a log file.
 ///
@@ -76,7 +73,6 @@ struct Seen {
     channels: ChannelCounter,
     flights: Flights,
     span: Option<(u64, u64)>,
-    ticks: TickCounter,
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
     first_ns: Option<u64>,
@@ -90,11 +86,6 @@ struct Seen {
 impl Seen {
     fn take(&mut self, entry: Entry, record: u32) {
         match entry {
-            Entry::Tick(tick) => {
-                self.vehicle_phases.note(tick.input.time_s, tick.input.phase);
-                self.ticks.count(&tick);
-            }
-            Entry::Truth(truth) => self.vehicle_phases.note(truth.time_s, truth.phase),
             Entry::Telemetry(telemetry) => {
                 if let Some(phase) = telemetry.phase {
                     self.telemetry_phases.note(telemetry.time_s, phase);
@@ -124,11 +115,10 @@ impl Seen {
     fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<SummaryFacts>) -> Info {
         let head = log.head();
         let profile = ProfileFacts::of(head);
-        let ticks = self.ticks.into_facts();
         let frames = self.frames.into_facts();
         let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
         let channels = self.channels.into_facts(log.channels());
-        let completeness = Completeness::new(log.damage(), span.as_ref(), ticks.as_ref(), &channels, summary);
+        let completeness = Completeness::new(log.damage(), span.as_ref(), &channels, summary);
         let completeness = completeness.with_flights(&self.flights);
         let verdict = self.verdicts.found().as_ref().map(VerdictFacts::found);
         let timelines =
@@ -138,7 +128,7 @@ impl Seen {
             size_bytes: None,
             grade: match &frames {
                 Some(frames) => Grade::of_frames(frames, profile.as_ref()),
-                None => Grade::of(ticks.as_ref(), profile.as_ref(), self.unreadable.as_deref()),
+                None => Grade::without_frames(self.unreadable.as_deref()),
             },
             frames,
             schema: SchemaFacts { version: head.schema_version(), this_build: SCHEMA_VERSION },
@@ -149,7 +139,6 @@ impl Seen {
             profile,
             span,
             channels,
-            ticks,
             phases: timelines
                 .into_iter()
                 .filter_map(|(source, tracker)| tracker.into_timeline(source))

@@ -9,7 +9,7 @@ const SPANS_KEPT: usize = 200;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhaseSource {
-    /// The vehicle: its controller's ticks and, if simulated, its plant.
+    /// The vehicle's own frames.
     Vehicle,
     /// A ground station's telemetry.
     Telemetry,
@@ -19,7 +19,7 @@ impl PhaseSource {
     /// The source's name.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Vehicle => "vehicle's ticks and plant",
+            Self::Vehicle => "vehicle's frames",
             Self::Telemetry => "ground station's telemetry",
         }
     }

@@ -82,11 +82,6 @@ impl Clocks {
             Entry::PilotTick(tick) => {
                 self.flight_zero_s.get_or_insert(since_s - tick.input.time_s);
             }
-            // The planar vehicle has one clock.
-            Entry::Tick(tick) => {
-                self.flight_zero_s.get_or_insert(since_s - tick.input.time_s);
-                self.boot_zero_s.get_or_insert(since_s - tick.input.time_s);
-            }
             Entry::Telemetry(telemetry) => {
                 self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);
             }

@@ -3,9 +3,9 @@
 use prost::Message;
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
-    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE,
-    TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH,
-    TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_EVENTS,
+    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
 };
 use protocol::log::{computer_v1, flight_v1, v1};
 
@@ -29,24 +29,20 @@ pub struct StampedEntry {
 /// One record of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// A controller tick.
-    Tick(Box<v1::ControllerTick>),
     /// The data from which the flight computer was built at power-up.
     ComputerStart(Box<computer_v1::ComputerStart>),
     /// A frame of the flight computer, from power-up on.
     ComputerFrame(Box<computer_v1::ComputerFrame>),
     /// The start record of the flight computer: its estimate at its release.
     PilotStart(Box<flight_v1::PilotStart>),
-    /// A frame of the flight computer from apogee to touchdown.
+    /// A frame of the flight computer from its release on.
     PilotTick(Box<flight_v1::PilotTick>),
     /// Solve time of a planning frame.
     PilotTiming(flight_v1::PilotTiming),
     /// What the flight computer believed after a frame.
     Estimate(Box<flight_v1::Estimate>),
-    /// The simulated world of a flight from apogee.
+    /// The simulated world.
     World(Box<flight_v1::TruthSample>),
-    /// The simulated plant.
-    Truth(Box<v1::PlantTruth>),
     /// The landing verdict.
     Verdict(Box<v1::LandingVerdict>),
     /// The values that a ground station knew.
@@ -75,7 +71,6 @@ impl Entry {
             return Self::Other;
         };
         match channel.topic.as_str() {
-            TOPIC_CONTROLLER_TICK => decoded(channel, "ControllerTick", data, Self::Tick),
             TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
             TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, Self::ComputerFrame),
             TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
@@ -85,7 +80,6 @@ impl Entry {
             }),
             TOPIC_ESTIMATE => decoded(channel, "Estimate", data, Self::Estimate),
             TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
-            TOPIC_PLANT_TRUTH => decoded(channel, "PlantTruth", data, Self::Truth),
             TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
             TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
             TOPIC_OPERATOR => {

@@ -1,6 +1,6 @@
 //! Why a file cannot be used as a flight log.
 
-use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_RAW_RX, TOPIC_TELEMETRY};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_RAW_RX, TOPIC_TELEMETRY};
 use protocol::text::printable;
 
 /// Most topics of a foreign file listed in a message.
@@ -46,7 +46,7 @@ pub enum LogError {
     /// An MCAP file of another program.
     #[error(
         "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {}, {} or similar topics",
-        printable(library.as_bytes()), listed(topics), TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_TELEMETRY,
+        printable(library.as_bytes()), listed(topics), TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_TELEMETRY,
         TOPIC_RAW_RX
     )]
     Foreign {

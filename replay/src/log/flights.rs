@@ -2,8 +2,7 @@
 //!
 //! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool may end in the
 //! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`. If the log
-//! has none, a flight from apogee begins with `/pilot/start`, and a planar one with tick 0. Each flight ends with its
-//! verdict.
+//! has none, a flight begins with `/pilot/start`. Each flight ends with its verdict.
 
 use std::fmt;
 
@@ -13,29 +12,15 @@ use serde::Serialize;
 
 use super::{Clock, ClockTime, Entry};
 
-/// Longest time between the last tick and the verdict's time of contact, s: the last planar tick comes at most one
-/// period (0.1 s) before contact.
-const PLANAR_TICK_S: f64 = 0.1;
 /// Tolerance for rounding: times are sums of periods.
 const ROUNDING_S: f64 = 1e-6;
 
-/// The computer that flew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FlightKind {
-    /// The controller of the planar landing.
-    Planar,
-    /// The flight computer of a flight from apogee.
-    InSpace,
-}
-
 /// A flight of a log.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LoggedFlight {
-    /// The computer that flew.
-    pub kind: FlightKind,
-    /// Ticks or frames.
+    /// Frames from the release on.
     pub ticks: u64,
-    /// Vehicle time, s, and phase of the latest tick.
+    /// Vehicle time, s, and phase of the latest of them.
     last: Option<(f64, u32)>,
     /// The latest frame of the flight computer since power-up: its time, s, and phase.
     on_the_pad: Option<(f64, u32)>,
@@ -71,10 +56,6 @@ impl fmt::Display for Cut {
 }
 
 impl LoggedFlight {
-    fn new(kind: FlightKind) -> Self {
-        Self { kind, ticks: 0, last: None, on_the_pad: None, contact_s: None }
-    }
-
     fn note(&mut self, time_s: f64, phase: u32) {
         self.ticks += 1;
         // Ticks in the file may be slightly out of order.
@@ -87,11 +68,7 @@ impl LoggedFlight {
     pub fn cut(&self) -> Option<Cut> {
         let flown = self.last.map(|last| (last, Clock::Flight));
         let ((time_s, phase), clock) = flown.or(self.on_the_pad.map(|last| (last, Clock::Boot)))?;
-        let period_s = match self.kind {
-            FlightKind::Planar => PLANAR_TICK_S,
-            FlightKind::InSpace => FRAME_S,
-        };
-        let reached = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= period_s + ROUNDING_S);
+        let reached = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= FRAME_S + ROUNDING_S);
         let phase = u8::try_from(phase).ok().and_then(Phase::from_index);
         (!reached).then_some(Cut {
             time_s,
@@ -107,8 +84,6 @@ impl LoggedFlight {
 #[derive(Debug, Clone, Default)]
 pub struct Flights {
     found: Vec<LoggedFlight>,
-    /// Tick 0 of the last flight has been seen: the next tick 0 belongs to another flight.
-    tick_0_seen: bool,
     /// The last flight began with the power-up of its flight computer.
     powered_up: bool,
 }
@@ -118,8 +93,8 @@ impl Flights {
     pub fn note(&mut self, entry: &Entry) -> bool {
         let before = self.found.len();
         match entry {
-            Entry::ComputerStart(start) => {
-                self.begin(if start.in_space.is_some() { FlightKind::InSpace } else { FlightKind::Planar });
+            Entry::ComputerStart(_) => {
+                self.begin();
                 self.powered_up = true;
             }
             Entry::ComputerFrame(frame) => {
@@ -130,15 +105,15 @@ impl Flights {
             // If the log has the power-up of this flight computer, its release does not begin another flight.
             Entry::PilotStart(_)
                 if self.powered_up && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
-            Entry::PilotStart(_) => self.begin(FlightKind::InSpace),
+            Entry::PilotStart(_) => self.begin(),
             Entry::PilotTick(tick) => {
-                self.present(FlightKind::InSpace, false).note(tick.input.time_s, tick.output.phase);
-            }
-            Entry::Tick(tick) => {
-                let again = tick.input.tick == 0 && self.tick_0_seen;
-                let flight = self.present(FlightKind::Planar, again);
-                flight.note(tick.input.time_s, tick.input.phase);
-                self.tick_0_seen |= tick.input.tick == 0;
+                // The start may be lost.
+                if self.found.is_empty() {
+                    self.begin();
+                }
+                if let Some(flight) = self.found.last_mut() {
+                    flight.note(tick.input.time_s, tick.output.phase);
+                }
             }
             Entry::Verdict(verdict) => {
                 if let Some(flight) = self.found.last_mut() {
@@ -150,19 +125,9 @@ impl Flights {
         self.found.len() > before
     }
 
-    fn begin(&mut self, kind: FlightKind) {
-        self.found.push(LoggedFlight::new(kind));
-        self.tick_0_seen = false;
+    fn begin(&mut self) {
+        self.found.push(LoggedFlight::default());
         self.powered_up = false;
-    }
-
-    /// The flight that a tick belongs to; it begins a new flight if the kind differs or the start is lost.
-    fn present(&mut self, kind: FlightKind, another: bool) -> &mut LoggedFlight {
-        if another || self.found.last().is_none_or(|flight| flight.kind != kind) {
-            self.begin(kind);
-        }
-        let last = self.found.len() - 1;
-        &mut self.found[last]
     }
 
     /// Every flight so far, in file order.

@@ -14,21 +14,19 @@ mod new_log;
 mod recording;
 mod schema;
 mod summary;
-mod tick_order;
 mod tick_ranges;
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
 pub use entry::{Entry, StampedEntry};
 pub use error::LogError;
-pub use flights::{Cut, FlightKind, Flights, LoggedFlight};
+pub use flights::{Cut, Flights, LoggedFlight};
 pub use frame_order::FrameOrder;
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 pub(crate) use heard::{Found, Heard, Verdicts, frame_of, heard_message};
 pub(crate) use new_log::{NewLog, NewLogError};
 pub use recording::{Recording, RecordingError};
-pub(crate) use schema::{computer_descriptor, pilot_descriptor, tick_descriptor};
+pub(crate) use schema::{computer_descriptor, pilot_descriptor};
 pub use summary::{SummaryFacts, summary_of};
-pub use tick_order::{Ordered, TickOrder};
 pub use tick_ranges::{Gap, TickRanges};
 
 use std::fs::File;

@@ -5,15 +5,13 @@
 
 use std::path::Path;
 
-use flight::vehicle::profile::Profile;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
 use super::heard::{Verdicts, heard_message};
-use super::{Clocks, Cut, Entry, FlightKind, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
-use crate::settings::explained;
+use super::{Clocks, Cut, Entry, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
 
-/// Most records of one kind: five hours of ticks at 10 Hz.
+/// Most records of one kind: seventeen minutes of frames at 200 Hz.
 const RECORDS_MAX: usize = 200_000;
 
 /// Why a log cannot be executed or flown again.
@@ -32,21 +30,10 @@ pub enum RecordingError {
         /// The kind of record of which there are too many.
         kind: &'static str,
     },
-    /// The log has no ticks to re-execute.
+    /// The log has no frames to re-execute.
     #[error(
-        "{name}: has no controller ticks from tick 0 on: {}",
+        "{name}: has no frames of a flight computer after a record /pilot/start: {}",
         unreadable.as_deref().unwrap_or("this command needs the log of the vehicle or of the demonstration")
-    )]
-    NoTicks {
-        /// The file.
-        name: String,
-        /// Why a record could not be read, if that is the reason.
-        unreadable: Option<String>,
-    },
-    /// The log has no frames of a flight from apogee to re-execute.
-    #[error(
-        "{name}: has no frames of the flight computer after a record /pilot/start{}",
-        unreadable.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default()
     )]
     NoFrames {
         /// The file.
@@ -95,11 +82,7 @@ pub struct Recording {
     pub name: String,
     /// Metadata and attachments of the log.
     pub head: Head,
-    /// Every tick, by number, without its plan.
-    pub ticks: Vec<v1::ControllerTick>,
-    /// Number of leading ticks, from tick 0, without a gap or a repetition.
-    pub ticks_unbroken: usize,
-    /// The start record of a flight from apogee.
+    /// The start record of the flight computer at its release.
     pub pilot_start: Option<flight_v1::PilotStart>,
     /// Its frames, in file order.
     pub frames: Vec<flight_v1::PilotTick>,
@@ -109,8 +92,6 @@ pub struct Recording {
     pub timings: Vec<flight_v1::PilotTiming>,
     /// Its simulated world, in file order.
     pub world: Vec<flight_v1::TruthSample>,
-    /// The simulated plant, in file order.
-    pub truth: Vec<v1::PlantTruth>,
     /// The values that a ground station knew, in file order.
     pub telemetry: Vec<v1::Telemetry>,
     /// Events, with log time in seconds after the first record.
@@ -156,14 +137,8 @@ impl Recording {
             recording.clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
             verdicts.note(&stamped, message.as_ref());
             match stamped.entry {
-                Entry::Tick(mut tick) => {
-                    tick.output.plan.states = Vec::new();
-                    tick.output.plan.gimbal_rad = Vec::new();
-                    recording.ticks.push(*tick);
-                }
                 Entry::PilotTiming(timing) => recording.timings.push(timing),
                 Entry::World(sample) => recording.world.push(*sample),
-                Entry::Truth(truth) => recording.truth.push(*truth),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
                 Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
                 Entry::Unreadable { reason } => {
@@ -201,20 +176,14 @@ impl Recording {
         recording.head = log.head().clone();
         recording.damage = log.damage().map(ToString::to_string);
         recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
-        recording.ticks.sort_by_key(|tick| tick.input.tick);
-        recording.ticks_unbroken =
-            (0..).zip(&recording.ticks).take_while(|(number, tick)| tick.input.tick == *number).count();
         Ok(recording)
     }
 
     fn check_length(&self) -> Result<(), RecordingError> {
-        // The plant is recorded several times a tick.
         let kinds = [
-            ("controller ticks", self.ticks.len()),
             ("frames of the flight computer", self.frames.len()),
             ("timings of the flight computer", self.timings.len()),
             ("records of the world", self.world.len()),
-            ("records of the plant", self.truth.len() / 10),
             ("records of telemetry", self.telemetry.len()),
             ("events", self.events.len()),
         ];
@@ -234,13 +203,7 @@ impl Recording {
         Some(contact_s + boot_zero_s.unwrap_or(0.0) - telemetry_zero_s.unwrap_or(0.0))
     }
 
-    /// Which vehicle flew: its ticks are of this kind.
-    pub fn kind(&self) -> FlightKind {
-        let in_space = self.pilot_start.is_some() || !self.frames.is_empty();
-        if in_space { FlightKind::InSpace } else { FlightKind::Planar }
-    }
-
-    /// The start record of a flight from apogee and all its frames.
+    /// The start record and all frames.
     ///
     /// # Errors
     /// The log has no frames or no start record.
@@ -271,27 +234,12 @@ impl Recording {
         }
     }
 
-    /// Where re-execution must stop, if the log has ticks or frames after that.
+    /// Where re-execution must stop, if the log has frames after that.
     pub fn gap(&self) -> Option<Gap> {
-        fn around<T>(records: &[T], place: usize, number: impl Fn(&T) -> u64) -> Option<Gap> {
-            let before = number(records.get(place)?);
-            Some(Gap { after: place.checked_sub(1).map_or(0, |last| number(&records[last])), before })
-        }
-        around(&self.frames, self.frames_unbroken, |tick| tick.input.frame)
-            .or_else(|| around(&self.ticks, self.ticks_unbroken, |tick| tick.input.tick))
-    }
-
-    /// The ticks that can be re-executed.
-    ///
-    /// # Errors
-    /// The log has no such ticks.
-    pub fn replayable_ticks(&self) -> Result<&[v1::ControllerTick], RecordingError> {
-        match self.ticks.get(..self.ticks_unbroken) {
-            Some(ticks) if !ticks.is_empty() => Ok(ticks),
-            _ => {
-                Err(RecordingError::NoTicks { name: self.name.clone(), unreadable: self.unreadable.clone() })
-            }
-        }
+        let number = |place: usize| self.frames.get(place).map(|tick| tick.input.frame);
+        let before = number(self.frames_unbroken)?;
+        let after = self.frames_unbroken.checked_sub(1).and_then(number).unwrap_or(0);
+        Some(Gap { after, before })
     }
 
     /// The text of the profile that was flown.
@@ -306,22 +254,5 @@ impl Recording {
                 Err(RecordingError::ProfileUnusable { name: self.name.clone(), reason: error.to_string() })
             }
         }
-    }
-
-    /// The profile that was flown.
-    ///
-    /// # Errors
-    /// The log has no profile, or this build cannot use it.
-    pub fn profile(&self) -> Result<Profile, RecordingError> {
-        let text = self.profile_toml()?;
-        vehicles::profile::from_toml(text, "profile.toml").map_err(|error| RecordingError::ProfileUnusable {
-            name: self.name.clone(),
-            reason: explained(&error.to_string()),
-        })
-    }
-
-    /// The seed of the flight's dispersions, if the log has it.
-    pub fn seed(&self) -> Option<u64> {
-        self.head.run.get("seed")?.parse().ok()
     }
 }

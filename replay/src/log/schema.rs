@@ -25,11 +25,6 @@ static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
     pool
 });
 
-/// Describes a controller tick. `None` cannot happen as long as the crate's tests pass.
-pub(crate) fn tick_descriptor() -> Option<MessageDescriptor> {
-    POOL.get_message_by_name("touchdown.log.v1.ControllerTick")
-}
-
 /// Describes a frame of the flight computer.
 pub(crate) fn pilot_descriptor() -> Option<MessageDescriptor> {
     POOL.get_message_by_name("touchdown.flight.v1.PilotTick")
@@ -77,27 +72,25 @@ fn message_complaint(message: &DynamicMessage, path: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use prost::Message as _;
-    use protocol::log::v1;
+    use protocol::log::{flight_v1, v1};
 
     use super::*;
 
     #[test]
     fn every_record_is_described() {
-        for name in ["ControllerTick", "PlantTruth", "LandingVerdict", "Telemetry", "OperatorAction"] {
+        for name in ["LandingVerdict", "Telemetry", "OperatorAction"] {
             assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
         }
-        assert!(
-            tick_descriptor().is_some() && pilot_descriptor().is_some() && computer_descriptor().is_some()
-        );
+        assert!(pilot_descriptor().is_some() && computer_descriptor().is_some());
     }
 
     #[test]
     fn a_missing_field_is_named() {
-        let tick = "touchdown.log.v1.ControllerTick";
-        assert_eq!(complaint(tick, &v1::ControllerTick::default().encode_to_vec()), None);
+        let tick = "touchdown.flight.v1.PilotTick";
+        assert_eq!(complaint(tick, &flight_v1::PilotTick::default().encode_to_vec()), None);
         assert_eq!(complaint(tick, &[]).unwrap(), "input is missing; this build needs it");
         // Field 1, a message of no bytes.
-        assert_eq!(complaint(tick, &[0x0a, 0x00]).unwrap(), "input.tick is missing; this build needs it");
+        assert_eq!(complaint(tick, &[0x0a, 0x00]).unwrap(), "input.frame is missing; this build needs it");
     }
 
     #[test]

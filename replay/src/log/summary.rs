@@ -6,14 +6,14 @@ use std::path::Path;
 
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use protocol::log::reader::RECORD_LIMIT_BYTES;
-use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK};
+use protocol::log::record::TOPIC_PILOT_TICK;
 
 /// Facts from a file's summary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SummaryFacts {
     /// Messages in the file.
     pub message_count: u64,
-    /// Of these, controller ticks and flight computer frames.
+    /// Of these, frames of the flight computer.
     pub ticks: u64,
     /// Time of the last message, ns since the Unix epoch.
     pub last_log_time_ns: u64,
@@ -23,12 +23,8 @@ pub struct SummaryFacts {
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     let summary = read_summary(path)?;
     let stats = summary.stats?;
-    let is_tick = |id: &u16| {
-        let channel = summary.channels.get(id);
-        channel.is_some_and(|channel| {
-            [TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK].contains(&channel.topic.as_str())
-        })
-    };
+    let is_tick =
+        |id: &u16| summary.channels.get(id).is_some_and(|channel| channel.topic == TOPIC_PILOT_TICK);
     let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_tick(id));
     Some(SummaryFacts {
         message_count: stats.message_count,

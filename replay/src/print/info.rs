@@ -7,7 +7,7 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use super::{counted, shown};
-use crate::info::{ChannelFacts, FrameFacts, Info, Named, PhaseSource, PhaseTimeline, SolveTimes, TickFacts};
+use crate::info::{ChannelFacts, FrameFacts, Info, PhaseSource, PhaseTimeline, SolveTimes};
 
 /// Writes a description of a log as text.
 ///
@@ -41,9 +41,6 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
         print_phases(timeline, output)?;
     }
     print_verdict(info, output)?;
-    if let Some(ticks) = &info.ticks {
-        print_ticks(ticks, output)?;
-    }
     if let Some(frames) = &info.frames {
         print_frames(frames, output)?;
     }
@@ -77,9 +74,6 @@ fn completeness(info: &Info) -> String {
             Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
         });
         faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
-    }
-    if found.ticks_missing > 0 {
-        faults.push(format!("{} missing", counted(found.ticks_missing, "tick")));
     }
     if found.messages_lost > 0 {
         faults.push(format!("{} lost", counted(found.messages_lost, "message")));
@@ -170,29 +164,6 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn print_ticks(ticks: &TickFacts, output: &mut impl Write) -> io::Result<()> {
-    let TickFacts { count, first, last, first_time_s, last_time_s, .. } = ticks;
-    row(
-        output,
-        "ticks",
-        &format!(
-            "{count}, from {first} ({first_time_s:.3} s) to {last} ({last_time_s:.3} s), {}",
-            gaps_text(ticks)
-        ),
-    )?;
-    if ticks.repeated > 0 {
-        row(output, "", &format!("{} repeated", ticks.repeated))?;
-    }
-    row(output, "levels", &names_text(&ticks.levels))?;
-    row(output, "solver", &names_text(&ticks.solver_statuses))?;
-    let dropped = ticks.outputs_dropped;
-    row(
-        output,
-        "solve time",
-        &format!("{}, {dropped} dropped as too late", solve_time_text(&ticks.solve_time)),
-    )
-}
-
 fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> {
     let FrameFacts { first, last, restarts, lost, repeated, start, solve_time, .. } = frames;
     let start = if *start { "" } else { ", start NOT RECORDED" };
@@ -221,18 +192,6 @@ fn solve_time_text(times: &SolveTimes) -> String {
         times.deadline_s * 1e3,
         times.over_deadline
     )
-}
-
-fn gaps_text(ticks: &TickFacts) -> String {
-    let Some(first) = ticks.gaps.first() else {
-        return "no gaps".to_owned();
-    };
-    let missing = counted(ticks.missing, "tick");
-    format!("{missing} MISSING, first between {} and {}", first.after, first.before)
-}
-
-fn names_text(names: &[Named]) -> String {
-    names.iter().map(|named| format!("{} {}", named.name, named.ticks)).collect::<Vec<_>>().join(", ")
 }
 
 fn print_channels(channels: &[ChannelFacts], output: &mut impl Write) -> io::Result<()> {

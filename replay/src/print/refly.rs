@@ -43,21 +43,19 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     if let Some(seed) = report.seed {
         writeln!(output, "plant drawn with seed {seed} instead of the recorded one")?;
     }
-    if let Some(Reached { frames, identical, first_different }) = report.reached {
+    let Reached { frames, identical, first_different } = report.reached;
+    writeln!(
+        output,
+        "flown again from its start up to there: {identical} of {frames} recorded frames identical"
+    )?;
+    if let Some(frame) = first_different {
         writeln!(
             output,
-            "flown again from its start up to there: {identical} of {frames} recorded frames identical"
+            "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
         )?;
-        if let Some(frame) = first_different {
-            writeln!(
-                output,
-                "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
-            )?;
-        }
     }
     match report.law {
         Law::AsRecorded => {}
-        Law::Stabiliser => writeln!(output, "with the upright law instead of the landing controller")?,
         law => writeln!(output, "with the landing burn flown by {}", law.name())?,
     }
     print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;

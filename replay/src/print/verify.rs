@@ -157,18 +157,17 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
 
 /// Prints the first diverged tick, the ticks 1, 2, 4, 8 and so on after it, the worst tick and the last tick.
 fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "how it grows (gimbal command, predicted touchdown, worst field):")?;
+    writeln!(output, "how it grows (gimbal command, worst field):")?;
     let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
     let mut shown: Vec<&GrowthStep> = doubling.filter_map(|place| growth.steps.get(place)).collect();
     shown.extend(growth.peak.iter().chain(&growth.last));
     shown.sort_by_key(|step| step.tick);
     shown.dedup_by_key(|step| step.tick);
     for step in shown {
-        let touchdown = step.touchdown_m.map_or_else(|| "-".to_owned(), |metres| format!("{metres:.3e} m"));
         let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
         writeln!(
             output,
-            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {touchdown:>12}  {ulps} ULP in {}",
+            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {ulps} ULP in {}",
             step.tick,
             step.time_s,
             step.gimbal_rad,

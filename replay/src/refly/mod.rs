@@ -1,58 +1,46 @@
 //! Closed loop: the flight flown again in simulation from a chosen moment, with other settings.
 //!
-//! For a planar landing, the simulated plant starts in the recorded state of that moment (position, motion, servos,
-//! time since ignition) and the controller with the memory it had then. Both continue to the ground. Nothing of the
-//! record is used after the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate)
-//! answers what the controller alone *would have commanded* on the recorded inputs. With nothing changed, a simulated
-//! flight is reproduced bit for bit.
-//!
-//! For a flight from apogee, the recorded truth is not enough, because no log holds the internal states of gusts,
-//! servos and sensors. So the flight is flown again from its start, with the recorded draw and seed, up to that moment,
-//! and compared with the record frame by frame on the way. From there on the changed settings apply to world and flight
-//! computer.
+//! The recorded truth is not enough, because no log holds the internal states of gusts, servos and sensors. So the flight
+//! is flown again from its start, with the recorded draw and seed, up to that moment, and compared with the record frame
+//! by frame on the way. From there on the changed settings apply to world and flight computer. Nothing of the record is
+//! used after the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate) answers what the
+//! flight computer alone *would have commanded* on the recorded inputs. With nothing changed, a simulated flight is
+//! reproduced bit for bit.
 //!
 //! Faults may be added and taken away ("would it have landed without the GNSS outage?"): then the flight is flown from
 //! its beginning with the other faults, and the settings apply from the start, as always.
 //!
-//! Settings change both controller and plant. Settings "of the plant" change the plant only, timed ones the controller
-//! only. An abort under thrust is flown if the record had it at the start; in a flight from apogee, the crew's abort
-//! comes at its recorded frame. Only a flight from apogee has wind (`truth.wind_m_s`); the planar plant has none.
+//! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
+//! computer only. The crew's abort comes at its recorded frame.
 
-mod apogee;
-mod planar;
 mod prepared;
-mod simulation;
-mod start;
+mod rerun;
 mod write;
 
 pub use prepared::Prepared;
-pub use simulation::{ReflownFlight, ReflownTick};
-pub use start::{From, StartAt, StartState};
 pub use write::{ReflyLogError, write_log};
 
-use flight::computer::plane::PlaneError;
+use std::collections::BTreeMap;
+
+use flight::rules::phase::Phase;
+use protocol::log::record::Record;
+use protocol::log::v1;
 use serde::Serialize;
 use sim::sortie::SetUpError;
-use tick_log::TickLogError;
 use world::world::WorldError;
 
 use crate::info::VerdictFacts;
-use crate::log::{FlightKind, Recording, RecordingError};
+use crate::log::{Recording, RecordingError};
 use crate::settings::{Setting, SettingError};
-
-/// Key of the run fact that holds the plant's settings in the log of a re-flown flight.
-const RUN_PLANT_SETTINGS: &str = "plant_settings";
 
 /// The controller that flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// As recorded: the landing controller, with a latched abort if there was one; the upright law if it flew alone.
+    /// As recorded.
     #[default]
     AsRecorded,
-    /// The upright law alone; for planar landings only.
-    Stabiliser,
-    /// The pilot itself. This law and the laws below are for flights from apogee only.
+    /// The pilot itself.
     Nmpc,
     /// Ignition and fins at times fixed in advance.
     OpenLoop,
@@ -65,12 +53,50 @@ impl Law {
     pub fn name(self) -> &'static str {
         match self {
             Self::AsRecorded => "as-recorded",
-            Self::Stabiliser => "stabiliser",
             Self::Nmpc => "nmpc",
             Self::OpenLoop => "open-loop",
             Self::Oscillating => "oscillating",
         }
     }
+}
+
+/// Where to begin.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum StartAt {
+    /// The first frame of the landing.
+    #[default]
+    Landing,
+    Tick(u64),
+    /// The first frame at or after this vehicle time, s.
+    Time(f64),
+    /// The frame after the one that entered this phase.
+    Phase(Phase),
+}
+
+/// Which recorded state to begin from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum From {
+    /// The simulated world's.
+    #[default]
+    Truth,
+    /// The flight computer's estimate.
+    Estimate,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StartState {
+    /// The first frame flown again.
+    pub tick: u64,
+    /// Its vehicle time, s.
+    pub time_s: f64,
+    pub phase: &'static str,
+    /// The recorded state that was used.
+    pub from: From,
+    /// Horizontal distance from the pad, m.
+    pub x_m: f64,
+    /// Altitude, m.
+    pub z_m: f64,
 }
 
 /// Options of a re-flown flight.
@@ -116,13 +142,7 @@ pub enum ReflyError {
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The profile needs something that the simulation cannot do.
-    #[error(transparent)]
-    Vehicle(#[from] PlaneError),
-    /// This build cannot interpret a recorded input.
-    #[error(transparent)]
-    Input(#[from] TickLogError),
-    /// The requested start is not in the log, or not part of a landing.
+    /// The requested start is not in the log.
     #[error("{name}: {reason}")]
     Start {
         /// The file.
@@ -130,13 +150,13 @@ pub enum ReflyError {
         /// What was requested and what the log has.
         reason: String,
     },
-    /// The flight from apogee cannot be set up.
+    /// The flight cannot be set up.
     #[error(transparent)]
     Flight(#[from] SetUpError),
     /// The world cannot be changed this way at the start.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// The log does not say how its flight from apogee was flown, or this build does not know it.
+    /// The log does not say how its flight was flown, or this build does not know it.
     #[error("{name}: cannot be flown again from its start: {reason}")]
     Recipe {
         /// The file.
@@ -150,18 +170,6 @@ pub enum ReflyError {
         /// The file.
         name: String,
         reason: String,
-    },
-    /// The request applies only to another kind of flight.
-    #[error("{what} is only for {of}; {name} is {is}")]
-    OtherKind {
-        /// The file.
-        name: String,
-        /// The request.
-        what: String,
-        /// The kind of flight that has it.
-        of: &'static str,
-        /// The kind of this flight.
-        is: &'static str,
     },
     /// A setting of the controller given to the plant, or the other way round.
     #[error("{setting}: {belongs}")]
@@ -206,9 +214,9 @@ pub struct ReflyReport {
     /// The seed of the plant's draw, if it is not the recorded one.
     pub seed: Option<u64>,
     pub start: StartState,
-    /// For a flight from apogee: how the frames before the start compare with the record.
-    pub reached: Option<Reached>,
-    /// True thrust over nominal thrust; for a flight from apogee, impulse over certified impulse.
+    /// How the frames before the start compare with the record.
+    pub reached: Reached,
+    /// True impulse over certified impulse.
     pub thrust_scale: f64,
     /// The recorded verdict.
     pub recorded: Option<VerdictFacts>,
@@ -229,18 +237,23 @@ pub struct ReflyReport {
     pub gimbal_difference_max_rad: f64,
 }
 
+/// A re-flown flight.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReflownFlight {
+    /// All its records, with vehicle times, s.
+    pub records: Vec<(f64, Record)>,
+    /// Facts that its log has in addition to those of the recorded flight.
+    pub run: BTreeMap<String, String>,
+    /// The landing verdict; `None` if it did not come down.
+    pub verdict: Option<v1::LandingVerdict>,
+}
+
 /// Whether a flight can be flown again at all.
 ///
 /// # Errors
 /// The log lacks what is needed, or this build cannot use it.
 pub fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
-    match recording.kind() {
-        FlightKind::InSpace => apogee::can_be_flown(recording),
-        FlightKind::Planar => {
-            recording.replayable_ticks()?;
-            Ok(recording.profile().map(|_| ())?)
-        }
-    }
+    rerun::Recorded::of(recording).map(|_| ())
 }
 
 /// Flies a recorded flight again.
@@ -266,38 +279,6 @@ pub fn refly_flight(
 fn refuse_timed(plant_settings: &[Setting]) -> Result<(), ReflyError> {
     let timed = plant_settings.iter().find(|setting| setting.at_s.is_some());
     timed.map_or(Ok(()), |timed| Err(ReflyError::TimedPlant { setting: timed.to_string() }))
-}
-
-/// The report of a re-flown flight, without the fields that only one kind of flight has.
-fn report(
-    recording: &Recording,
-    options: &ReflyOptions,
-    start: StartState,
-    recorded: Option<VerdictFacts>,
-    reflown: Option<VerdictFacts>,
-) -> ReflyReport {
-    let verdict_changed =
-        recorded.as_ref().map(|then| Some(then.landed) != reflown.as_ref().map(|now| now.landed));
-    ReflyReport {
-        kind: "closed loop: flown again in simulation",
-        file: recording.name.clone(),
-        settings: options.settings.iter().map(ToString::to_string).collect(),
-        plant_settings: options.plant_settings.iter().map(ToString::to_string).collect(),
-        law: options.law,
-        faults: options.faults.clone(),
-        seed: options.seed,
-        start,
-        reached: None,
-        thrust_scale: 1.0,
-        recorded,
-        margin: reflown.as_ref().map(margin),
-        reflown,
-        verdict_changed,
-        ticks: 0,
-        commands_recorded: 0,
-        commands_identical: 0,
-        gimbal_difference_max_rad: 0.0,
-    }
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].

@@ -1,31 +1,114 @@
-//! Prepares a recorded flight to be flown again many times from the same moment.
+//! A recorded flight at the moment it is flown again from: with the recorded draw up to there, then with the changed
+//! settings, as often as is asked.
 
-use super::{From, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, apogee, planar};
-use crate::log::{FlightKind, Recording};
-use crate::settings::{is_whole, is_whole_in_mission, mission_value_of, value_of};
+use std::collections::BTreeMap;
+
+use flight::computer::FRAME_S;
+use flight::guidance::baseline::{Controller, Law as BurnLaw};
+use flight::rules::phase::Phase;
+use prost::Message as _;
+use protocol::log::flight_v1;
+use protocol::log::record::Record;
+use sim::dispersion::Dispersion;
+use sim::draw::draw;
+use tick_log::pilot::tick_to_log;
+use tick_log::sortie::{self, pilot_start};
+use world::Truth;
+
+use super::rerun::{Recorded, Rerun};
+use super::{
+    From, Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, StartAt, StartState, margin,
+    refuse_timed,
+};
+use crate::controller::{LoggedPilot, Moment, Replayed as _, SETTINGS_IN_FLIGHT};
+use crate::info::VerdictFacts;
+use crate::log::Recording;
+use crate::settings::{Setting, is_whole_in_mission, mission_value_of, mission_with, truth_with};
+
+/// Number and time of a record that is kept.
+type Kept = Vec<(f64, Record)>;
 
 /// A recorded flight at the moment it is flown again from.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     recording: &'a Recording,
-    /// For a flight from apogee: already flown to the start.
-    at_start: Option<Box<apogee::AtStart<'a>>>,
+    pilot_start: &'a flight_v1::PilotStart,
+    frames: &'a [flight_v1::PilotTick],
+    dispersion: Dispersion,
+    number: u64,
+    truth: Truth,
+    rerun: Rerun,
+    first_frame: u64,
+    state: StartState,
+    reached: Reached,
+    recorded: Option<VerdictFacts>,
 }
 
 impl<'a> Prepared<'a> {
-    /// Prepares a flight; only the start is taken from the options.
+    /// Flies up to the start; only the start is taken from the options.
     ///
     /// # Errors
     /// See [`ReflyError`].
     pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
-        let at_start = match recording.kind() {
-            FlightKind::InSpace => Some(Box::new(apogee::AtStart::new(recording, options)?)),
-            FlightKind::Planar => {
-                recording.replayable_ticks()?;
-                None
+        let (pilot_start, frames) = recording.recorded_frames()?;
+        let Recorded { dispersion, number, mut rerun, .. } = Recorded::of(recording)?;
+        let place = find(recording, frames, &options.start)?;
+        let first_frame = frames[place].input.frame;
+        let mut reached = Reached { frames: 0, identical: 0, first_different: None };
+        while rerun.flight.frame() + 1 < first_frame && rerun.step() {
+            let flight = &rerun.flight;
+            if let Some((input, piloted)) = rerun.piloted()
+                && let Some(then) = recorded_frame(&frames[..place], flight.frame())
+            {
+                reached.frames += 1;
+                let now = tick_to_log(input, piloted, flight.computer().flight_digest());
+                if now.encode_to_vec() == then.encode_to_vec() {
+                    reached.identical += 1;
+                } else {
+                    reached.first_different.get_or_insert(then.input.frame);
+                }
             }
+        }
+        let recorded = match &recording.verdict {
+            Some(verdict) => Some(VerdictFacts::of(verdict)),
+            // For an older log of a whole flight: its outcome without changes, if this build still flies the same
+            // flight.
+            None if reached.first_different.is_none() && frames.last().is_some_and(is_down) => {
+                let mut as_it_was = rerun.clone();
+                while as_it_was.step() {}
+                sortie::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
+            }
+            None => None,
         };
-        Ok(Self { recording, at_start })
+        if options.from == From::Estimate {
+            put_where_it_believes(recording, &mut rerun, first_frame)?;
+        }
+        let world = rerun.flight.world();
+        let place_m = world.state().position_m;
+        let before = place
+            .checked_sub(1)
+            .map_or("DEPLOY", |before| phase_of(&frames[before]).map_or("unknown", Phase::name));
+        let state = StartState {
+            tick: first_frame,
+            time_s: frames[place].input.time_s,
+            phase: before,
+            from: options.from,
+            x_m: libm::hypot(place_m.x, place_m.y),
+            z_m: world.height_m(),
+        };
+        Ok(Self {
+            recording,
+            pilot_start,
+            frames,
+            dispersion,
+            number,
+            truth: *world.truth(),
+            first_frame,
+            state,
+            reached,
+            recorded,
+            rerun,
+        })
     }
 
     /// The flight.
@@ -38,21 +121,7 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// See [`ReflyError`].
     pub fn fly(&self, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
-        match &self.at_start {
-            Some(at_start) => Ok(at_start.fly(options, None)?.0),
-            None => Ok(planar::fly(self.recording, options)?.0),
-        }
-    }
-
-    /// Flies it again and keeps the flight itself.
-    ///
-    /// # Errors
-    /// See [`ReflyError`].
-    pub fn fly_kept(&self, options: &ReflyOptions) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-        match &self.at_start {
-            Some(at_start) => at_start.fly_kept(options),
-            None => planar::fly(self.recording, options),
-        }
+        Ok(self.fly_on(options, None)?.0)
     }
 
     /// Whether this build, with nothing changed, flies it as recorded: up to the start, and also after it if the start
@@ -61,7 +130,7 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// See [`ReflyError`].
     pub fn is_reproduced(&self, options: &ReflyOptions) -> Result<bool, ReflyError> {
-        if self.at_start.as_ref().is_some_and(|at_start| at_start.reached().first_different.is_some()) {
+        if self.reached.first_different.is_some() {
             return Ok(false);
         }
         if options.from == From::Estimate {
@@ -78,16 +147,289 @@ impl<'a> Prepared<'a> {
     /// The flight has no setting of this name.
     pub fn is_whole(&self, path: &str) -> Result<bool, ReflyError> {
         let toml = self.recording.profile_toml()?;
-        Ok(if self.at_start.is_some() { is_whole_in_mission(toml, path)? } else { is_whole(toml, path)? })
+        Ok(is_whole_in_mission(toml, path)?)
     }
 
     /// The number that a setting has in the recorded flight.
     pub fn number_of(&self, path: &str) -> Option<f64> {
         let toml = self.recording.profile_toml().ok()?;
-        let value = match &self.at_start {
-            Some(at_start) => mission_value_of(toml, at_start.truth(), path)?,
-            None => value_of(toml, path)?,
-        };
+        let value = mission_value_of(toml, &self.truth, path)?;
         value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
     }
+
+    /// Continues the flight to its end; keeps the frames if a place for them is given.
+    fn fly_on(
+        &self,
+        options: &ReflyOptions,
+        mut kept: Option<&mut Kept>,
+    ) -> Result<(ReflyReport, Option<protocol::log::v1::LandingVerdict>), ReflyError> {
+        let mut rerun = self.changed(options)?;
+        let (mut ticks, mut commands_recorded, mut commands_identical) = (0, 0, 0);
+        let mut gimbal_difference_max_rad = 0.0_f64;
+        let mut phase = rerun.flight.computer().mode().phase;
+        loop {
+            let goes_on = rerun.step();
+            let flight = &rerun.flight;
+            if let Some((_, piloted)) = rerun.piloted() {
+                ticks += 1;
+                if let Some(then) = recorded_frame(self.frames, flight.frame()) {
+                    let then = &then.output.gimbal_rad;
+                    let pairs = || then.iter().zip(&piloted.gimbal_rad);
+                    commands_recorded += 1;
+                    commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
+                    let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    gimbal_difference_max_rad = gimbal_difference_max_rad.max(apart_rad);
+                }
+            }
+            if let Some(kept) = &mut kept {
+                keep(kept, &rerun, phase);
+            }
+            phase = rerun.flight.computer().mode().phase;
+            if !goes_on {
+                break;
+            }
+        }
+        let verdict = sortie::verdict(&rerun.flight);
+        let reflown = verdict.as_ref().map(VerdictFacts::of);
+        let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
+        let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+        let report = ReflyReport {
+            kind: "closed loop: flown again in simulation",
+            file: self.recording.name.clone(),
+            settings: listed(&options.settings),
+            plant_settings: listed(&options.plant_settings),
+            law: options.law,
+            faults: options.faults.clone(),
+            seed: options.seed,
+            start: self.state,
+            reached: self.reached,
+            thrust_scale: rerun.flight.world().truth().impulse_scale,
+            verdict_changed: landed(&self.recorded).map(|then| Some(then) != landed(&reflown)),
+            recorded: self.recorded.clone(),
+            margin: reflown.as_ref().map(margin),
+            reflown,
+            ticks,
+            commands_recorded,
+            commands_identical,
+            gimbal_difference_max_rad,
+        };
+        Ok((report, verdict))
+    }
+
+    /// Continues the flight to its end and keeps everything from apogee on. The frames before the start are the
+    /// re-flown ones, too: recorded frames may come from another build or be partly lost, and the flight after the
+    /// start would not continue them.
+    ///
+    /// # Errors
+    /// See [`ReflyError`].
+    pub fn fly_kept(&self, options: &ReflyOptions) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+        let Recorded { mut rerun, faults, .. } = Recorded::with_faults(self.recording, &options.faults)?;
+        let flight_v1::PilotStart { believed, gyro_bias_rad_s, .. } = pilot_start(&rerun.flight);
+        let start = flight_v1::PilotStart { believed, gyro_bias_rad_s, ..*self.pilot_start };
+        let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
+        let mut phase = rerun.flight.computer().mode().phase;
+        while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {
+            keep(&mut records, &rerun, phase);
+            phase = rerun.flight.computer().mode().phase;
+        }
+        let (report, verdict) = self.fly_on(options, Some(&mut records))?;
+        let mut run = self.run_facts(options)?;
+        run.insert("faults".to_owned(), faults);
+        Ok((report, ReflownFlight { records, run, verdict }))
+    }
+
+    /// Facts that the log of this flight has in addition to those of the recorded flight.
+    fn run_facts(&self, options: &ReflyOptions) -> Result<BTreeMap<String, String>, ReflyError> {
+        let lines: Vec<String> = self.in_flight(options)?.iter().map(ToString::to_string).collect();
+        Ok(BTreeMap::from([(SETTINGS_IN_FLIGHT.to_owned(), lines.join("\n"))]))
+    }
+
+    /// The settings as timed ones. None applies before the start (half a frame before the end of its first frame),
+    /// because until then the flight is the recorded one. If another controller of the landing burn is requested, its
+    /// ignition height is included.
+    fn in_flight(&self, options: &ReflyOptions) -> Result<Vec<Setting>, ReflyError> {
+        let start_s = (self.first_frame as f64 - 0.5) * FRAME_S;
+        let mut in_flight = options.settings.clone();
+        // Of two settings that take effect at the start, the later setting wins, as it would have in flight.
+        in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
+        for setting in &mut in_flight {
+            setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
+        }
+        if let Some(controller) = Self::other_controller(options) {
+            let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
+            let fixed_m = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
+            let height_m = BurnLaw::of(controller, &mission).ignition_height_m();
+            if let (Some(height_m), None) = (height_m, fixed_m) {
+                in_flight.push(Setting {
+                    path: "ignition.fixed_height_m".to_owned(),
+                    value: toml::Value::Float(height_m),
+                    at_s: Some(start_s),
+                });
+            }
+        }
+        Ok(in_flight)
+    }
+
+    /// The requested controller of the landing burn, if it differs from the recorded controller.
+    fn other_controller(options: &ReflyOptions) -> Option<Controller> {
+        match options.law {
+            Law::AsRecorded => None,
+            Law::Nmpc => Some(Controller::Nmpc),
+            Law::OpenLoop => Some(Controller::OpenLoop),
+            Law::Oscillating => Some(Controller::Oscillating),
+        }
+    }
+
+    /// The flight at the start. With other faults it is flown there anew, and may have come another way.
+    fn with_other_faults(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
+        if options.faults.is_none() {
+            return Ok(self.rerun.clone());
+        }
+        let Recorded { mut rerun, .. } = Recorded::with_faults(self.recording, &options.faults)?;
+        while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {}
+        if options.from == From::Estimate {
+            put_where_it_believes(self.recording, &mut rerun, self.first_frame)?;
+        }
+        Ok(rerun)
+    }
+
+    /// The flight at the start, with the changes that apply from there.
+    fn changed(&self, options: &ReflyOptions) -> Result<Rerun, ReflyError> {
+        refuse_timed(&options.plant_settings)?;
+        let toml = self.recording.profile_toml()?;
+        let estimator = |setting: &&Setting| setting.path.starts_with("estimator.");
+        if let Some(setting) = options.settings.iter().find(estimator) {
+            let reason = format!("{setting}: the estimator is set up at apogee; evaluate takes it");
+            return Err(ReflyError::Recipe { name: self.recording.name.clone(), reason });
+        }
+        refuse_misplaced(options)?;
+        let mut rerun = self.with_other_faults(options)?;
+        let in_flight = self.in_flight(options)?;
+        rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
+
+        // The world gets its airframe from all settings without a time, and its draw from the settings of the draw.
+        let lasting = lasting(options);
+        let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
+            options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
+        let all: Vec<Setting> = lasting.iter().chain(&of_mission).cloned().collect();
+        let true_mission = mission_with(toml, &all)?;
+        if let Some(controller) = Self::other_controller(options) {
+            let believed = mission_with(toml, &lasting)?;
+            rerun.flight.set_law(BurnLaw::of(controller, &believed));
+        }
+        let other_draw =
+            options.seed.map(|seed| draw(&true_mission, &self.dispersion, seed, self.number).truth);
+        let truth = truth_with(&other_draw.unwrap_or(self.truth), &of_truth)?;
+        let world = rerun.flight.world();
+        if truth != *world.truth() || true_mission.airframe != *world.airframe() {
+            let changed = world.changed(&true_mission.airframe, &true_mission.motor_curve, &truth)?;
+            *rerun.flight.world_mut() = changed;
+        }
+        Ok(rerun)
+    }
+}
+
+/// The plant takes settings of the airframe and of the draw; the controller takes all but those of the draw.
+fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
+    let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
+    let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
+    if let Some(setting) = options.settings.iter().find(of_truth) {
+        let belongs = "the random draw belongs to the plant alone (--plant, --vary-plant, --of-plant)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {
+        let belongs =
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set, --vary)";
+        return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
+    }
+    Ok(())
+}
+
+/// Keeps the frame just flown; `phase` is the phase before it.
+fn keep(kept: &mut Kept, rerun: &Rerun, phase: Phase) {
+    let time_s = rerun.flight.frame() as f64 * FRAME_S;
+    kept.extend(sortie::frame_and_phase(&rerun.flight, phase).into_iter().map(|record| (time_s, record)));
+}
+
+/// The settings without a time.
+fn lasting(options: &ReflyOptions) -> Vec<Setting> {
+    options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect()
+}
+
+/// Whether a frame's flight computer has noticed that it is on the ground.
+fn is_down(tick: &flight_v1::PilotTick) -> bool {
+    matches!(phase_of(tick), Some(Phase::Touchdown | Phase::Safed))
+}
+
+fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
+    u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
+}
+
+/// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
+/// cannot act earlier.
+fn find(
+    recording: &Recording,
+    frames: &[flight_v1::PilotTick],
+    start: &StartAt,
+) -> Result<usize, ReflyError> {
+    let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
+        let entered = frames.iter().position(|tick| phase_of(tick).is_some_and(wanted))?;
+        Some(entered + 1).filter(|place| *place < frames.len())
+    };
+    let found = match start {
+        StartAt::Landing => in_phase(&Phase::is_landing),
+        StartAt::Tick(number) => frames.iter().position(|tick| tick.input.frame == *number),
+        StartAt::Time(time_s) => frames.iter().position(|tick| tick.input.time_s >= *time_s),
+        StartAt::Phase(phase) => in_phase(&|found| found == *phase),
+    };
+    found.ok_or_else(|| {
+        let first = frames.first().map(LoggedPilot::moment);
+        let last = frames.last().map(LoggedPilot::moment);
+        let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
+        let reason = match start {
+            StartAt::Landing => {
+                "no frame of a landing to start from; a frame, a time or a phase names another moment"
+                    .to_owned()
+            }
+            StartAt::Tick(asked) => {
+                format!("no frame {asked}; there are {} to {}", number(first), number(last))
+            }
+            StartAt::Time(time_s) => {
+                format!(
+                    "no frame at or after {time_s} s; the last is at {:.3} s",
+                    last.map_or(0.0, |moment| moment.time_s)
+                )
+            }
+            StartAt::Phase(phase) => format!("no frame in phase {}", phase.name()),
+        };
+        ReflyError::Start { name: recording.name.clone(), reason }
+    })
+}
+
+/// Puts the vehicle at the position that its flight computer estimated at the end of the frame before the start.
+fn put_where_it_believes(
+    recording: &Recording,
+    rerun: &mut Rerun,
+    first_frame: u64,
+) -> Result<(), ReflyError> {
+    let refused =
+        |reason: &str| ReflyError::Start { name: recording.name.clone(), reason: reason.to_owned() };
+    let Some(estimate) = rerun.flight.pilot().estimate().filter(|_| first_frame > 1) else {
+        return Err(refused("before its first frame the flight computer has estimated nothing yet"));
+    };
+    let world = rerun.flight.world();
+    if world.touchdown().is_some() {
+        return Err(refused(
+            "it is already on the ground; --from estimate can place only a vehicle in flight",
+        ));
+    }
+    let placed = world.placed(&estimate.state)?;
+    *rerun.flight.world_mut() = placed;
+    Ok(())
+}
+
+/// A recorded frame by its number; a log may have lost it.
+fn recorded_frame(frames: &[flight_v1::PilotTick], number: u64) -> Option<&flight_v1::PilotTick> {
+    let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
+    frames.get(place)
 }

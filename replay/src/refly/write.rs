@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriteError};
 
-use super::{Law, RUN_PLANT_SETTINGS, ReflownFlight, ReflyOptions, ReflyReport};
+use super::{Law, ReflownFlight, ReflyOptions, ReflyReport};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};
-use crate::log::{FlightKind, NewLog, NewLogError, Recording};
+use crate::log::{NewLog, NewLogError, Recording};
 use crate::output::Destination;
-use crate::settings::{Setting, profile_toml_with};
 
 /// Why a log could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -70,40 +69,27 @@ fn header(
         run.insert(REFLOWN_BY.to_owned(), report.law.name().to_owned());
     }
     run.extend(flight.run.clone());
-    let before = run.remove(RUN_PLANT_SETTINGS).unwrap_or_default();
-    let plant = before.split_whitespace().chain(report.plant_settings.iter().map(String::as_str));
-    run.insert(RUN_PLANT_SETTINGS.to_owned(), plant.collect::<Vec<_>>().join(" "));
+    run.insert("plant_settings".to_owned(), report.plant_settings.join(" "));
     run.retain(|_, fact| !fact.is_empty());
     if let Some(seed) = options.seed {
         run.insert("seed".to_owned(), seed.to_string());
         let before = recording.head.run.get("seed").map_or("not recorded", String::as_str);
         run.insert("reflown_instead_of_seed".to_owned(), before.to_owned());
     }
-    let lasting: Vec<Setting> =
-        options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-    let profile = recording.profile_toml().ok().and_then(|toml| match recording.kind() {
-        // It keeps its mission from the start record; its settings change in flight.
-        FlightKind::InSpace => Some(toml.to_owned()),
-        FlightKind::Planar => profile_toml_with(toml, &lasting).ok(),
-    });
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
     LogHeader {
         writer: "replay".to_owned(),
         start_unix_ns: start.unwrap_or(0),
         run,
-        profile_toml: profile,
+        // It keeps its mission; its settings change in flight.
+        profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     }
 }
 
 /// Every record with its vehicle time, s, in order.
 fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
-    let ticks = flight.before.iter().chain(flight.ticks.iter().map(|tick| &tick.record));
-    let mut records: Vec<(f64, Record)> =
-        ticks.map(|tick| (tick.input.time_s, Record::from(tick.clone()))).collect();
-    records.extend(flight.records.iter().cloned());
-    records
-        .extend(flight.truth.iter().map(|truth| (truth.time_s, Record::PlantTruth(Box::new(truth.clone())))));
+    let mut records = flight.records.clone();
     let began = Event {
         level: EventLevel::Info,
         name: "replay".to_owned(),

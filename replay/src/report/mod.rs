@@ -2,9 +2,8 @@
 //!
 //! The verdict comes first, each value against its limit; then what led to it: phases, path, states, input, tracking,
 //! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. If the log lacks something,
-//! the section says so. A flight from apogee is shown in the plane of its landing.
+//! the section says so. A flight is shown in the plane of its landing.
 
-mod apogee;
 mod axis;
 mod chart;
 mod html;
@@ -15,8 +14,8 @@ mod track;
 use std::path::Path;
 
 use crate::info::{Completeness, Info, info};
-use crate::log::{FlightKind, Recording, RecordingError};
-use track::{Flight, plans_of};
+use crate::log::{Recording, RecordingError};
+use track::Flight;
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -56,9 +55,6 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
-    let flight = match recording.kind() {
-        FlightKind::InSpace => apogee::flight(recording),
-        FlightKind::Planar => Flight::new(recording, plans_of(path)?),
-    };
+    let flight = Flight::of(recording);
     Ok((flight, info))
 }

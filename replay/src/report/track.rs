@@ -1,12 +1,23 @@
-//! A recorded flight, prepared for the report.
+//! A recorded flight, prepared for the report and seen in the plane of its landing.
+//!
+//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them. Plans are
+//! made in the frame of the moving air; here they are converted to the ground.
 
-use std::path::Path;
-
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
+use flight::estimation::estimator::Estimate;
+use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::{Plane, PoweredReport};
 use flight::rules::phase::Phase;
-use flight::vehicle::profile::Profile;
-use protocol::log::v1;
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
+use nalgebra::Vector3;
+use protocol::log::{flight_v1, v1};
+use tick_log::pilot::{state_from_log, vector_from_log};
 
-use crate::log::{Entry, FlightLog, LogError, Recording};
+use crate::controller::{LoggedPilot, NewPlans, Replayed as _};
+use crate::log::Recording;
 
 /// Prediction times at which predictions are compared with the flight, s.
 pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
@@ -14,7 +25,10 @@ pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
 /// A plan that ends this far below the ground ends on it, m.
 const GROUND_M: f64 = 0.05;
 
-pub(super) const PLANS_DRAWN: usize = 8;
+const PLANS_DRAWN: usize = 8;
+
+/// Records of the world this close to a frame belong to the same moment, s.
+const SAME_MOMENT_S: f64 = 1e-4;
 
 /// The state of the flight at one time.
 #[derive(Debug, Clone, Copy)]
@@ -26,10 +40,32 @@ pub(super) struct Sample {
     pub(super) state: [f64; 6],
 }
 
-/// A summary of one tick's plan.
+/// The simulated world at one time.
+#[derive(Debug, Clone)]
+pub(super) struct Plant {
+    pub(super) sample: Sample,
+    pub(super) fins_rad: Vec<f64>,
+    pub(super) thrust_n: f64,
+    pub(super) mass_kg: f64,
+    pub(super) in_contact: bool,
+}
+
+/// What the flight computer estimated and decided at a planning frame.
+#[derive(Debug, Clone)]
+pub(super) struct Thought {
+    /// The estimated state.
+    pub(super) sample: Sample,
+    /// The index of the control level.
+    pub(super) level: u32,
+    pub(super) iterations: usize,
+    /// The touchdown that a plan made at this frame predicts: time from now, s, and state.
+    pub(super) touchdown: Option<(f64, [f64; 6])>,
+}
+
+/// A summary of one plan.
 #[derive(Debug, Clone)]
 pub(super) struct PlanSample {
-    /// Vehicle time of the tick, s.
+    /// Vehicle time of its frame, s.
     pub(super) time_s: f64,
     /// The state predicted for each of [`AHEAD_S`].
     pub(super) ahead: [Option<[f64; 6]>; 2],
@@ -54,23 +90,24 @@ pub(super) struct Vehicle {
     /// Half of the nominal thrust, N: from there on the motor counts as lit.
     pub(super) half_thrust_n: f64,
     pub(super) gimbal_limit_deg: f64,
-    pub(super) gimbal_rate_rad_s: Option<f64>,
+    pub(super) gimbal_rate_rad_s: f64,
     pub(super) fin_rate_deg_s: f64,
     /// Thrust expected at a time since the ignition command, s to N.
     pub(super) expected_n: Box<dyn Fn(f64) -> f64>,
 }
 
 impl Vehicle {
-    fn of(profile: &Profile) -> Self {
-        let motor = profile.motor;
+    fn of(mission: &Mission) -> Self {
+        let (airframe, curve) = (&mission.airframe, mission.motor_curve.clone());
+        let delay_s = mission.ignition.delay_s;
         Self {
-            gravity_m_s2: profile.environment.gravity_m_s2,
-            weight_n: profile.vehicle.mass_kg * profile.environment.gravity_m_s2,
-            half_thrust_n: 0.5 * profile.motor.thrust_n,
-            gimbal_limit_deg: profile.gimbal.limit_deg,
-            gimbal_rate_rad_s: profile.gimbal.rate_limit_rad_s(),
-            fin_rate_deg_s: profile.fins.rate_limit_deg_s,
-            expected_n: Box::new(move |since_s| motor.thrust_at_n(since_s)),
+            gravity_m_s2: mission.gravity_m_s2,
+            weight_n: airframe.mass.loaded_kg * mission.gravity_m_s2,
+            half_thrust_n: 0.5 * curve.total_impulse_n_s() / curve.burn_time_s(),
+            gimbal_limit_deg: airframe.gimbal.limit_deg,
+            gimbal_rate_rad_s: airframe.gimbal.servo.rate_rad_s(),
+            fin_rate_deg_s: airframe.fins.servo.rate_rad_s().to_degrees(),
+            expected_n: Box::new(move |since_s| curve.thrust_at_n(since_s - delay_s)),
         }
     }
 }
@@ -84,7 +121,7 @@ pub(super) struct GimbalAxis {
     pub(super) actual: Vec<(f64, f64)>,
 }
 
-/// Data that only a flight from apogee has.
+/// What only the frames of a flight computer tell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct InSpace {
     /// Impulse and burn time divided by their certified values, as estimated at the end.
@@ -116,7 +153,13 @@ pub(super) struct EstimateError {
 pub(super) struct Flight {
     pub(super) recording: Recording,
     pub(super) vehicle: Option<Vehicle>,
-    pub(super) from_apogee: Option<InSpace>,
+    /// `None` for a log without frames that can be run again, such as that of a ground station.
+    pub(super) in_space: Option<InSpace>,
+    pub(super) plant: Vec<Plant>,
+    /// At the planning frames.
+    pub(super) thoughts: Vec<Thought>,
+    /// The state at contact.
+    pub(super) contact: Option<[f64; 6]>,
     pub(super) gimbal: Vec<GimbalAxis>,
     /// Vehicle time, s, and thrust as estimated in flight, N.
     pub(super) inferred_n: Vec<(f64, f64)>,
@@ -129,39 +172,94 @@ pub(super) struct Flight {
     pub(super) touchdown_s: Option<f64>,
 }
 
+/// What the flight computer, run again, makes of a planning frame.
+struct Again {
+    time_s: f64,
+    phase: u32,
+    level: u32,
+    estimate: Option<Estimate>,
+    burning_s: f64,
+    inferred_n: f64,
+    /// If a plan was made at this frame: the solution, its path, and the time between path points, s.
+    plan: Option<(PoweredReport, Vec<PlanarState>, f64)>,
+}
+
 impl Flight {
-    pub(super) fn new(recording: Recording, plans: Vec<PlanSample>) -> Self {
-        let (teller, track) = track_of(&recording);
-        let lit = |tick: &&v1::ControllerTick| phase_of(tick.input.phase).is_some_and(Phase::in_landing_burn);
-        let ignition_s = recording
-            .ticks
-            .iter()
-            .find(lit)
-            .map(|tick| tick.input.time_s - tick.input.time_since_ignition_s)
-            .or_else(|| {
-                let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
-                track.iter().find(burning).map(|sample| sample.time_s)
-            });
-        let vehicle = recording.profile().ok().as_ref().map(Vehicle::of);
-        let inferred_n = match (&vehicle, ignition_s) {
-            (Some(vehicle), Some(ignition_s)) => {
-                let inferred = |tick: &v1::ControllerTick| {
-                    let input = &tick.input;
-                    (input.time_s, input.thrust_scale * (vehicle.expected_n)(input.time_s - ignition_s))
-                };
-                let burning = recording.ticks.iter().filter(|tick| tick.input.time_s >= ignition_s);
-                burning.map(inferred).collect()
-            }
-            _ => Vec::new(),
-        };
+    /// A recorded flight. Without mission, start or frames the sections report what is missing.
+    pub(super) fn of(recording: Recording) -> Self {
+        match run_again(&recording) {
+            None => Self::heard(recording),
+            Some((mission, again, pilot)) => Self::told(recording, &mission, &again, &pilot),
+        }
+    }
+
+    /// A flight of which only the telemetry of a ground station tells.
+    fn heard(recording: Recording) -> Self {
+        let mut gimbal = GimbalAxis { name: "Gimbal angle", commanded: Vec::new(), actual: Vec::new() };
+        let mut track = Vec::new();
+        for told in &recording.telemetry {
+            gimbal.commanded.extend(told.gimbal_commanded_rad.map(|rad| (told.time_s, rad)));
+            gimbal.actual.extend(told.gimbal_measured_rad.map(|rad| (told.time_s, rad)));
+            let state = [told.x_m, told.altitude_m, told.pitch_rad, told.u_m_s, told.w_m_s, told.q_rad_s];
+            let state = state.map(|value| value.unwrap_or(f64::NAN));
+            track.push(Sample { time_s: told.time_s, phase: told.phase.and_then(phase_of), state });
+        }
+        track.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         Self {
-            vehicle,
-            from_apogee: None,
-            gimbal: vec![gimbal_of(&recording)],
-            inferred_n,
+            vehicle: None,
+            in_space: None,
+            plant: Vec::new(),
+            thoughts: Vec::new(),
+            contact: recording.verdict.as_ref().map(|verdict| state_of(&verdict.state)),
+            gimbal: vec![gimbal],
+            inferred_n: Vec::new(),
+            plans: Vec::new(),
+            teller: if track.is_empty() { Teller::Nobody } else { Teller::Telemetry },
+            ignition_s: track.iter().find(burning).map(|sample| sample.time_s),
             touchdown_s: recording.contact_s(),
-            ignition_s,
-            plans,
+            track,
+            recording,
+        }
+    }
+
+    /// A flight whose computer was run again.
+    fn told(recording: Recording, mission: &Mission, again: &[Again], pilot: &Pilot) -> Self {
+        let nil = Vector3::zeros();
+        let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));
+        let world = &recording.world;
+        let plant: Vec<Plant> = world.iter().map(|sample| plant(sample, &recording.frames, &plane)).collect();
+        let thoughts: Vec<Thought> = again.iter().map(|frame| thought(frame, world, &plane)).collect();
+        let known = |samples: Vec<Sample>| Some(samples).filter(|samples| !samples.is_empty());
+        let of_plant = known(plant.iter().map(|plant| plant.sample).collect());
+        let (teller, track) = match (of_plant, known(thoughts.iter().map(|thought| thought.sample).collect()))
+        {
+            (Some(track), _) => (Teller::Plant, track),
+            (None, Some(track)) => (Teller::Estimate, track),
+            (None, None) => (Teller::Nobody, Vec::new()),
+        };
+        // In the same plane as everything else.
+        let contact = recording.verdict.as_ref().map(|verdict| {
+            let sample = plant.iter().rfind(|plant| plant.sample.time_s <= verdict.time_s);
+            sample.map_or_else(|| state_of(&verdict.state), |plant| plant.sample.state)
+        });
+        Self {
+            vehicle: Some(Vehicle::of(mission)),
+            in_space: Some(in_space(&recording, mission, again, pilot, &plane)),
+            gimbal: [("Gimbal pitch", 0), ("Gimbal yaw", 1)]
+                .map(|(name, axis)| gimbal(name, axis, world))
+                .into(),
+            inferred_n: again
+                .iter()
+                .filter(|frame| frame.burning_s > 0.0)
+                .map(|frame| (frame.time_s, frame.inferred_n))
+                .collect(),
+            plans: plans(again, &plane),
+            ignition_s: pilot.ignited_at_s(),
+            touchdown_s: recording.contact_s(),
+            plant,
+            thoughts,
+            contact,
             teller,
             track,
             recording,
@@ -211,109 +309,201 @@ impl Flight {
     }
 }
 
-/// The gimbal angle of the planar landing, else from the telemetry of a ground station.
-fn gimbal_of(recording: &Recording) -> GimbalAxis {
-    let truth = &recording.truth;
-    let mut axis = GimbalAxis {
-        name: "Gimbal angle",
-        commanded: truth.iter().map(|truth| (truth.time_s, truth.gimbal_commanded_rad)).collect(),
-        actual: truth.iter().map(|truth| (truth.time_s, truth.gimbal_actual_rad)).collect(),
-    };
-    if truth.is_empty() {
-        for told in &recording.telemetry {
-            axis.commanded.extend(told.gimbal_commanded_rad.map(|rad| (told.time_s, rad)));
-            axis.actual.extend(told.gimbal_measured_rad.map(|rad| (told.time_s, rad)));
-        }
-    }
-    axis
-}
-
 pub(super) fn phase_of(number: u32) -> Option<Phase> {
     u8::try_from(number).ok().and_then(Phase::from_index)
 }
 
-pub(super) fn state_of(state: &v1::PlanarState) -> [f64; 6] {
+fn state_of(state: &v1::PlanarState) -> [f64; 6] {
     [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s]
 }
 
-/// The best source in the log: the plant, else the controller's estimate, else the telemetry of a ground station.
-pub(super) fn track_of(recording: &Recording) -> (Teller, Vec<Sample>) {
-    let sample = |time_s, phase, state| Sample { time_s, phase, state };
-    let plant = recording.truth.iter();
-    let mut best: (Teller, Vec<Sample>) = (
-        Teller::Plant,
-        plant.map(|truth| sample(truth.time_s, phase_of(truth.phase), state_of(&truth.state))).collect(),
-    );
-    if best.1.is_empty() {
-        let ticks = recording.ticks.iter();
-        best = (
-            Teller::Estimate,
-            ticks
-                .map(|tick| {
-                    sample(tick.input.time_s, phase_of(tick.input.phase), state_of(&tick.input.state))
-                })
-                .collect(),
-        );
+/// What the frames tell beside the plane of the landing.
+fn in_space(
+    recording: &Recording,
+    mission: &Mission,
+    again: &[Again],
+    pilot: &Pilot,
+    plane: &Plane,
+) -> InSpace {
+    let world = &recording.world;
+    let impulse_n_s: f64 = world
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0].thrust_n + pair[1].thrust_n) * (pair[1].time_s - pair[0].time_s))
+        .sum();
+    let burnt_out = world.last().is_some_and(|last| last.thrust_n <= 0.0);
+    let certified_n_s = mission.motor_curve.total_impulse_n_s();
+    let in_air = |time_s: f64| recording.verdict.as_ref().is_none_or(|verdict| time_s <= verdict.time_s);
+    InSpace {
+        plane: plane_in_words(pilot.plane()),
+        across_m: world
+            .iter()
+            .map(|sample| (sample.time_s, vector_from_log(&sample.state.position_m).dot(&plane.across)))
+            .collect(),
+        errors: again
+            .iter()
+            .filter(|frame| in_air(frame.time_s))
+            .filter_map(|frame| error(frame.estimate.as_ref()?, frame.time_s, world))
+            .collect(),
+        // On the way up nothing estimates the wind.
+        wind_m_s: again
+            .iter()
+            .filter(|frame| phase_of(frame.phase).is_some_and(|phase| !phase.before_apogee()))
+            .filter_map(|frame| {
+                let wind = frame.estimate.as_ref()?.wind_m_s;
+                Some((frame.time_s, [wind.x, -wind.y]))
+            })
+            .collect(),
+        inferred_scales: pilot
+            .motor()
+            .ignition_s()
+            .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
+        true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / certified_n_s),
     }
-    if best.1.is_empty() {
-        let heard = recording.telemetry.iter();
-        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        best = (
-            Teller::Telemetry,
-            heard
-                .map(|told| {
-                    let numbers =
-                        [told.x_m, told.altitude_m, told.pitch_rad, told.u_m_s, told.w_m_s, told.q_rad_s];
-                    sample(told.time_s, told.phase.and_then(phase_of), numbers.map(or_nan))
-                })
-                .collect(),
-        );
-    }
-    if best.1.is_empty() {
-        return (Teller::Nobody, Vec::new());
-    }
-    best.1.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    best
 }
 
-/// Summaries of every tick's plan, so that the plans need not be held.
-pub(super) fn plans_of(path: &Path) -> Result<Vec<PlanSample>, LogError> {
-    let mut log = FlightLog::open(path)?;
-    let mut plans = Vec::new();
-    while let Some(stamped) = log.next_entry()? {
-        if let Entry::Tick(tick) = stamped.entry
-            && phase_of(tick.input.phase).is_some_and(Phase::is_landing)
-            && !tick.output.plan.states.is_empty()
-        {
-            plans.push(plan_sample(&tick));
+/// The plane's direction; a flight without a landing has none, and is seen from the west.
+fn plane_in_words(plane: Option<&Plane>) -> String {
+    // East is against y.
+    match plane {
+        None => "the plane of north and up, because no landing was planned".to_owned(),
+        Some(plane) => {
+            let deg = libm::atan2(-plane.along.y, plane.along.x).to_degrees();
+            format!("the vertical plane of the landing, {:.0} deg from north to east", deg.rem_euclid(360.0))
         }
     }
-    plans.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    let stride = plans.len().div_ceil(PLANS_DRAWN).max(1);
-    for (place, plan) in plans.iter_mut().enumerate() {
-        if place % stride != 0 {
-            plan.path = Vec::new();
+}
+
+/// Estimate less truth at the moment of an estimate; `None` without a record of the world then.
+fn error(estimate: &Estimate, time_s: f64, world: &[flight_v1::TruthSample]) -> Option<EstimateError> {
+    let place = world.partition_point(|sample| sample.time_s < time_s - SAME_MOMENT_S);
+    let sample = world.get(place).filter(|sample| (sample.time_s - time_s).abs() < SAME_MOMENT_S)?;
+    let truth = state_from_log(&sample.state);
+    // East is against y.
+    let to_ground = |vector: Vector3<f64>| [vector.x, -vector.y, vector.z];
+    let cosine = estimate.state.nose_in_world().dot(&truth.nose_in_world());
+    Some(EstimateError {
+        position_m: to_ground(estimate.state.position_m - truth.position_m),
+        velocity_m_s: to_ground(estimate.state.velocity_m_s - truth.velocity_m_s),
+        nose_rad: libm::acos(cosine.clamp(-1.0, 1.0)),
+    })
+}
+
+/// Runs the flight computer again and returns its estimate and plan at every tenth frame; `None` if the log lacks
+/// records.
+fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot)> {
+    let (start, frames) = recording.replayable_frames().ok()?;
+    let toml = recording.profile_toml().ok()?;
+    let mut controller = LoggedPilot::recorded(toml, start, &recording.head.run, &[]).ok()?;
+    let mission = controller.pilot().mission().clone();
+    let curve: ThrustCurve = mission.motor_curve.clone();
+    let (mut again, mut plans) = (Vec::new(), NewPlans::default());
+    for recorded in frames {
+        let frame = controller.run_again(recorded).ok()?;
+        if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
+            continue;
         }
+        let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
+        let plan = plans.made(pilot, frame.output.level);
+        again.push(Again {
+            time_s,
+            phase: frame.output.phase,
+            level: frame.output.level,
+            estimate: pilot.estimate().copied(),
+            burning_s: pilot.burning_s(time_s).unwrap_or(0.0),
+            inferred_n: pilot.motor().predict(&curve, time_s, time_s).thrust_n,
+            plan: plan.map(|(states, step_s)| (*pilot.report(), states.to_vec(), step_s)),
+        });
     }
-    Ok(plans)
+    Some((mission, again, controller.pilot().clone()))
 }
 
-/// A planned path up to the ground: a plan that does not land ends below it.
-pub(super) fn above_ground(path: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    path.take_while(|(_, up_m)| *up_m >= -GROUND_M).collect()
+/// The state in the plane, relative to the ground; altitude is the height of the feet.
+fn in_plane(plane: &Plane, state: &RigidState, height_m: f64) -> [f64; 6] {
+    PlanarState { z_m: height_m, ..plane.project(state, 0.0, 0.0) }.to_array()
 }
 
-fn plan_sample(tick: &v1::ControllerTick) -> PlanSample {
-    let plan = &tick.output.plan;
-    let node_at = |ahead_s: f64| {
-        let node = (ahead_s - plan.starts_in_s) / plan.step_s;
-        let whole = node.round();
-        let on_node = (node - whole).abs() < 1e-6 && whole >= 0.0;
-        on_node.then(|| plan.states.get(whole as usize).map(state_of))?
+impl Again {
+    /// The wind along the plane of this frame's plan, m/s.
+    fn wind_m_s(&self, plane: &Plane) -> f64 {
+        self.estimate.as_ref().map_or(0.0, |estimate| estimate.wind_m_s.push(0.0).dot(&plane.along))
+    }
+}
+
+fn plant(sample: &flight_v1::TruthSample, frames: &[flight_v1::PilotTick], plane: &Plane) -> Plant {
+    let behind = frames.partition_point(|tick| tick.input.time_s <= sample.time_s + SAME_MOMENT_S);
+    let frame = behind.checked_sub(1).and_then(|place| frames.get(place));
+    Plant {
+        sample: Sample {
+            time_s: sample.time_s,
+            phase: phase_of(frame.map_or(0, |tick| tick.output.phase)),
+            state: in_plane(plane, &state_from_log(&sample.state), sample.height_m),
+        },
+        fins_rad: sample.fins_actual_rad.clone(),
+        thrust_n: sample.thrust_n,
+        mass_kg: sample.mass_kg,
+        in_contact: sample.in_contact,
+    }
+}
+
+fn gimbal(name: &'static str, axis: usize, world: &[flight_v1::TruthSample]) -> GimbalAxis {
+    let over = |angles: fn(&flight_v1::TruthSample) -> &Vec<f64>| {
+        world.iter().filter_map(|sample| Some((sample.time_s, *angles(sample).get(axis)?))).collect()
     };
-    PlanSample {
-        time_s: tick.input.time_s,
-        ahead: AHEAD_S.map(node_at),
-        path: above_ground(plan.states.iter().map(|state| (state.x_m, state.z_m))),
+    GimbalAxis {
+        name,
+        commanded: over(|sample| &sample.gimbal_commanded_rad),
+        actual: over(|sample| &sample.gimbal_actual_rad),
     }
+}
+
+fn thought(frame: &Again, world: &[flight_v1::TruthSample], plane: &Plane) -> Thought {
+    let place = world.partition_point(|sample| sample.time_s < frame.time_s - SAME_MOMENT_S);
+    // The feet are below the centre of gravity, as in the record of the world.
+    let feet_below_m = world.get(place).map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
+    let state = frame.estimate.as_ref().map_or([0.0; 6], |estimate| {
+        in_plane(plane, &estimate.state, estimate.state.position_m.z - feet_below_m)
+    });
+    let plan = frame.plan.as_ref().map(|(report, ..)| report);
+    Thought {
+        sample: Sample { time_s: frame.time_s, phase: phase_of(frame.phase), state },
+        level: plan.map_or(u32::from(ControlLevel::Idle.index()), |_| frame.level),
+        iterations: plan.map_or(0, |report| report.iterations),
+        touchdown: plan.map(|report| {
+            let in_s = report.touchdown_in_s;
+            (in_s, Plane::over_ground(&report.touchdown, frame.wind_m_s(plane), in_s).to_array())
+        }),
+    }
+}
+
+fn plans(again: &[Again], plane: &Plane) -> Vec<PlanSample> {
+    let made: Vec<&Again> = again.iter().filter(|frame| frame.plan.is_some()).collect();
+    let stride = made.len().div_ceil(PLANS_DRAWN).max(1);
+    let sample = |(place, frame): (usize, &&Again)| {
+        let (_, states, step_s) = frame.plan.as_ref()?;
+        let wind_m_s = frame.wind_m_s(plane);
+        let nodes = states.iter().enumerate();
+        let states: Vec<[f64; 6]> = nodes
+            .map(|(node, state)| Plane::over_ground(state, wind_m_s, node as f64 * step_s).to_array())
+            .collect();
+        let drawn = place.is_multiple_of(stride);
+        Some(PlanSample {
+            time_s: frame.time_s,
+            ahead: AHEAD_S.map(|ahead_s| between(&states, ahead_s / step_s)),
+            // A plan that does not land ends below the ground.
+            path: states
+                .iter()
+                .filter(|_| drawn)
+                .map(|state| (state[0], state[1]))
+                .take_while(|(_, up_m)| *up_m >= -GROUND_M)
+                .collect(),
+        })
+    };
+    made.iter().enumerate().filter_map(sample).collect()
+}
+
+/// The state after a number of steps, interpolated between nodes; `None` after the last.
+fn between(states: &[[f64; 6]], steps: f64) -> Option<[f64; 6]> {
+    let share = steps.fract();
+    let (before, after) = (states.get(steps as usize)?, states.get(steps as usize + 1)?);
+    Some(core::array::from_fn(|i| (1.0 - share) * before[i] + share * after[i]))
 }

@@ -169,6 +169,16 @@ mod tests {
     }
 
     #[test]
+    fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
+        assert_eq!(with(&["powered.solver.max_iterations=12.0"]).unwrap().powered.solver.max_iterations, 12);
+        let refusal = with(&["powered.solver.max_iterations=12.5"]).unwrap_err().to_string();
+        assert_eq!(refusal, "setting `powered.solver.max_iterations=12.5`: must be a whole number");
+        assert!(is_whole_in_mission(toml(), "powered.solver.max_iterations").unwrap());
+        assert!(!is_whole_in_mission(toml(), "powered.weights.theta").unwrap());
+        assert!(is_whole_in_mission(toml(), "powered.solver.max_iteration").is_err());
+    }
+
+    #[test]
     fn the_truth_is_set_by_its_own_names() {
         let set = |given: &str| truth_with(&Truth::default(), &[given.parse().unwrap()]);
         let expected = Truth { wind_m_s: 4.0, ..Truth::default() };

@@ -1,7 +1,7 @@
-//! Other settings for a recorded flight, named as in its profile and checked against the known names.
+//! Other settings for a recorded flight, named as in its mission and checked against the known names.
 //!
 //! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A file of settings is a
-//! TOML file with the structure of the profile and only the keys to change. An unknown name is refused, and the most
+//! TOML file with the structure of the mission and only the keys to change. An unknown name is refused, and the most
 //! similar known name is suggested.
 
 mod mission;
@@ -12,7 +12,6 @@ mod schedule;
 pub use mission::{
     is_whole_in_mission, known_mission_paths, mission_toml_with, mission_value_of, mission_with, truth_with,
 };
-pub use names::{is_whole, known_paths};
 pub(crate) use other_release::explained;
 pub use schedule::Schedule;
 
@@ -20,15 +19,13 @@ use std::fmt;
 use std::str::FromStr;
 
 use flight::guidance::baseline::UnknownController;
-use flight::vehicle::profile::Profile;
-use vehicles::file_error::FileError;
 
 use self::names::Names;
 
-/// A value for one key of the profile.
+/// A value for one key of the mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// The key, as in `nmpc.weights.w`.
+    /// The key, as in `powered.weights.theta`.
     pub path: String,
     pub value: toml::Value,
     /// Vehicle time from which it applies, s; `None`: from the beginning.
@@ -42,7 +39,9 @@ pub enum SettingError {
     #[error(transparent)]
     Law(#[from] UnknownController),
     /// Not of the form `path=value`.
-    #[error("setting `{given}`: must be path=value or path=value@seconds, as in nmpc.weights.w=90@6.5")]
+    #[error(
+        "setting `{given}`: must be path=value or path=value@seconds, as in powered.weights.theta=90@6.5"
+    )]
     Form { given: String },
     /// The key is unknown.
     #[error("no setting `{given}`: did you mean `{nearest}`?")]
@@ -57,7 +56,7 @@ pub enum SettingError {
     /// A fraction for a key that takes whole numbers.
     #[error("setting `{given}`: must be a whole number")]
     NotWhole { given: String },
-    /// The log's profile or a settings file is not TOML.
+    /// The log's mission or a settings file is not TOML.
     #[error("{origin}: {reason}")]
     Toml {
         /// Which text.
@@ -68,13 +67,6 @@ pub enum SettingError {
     /// The mission or the truth is invalid with the settings.
     #[error("with {settings}: {reason}")]
     Mission { settings: String, reason: String },
-    /// The profile is invalid with the settings.
-    #[error("with {settings}: {source}")]
-    Profile {
-        settings: String,
-        /// What is wrong.
-        source: FileError,
-    },
 }
 
 impl FromStr for Setting {
@@ -127,30 +119,6 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
     Ok(settings)
 }
 
-/// The profile of this text with other settings; their times are ignored.
-///
-/// # Errors
-/// A name is unknown, or the result is not a valid profile.
-pub fn profile_with(profile_toml: &str, settings: &[Setting]) -> Result<Profile, SettingError> {
-    let text = profile_toml_with(profile_toml, settings)?;
-    vehicles::profile::from_toml(&text, "profile.toml")
-        .map_err(|source| SettingError::Profile { settings: listed(settings), source })
-}
-
-/// The text of a profile with other settings.
-///
-/// # Errors
-/// A name is unknown, or the text is not TOML.
-pub fn profile_toml_with(profile_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
-    if settings.is_empty() {
-        // Without settings the text stays the same, byte for byte.
-        return Ok(profile_toml.to_owned());
-    }
-    let mut table = parsed_table(profile_toml, "profile.toml")?;
-    set(&mut table, settings, Names::of::<Profile>(""))?;
-    text_of(&table)
-}
-
 /// Puts settings into a table, if each is a known name or in it already.
 fn set(table: &mut toml::Table, settings: &[Setting], names: Names) -> Result<(), SettingError> {
     let names = names.with_those_in(table);
@@ -168,11 +136,6 @@ fn text_of(table: &toml::Table) -> Result<String, SettingError> {
 
 fn listed(settings: &[Setting]) -> String {
     settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
-}
-
-/// The value of a key in a profile's text, if it is there.
-pub fn value_of(profile_toml: &str, path: &str) -> Option<toml::Value> {
-    value_in(profile_toml.parse::<toml::Table>().ok()?, path)
 }
 
 fn value_in(table: toml::Table, path: &str) -> Option<toml::Value> {
@@ -217,67 +180,26 @@ fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
 mod tests {
     use super::*;
 
-    const CALIBRATED: &str = "paper-calibrated";
-
-    fn calibrated() -> &'static str {
-        vehicles::profile::builtin_toml(CALIBRATED).unwrap()
-    }
-
-    fn with(given: &[&str]) -> Result<Profile, SettingError> {
-        let settings: Vec<Setting> = given.iter().map(|text| text.parse().unwrap()).collect();
-        profile_with(calibrated(), &settings)
-    }
-
     #[test]
     fn a_setting_is_a_path_a_value_and_perhaps_a_time() {
-        let setting: Setting = "nmpc.weights.w=90".parse().unwrap();
-        assert_eq!((setting.path.as_str(), setting.at_s), ("nmpc.weights.w", None));
+        let setting: Setting = "powered.weights.theta=90".parse().unwrap();
+        assert_eq!((setting.path.as_str(), setting.at_s), ("powered.weights.theta", None));
         assert_eq!(setting.value, toml::Value::Integer(90));
-        let timed: Setting = "nmpc.weights.w = 9.5e1 @ 6.5s".parse().unwrap();
+        let timed: Setting = "powered.weights.theta = 9.5e1 @ 6.5s".parse().unwrap();
         assert_eq!((timed.value, timed.at_s), (toml::Value::Float(95.0), Some(6.5)));
-        let word: Setting = "nmpc.model=as-printed".parse().unwrap();
+        let word: Setting = "airframe.motor=as-printed".parse().unwrap();
         assert_eq!(word.value, toml::Value::String("as-printed".to_owned()));
-        for bad in ["nmpc.weights.w", "=3", "a=", "a=3@nan", "a=@3"] {
+        for bad in ["powered.weights.theta", "=3", "a=", "a=3@nan", "a=@3"] {
             assert!(bad.parse::<Setting>().is_err(), "{bad}");
         }
     }
 
     #[test]
-    fn a_set_value_reaches_the_profile_and_nothing_else_changes() {
-        let changed = with(&["nmpc.weights.w=90", "nmpc.model=as-printed"]).unwrap();
-        let mut expected = vehicles::profile::builtin(CALIBRATED).unwrap();
-        expected.nmpc.weights.w = 90.0;
-        expected.nmpc.model = flight::vehicle::profile::ModelKind::AsPrinted;
-        assert_eq!(changed, expected);
-        assert_eq!(with(&[]).unwrap(), vehicles::profile::builtin(CALIBRATED).unwrap());
-    }
-
-    #[test]
-    fn a_key_that_the_profile_leaves_out_can_be_set() {
-        assert_eq!(with(&["gimbal.rate_limit_deg_s=400"]).unwrap().gimbal.rate_limit_deg_s, Some(400.0));
-        assert_eq!(
-            with(&["plant.thrust_scale=0.97"]).unwrap().plant.thrust_scale.to_bits(),
-            0.97_f64.to_bits()
-        );
-    }
-
-    #[test]
-    fn an_unknown_name_is_refused_with_the_nearest() {
-        let refusal = |given| with(&[given]).unwrap_err().to_string();
-        assert_eq!(refusal("nmpc.weight.w=1"), "no setting `nmpc.weight.w`: did you mean `nmpc.weights.w`?");
-        assert_eq!(
-            refusal("gimbal.rate_limit_deg=1"),
-            "no setting `gimbal.rate_limit_deg`: did you mean `gimbal.rate_limit_deg_s`?"
-        );
-        assert!(refusal("nmpc.weights=1").starts_with("`nmpc.weights` is a section; its settings are"));
-        assert!(refusal("motor.thrust_n=-3").contains("motor.thrust_n"), "{}", refusal("motor.thrust_n=-3"));
-    }
-
-    #[test]
-    fn a_file_of_settings_has_the_profiles_shape() {
-        let settings = settings_of_file("nmpc.weights.w = 90\n[motor]\nthrust_n = 34.0\n", "x.toml").unwrap();
+    fn a_file_of_settings_has_the_missions_shape() {
+        let settings =
+            settings_of_file("powered.weights.theta = 90\n[ignition]\ndelay_s = 0.2\n", "x.toml").unwrap();
         let shown: Vec<String> = settings.iter().map(ToString::to_string).collect();
-        assert_eq!(shown, ["motor.thrust_n=34.0", "nmpc.weights.w=90"]);
+        assert_eq!(shown, ["ignition.delay_s=0.2", "powered.weights.theta=90"]);
         assert!(settings_of_file("= 3", "x.toml").unwrap_err().to_string().starts_with("x.toml: "));
     }
 }

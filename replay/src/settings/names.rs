@@ -1,36 +1,19 @@
-//! The names that a profile's settings can have, from the profile's own types.
+//! The names that a mission's settings can have, from the mission's own types.
 //!
 //! The names come from the types and not from a list: every struct gives its field names to the deserializer, so a
-//! deserializer that supplies placeholder values visits the whole profile and notes each path.
+//! deserializer that supplies placeholder values visits the whole mission and notes each path.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use flight::vehicle::profile::Profile;
 use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
 
-use super::{Setting, SettingError, collect_leaves, parsed_table};
+use super::{Setting, SettingError, collect_leaves};
 
 /// The placeholder for a mission's airframe, which may be a name or a table.
 const NAME_OR_TABLE: &str = "mk2";
-
-/// Every key that a profile may have, as in `nmpc.weights.w`.
-pub fn known_paths() -> BTreeSet<String> {
-    Names::of::<Profile>("").paths
-}
-
-/// Whether a key of a profile takes whole numbers only.
-///
-/// # Errors
-/// The name is unknown, or the text is not TOML.
-pub fn is_whole(profile_toml: &str, path: &str) -> Result<bool, SettingError> {
-    let table = parsed_table(profile_toml, "profile.toml")?;
-    let names = Names::of::<Profile>("").with_those_in(&table);
-    names.check(path)?;
-    Ok(names.is_whole(path))
-}
 
 /// The keys that a type may have.
 #[derive(Debug, Clone, Default)]
@@ -266,39 +249,5 @@ impl<'de> MapAccess<'de> for Fields<'_> {
         let above = &self.walker.path;
         let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
         seed.deserialize(Walker { path, names: self.walker.names })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Every key of every built-in profile, and the keys that all of them leave out.
-    #[test]
-    fn every_key_of_the_built_in_profiles_is_known() {
-        let known = known_paths();
-        for (name, text) in vehicles::profile::BUILTIN {
-            let table = text.parse::<toml::Table>().unwrap();
-            collect_leaves("", &table, &mut |path, _| {
-                assert!(known.contains(&path), "{name}: {path}");
-            });
-        }
-        for optional in ["gimbal.rate_limit_deg_s", "nmpc.limits.final.w_m_s", "stabiliser.decay_rate_per_s"]
-        {
-            assert!(known.contains(optional), "{optional}");
-        }
-        assert!(!known.contains("nmpc.weights"), "a section is no key");
-    }
-
-    #[test]
-    fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
-        let text = vehicles::profile::builtin_toml("paper-calibrated").unwrap();
-        let with = |given: &str| super::super::profile_with(text, &[given.parse().unwrap()]);
-        assert_eq!(with("nmpc.horizon_steps=12.0").unwrap().nmpc.horizon_steps, 12);
-        let refusal = with("nmpc.horizon_steps=12.5").unwrap_err().to_string();
-        assert_eq!(refusal, "setting `nmpc.horizon_steps=12.5`: must be a whole number");
-        assert!(is_whole(text, "nmpc.horizon_steps").unwrap());
-        assert!(!is_whole(text, "nmpc.weights.w").unwrap());
-        assert!(is_whole(text, "nmpc.horizon_step").is_err());
     }
 }

@@ -1,8 +1,6 @@
 //! The settings over the time of a flight.
 
-use flight::vehicle::profile::Profile;
-
-use super::{Setting, SettingError, profile_with};
+use super::{Setting, SettingError};
 
 /// A controller's settings over a flight: those of the beginning, and changes at given times.
 #[derive(Debug, Clone)]
@@ -11,16 +9,6 @@ pub struct Schedule<T> {
     /// By time; each stage includes all earlier changes.
     changes: Vec<(f64, T)>,
     next: usize,
-}
-
-impl Schedule<Profile> {
-    /// Builds a schedule of profiles: the settings from the beginning, then each timed one from its time.
-    ///
-    /// # Errors
-    /// A name is unknown, or some stage is not a valid profile.
-    pub fn new(profile_toml: &str, settings: &[Setting]) -> Result<Self, SettingError> {
-        Self::of(settings, |so_far| profile_with(profile_toml, so_far))
-    }
 }
 
 impl<T> Schedule<T> {

@@ -13,7 +13,7 @@ const POINTS_MAX: usize = 1_000_000;
 /// A setting and the values it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vary {
-    /// The setting, as in `nmpc.weights.w`.
+    /// The setting, as in `powered.weights.theta`.
     pub path: String,
     pub values: Values,
 }
@@ -39,7 +39,7 @@ pub enum Values {
 pub enum VaryError {
     /// The text cannot be parsed.
     #[error(
-        "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in nmpc.weights.w=50:110:7"
+        "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in powered.weights.theta=50:110:7"
     )]
     Form { given: String },
     /// Too many points.

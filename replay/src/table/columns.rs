@@ -6,7 +6,7 @@ use prost_reflect::{
 
 use super::dialect::words_of;
 
-/// A list up to this length has one column for each element; a longer one, such as a plan's nodes, has none.
+/// A list up to this length has one column for each element; a longer one, has none.
 const LIST_MAX: usize = 8;
 
 /// Unit suffixes of field names and their units, the longest first.
@@ -183,7 +183,7 @@ fn walk(
     }
 }
 
-/// The second element of `fin_command_rad` is `fin_command_2_rad`: the unit stays at the end.
+/// The second element of `fins_rad` is `fins_2_rad`: the unit stays at the end.
 fn element_name(name: &str, element: usize) -> String {
     let unit = UNITS.into_iter().map(|(suffix, _)| suffix).find(|suffix| name.ends_with(suffix));
     let unit = unit.unwrap_or_default();
@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn an_elements_number_stands_before_its_unit() {
         for (name, second) in [
-            ("output.fin_command_rad", "output.fin_command_2_rad"),
+            ("output.fins_rad", "output.fins_2_rad"),
             ("gimbal_rad_s", "gimbal_2_rad_s"),
             ("position_m", "position_2_m"),
             ("counts", "counts_2"),

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 /// A field in which a recorded and a recomputed tick differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldDifference {
-    /// Path of the field, as in `output.plan.states[3].u_m_s`.
+    /// Path of the field, as in `output.gimbal_rad[1]`.
     pub path: String,
     /// The value in the log.
     pub recorded: FieldValue,
@@ -164,10 +164,10 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
 mod tests {
     use proptest::prelude::*;
     use prost::Message as _;
-    use protocol::log::v1;
+    use protocol::log::flight_v1::PilotTick;
 
     use super::*;
-    use crate::log::tick_descriptor;
+    use crate::log::pilot_descriptor;
 
     #[test]
     fn neighbours_are_one_apart_across_zero_and_up_to_infinity() {
@@ -192,16 +192,16 @@ mod tests {
         fn nans_with_different_payloads_differ(a: u64, b: u64) {
             const NAN: u64 = 0x7ff8_0000_0000_0000;
             let tick = |bits: u64| {
-                let mut tick = v1::ControllerTick::default();
-                tick.output.gimbal_command_rad = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
+                let mut tick = PilotTick::default();
+                tick.input.time_s = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
                 tick.encode_to_vec()
             };
-            let found = differences(tick_descriptor().as_ref(), &tick(a), &tick(b));
+            let found = differences(pilot_descriptor().as_ref(), &tick(a), &tick(b));
             if tick(a) == tick(b) {
                 prop_assert!(found.is_empty());
             } else {
                 prop_assert_eq!(found.len(), 1);
-                prop_assert_eq!(&found[0].path, "output.gimbal_command_rad");
+                prop_assert_eq!(&found[0].path, "input.time_s");
                 prop_assert_eq!(found[0].ulps, None);
             }
         }
@@ -209,14 +209,14 @@ mod tests {
 
     #[test]
     fn lists_of_different_lengths_differ_in_length() {
-        let mut longer = v1::ControllerTick::default();
-        longer.output.fin_command_rad = vec![1.0, 2.0];
+        let mut longer = PilotTick::default();
+        longer.output.fins_rad = vec![1.0, 2.0];
         let mut shorter = longer.clone();
-        shorter.output.fin_command_rad.pop();
-        let descriptor = tick_descriptor();
+        shorter.output.fins_rad.pop();
+        let descriptor = pilot_descriptor();
         let found = differences(descriptor.as_ref(), &longer.encode_to_vec(), &shorter.encode_to_vec());
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].path, "output.fin_command_rad.len");
+        assert_eq!(found[0].path, "output.fins_rad.len");
         assert_eq!(found[0].recorded, FieldValue::Integer(2));
     }
 }

@@ -4,21 +4,18 @@ use std::io::Read;
 
 use protocol::log::record::SCHEMA_VERSION;
 
-use super::from_power_up::{FromPowerUp, Tick};
+use super::from_power_up::FromPowerUp;
 use super::report::{FileFacts, Obstacle, VerifyReport};
 use super::verifier::Verifier;
-use crate::controller::{LoggedComputer, LoggedController, LoggedPilot};
-use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, Ordered, StampedEntry, TickOrder};
-use crate::settings::explained;
+use crate::controller::{LoggedComputer, LoggedPilot};
+use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, StampedEntry};
 
 /// One flight being verified.
 pub(super) struct FlightVerifier {
     /// The whole flight computer, if the log begins at its power-up.
     from_power_up: Option<FromPowerUp>,
     digests_compared: bool,
-    order: TickOrder,
     frame_order: FrameOrder,
-    verifier: Option<Verifier<LoggedController>>,
     pilot: Option<Verifier<LoggedPilot>>,
     ticks: u64,
     obstacle: Option<Obstacle>,
@@ -33,9 +30,7 @@ impl FlightVerifier {
         Self {
             from_power_up: None,
             digests_compared: true,
-            order: TickOrder::new(),
             frame_order: if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() },
-            verifier: None,
             pilot: None,
             ticks: 0,
             obstacle: None,
@@ -67,36 +62,14 @@ impl FlightVerifier {
                     computer.take_frame(&frame, stamped.sequence);
                 }
             }
-            Entry::Tick(tick) if self.from_power_up.is_some() => {
-                self.ticks += 1;
-                if let Some(computer) = &mut self.from_power_up {
-                    computer.take_tick(Tick::Plane(tick));
-                }
-            }
             Entry::PilotTick(tick) if self.pilot.is_none() && self.from_power_up.is_some() => {
                 self.ticks += 1;
                 if let Some(computer) = &mut self.from_power_up {
-                    computer.take_tick(Tick::Space(tick));
+                    computer.take_tick(*tick);
                 }
             }
             // The pilot needs no run of its own. If frames before the release were lost, it is run again from here.
             Entry::PilotStart(_) if self.from_power_up.as_ref().is_some_and(FromPowerUp::is_unbroken) => {}
-            Entry::Tick(tick) => {
-                self.ticks += 1;
-                if self.obstacle.is_some() {
-                    return Ok(());
-                }
-                if self.verifier.is_none() {
-                    match controller_of(log, whole_head)? {
-                        Ok(controller) => self.verifier = Some(Verifier::new(controller)),
-                        Err(obstacle) => self.obstacle = Some(obstacle),
-                    }
-                }
-                if let Some(Ordered::Repeated { tick }) = self.order.push(tick) {
-                    self.obstacle.get_or_insert(Obstacle::Repeated { tick });
-                }
-                self.advance(false);
-            }
             Entry::PilotStart(start) => match text_of(log, whole_head)? {
                 Ok(mission) => match LoggedPilot::recorded(&mission, &start, &log.head().run, &[]) {
                     Ok(controller) if log.head().schema_version() == SCHEMA_VERSION => {
@@ -134,33 +107,9 @@ impl FlightVerifier {
         Ok(())
     }
 
-    /// Compares every tick that is next in order.
-    fn advance(&mut self, at_end: bool) {
-        let Some(verifier) = &mut self.verifier else {
-            return;
-        };
-        while self.obstacle.is_none()
-            && let Some(next) = self.order.pop(at_end)
-        {
-            match next {
-                Ordered::Tick(tick) => {
-                    self.obstacle = verifier.check(&tick).err().map(Obstacle::Input);
-                }
-                Ordered::Missing { from: 0, next } => {
-                    self.obstacle = Some(Obstacle::BeginningMissing { first: next });
-                }
-                Ordered::Missing { from, next } => {
-                    self.obstacle = Some(Obstacle::Gap { after: from - 1, before: next });
-                }
-                Ordered::Repeated { tick } => self.obstacle = Some(Obstacle::Repeated { tick }),
-            }
-        }
-    }
-
     pub(super) fn into_report(mut self, facts: FileFacts) -> VerifyReport {
-        self.advance(true);
         let let_go = self.pilot.is_some();
-        let by_ticks = self.pilot.map(|pilot| pilot.tally).or(self.verifier.map(|verifier| verifier.tally));
+        let by_ticks = self.pilot.map(|pilot| pilot.tally);
         let (mut tally, mut frames) = (by_ticks.clone().unwrap_or_default(), None);
         if let Some(computer) = self.from_power_up {
             let (ticks, report, obstacle) = computer.finish(facts.damage.is_none());
@@ -188,19 +137,6 @@ impl FlightVerifier {
             ..VerifyReport::new(facts, (self.ticks, tally), frames, obstacle)
         }
     }
-}
-
-fn controller_of<R: Read>(
-    log: &FlightLog<R>,
-    whole_head: &impl Fn() -> Result<Head, LogError>,
-) -> Result<Result<LoggedController, Obstacle>, LogError> {
-    Ok(text_of(log, whole_head)?.and_then(|text| {
-        let unreadable = |reason: String| Obstacle::ProfileUnreadable { reason };
-        let profile = vehicles::profile::from_toml(&text, "profile.toml")
-            .map_err(|error| unreadable(explained(&error.to_string())))?;
-        LoggedController::recorded(&profile, &text, &log.head().run)
-            .map_err(|error| unreadable(error.to_string()))
-    }))
 }
 
 fn text_of<R: Read>(

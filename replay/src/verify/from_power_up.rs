@@ -1,34 +1,19 @@
 //! Runs a flight computer again from power-up on, and compares its frames and its ticks.
 //!
-//! A log holds the decision of a frame twice: in the frame itself, and in the tick of the pilot or of the landing
-//! controller, which the other tools read. Both are compared with the same run of the computer. They are matched by
+//! A log holds the decision of a frame twice: in the frame itself, and in the tick of the pilot, which the other tools
+//! read. Both are compared with the same run of the computer. They are matched by
 //! their numbers, because another tool may have sorted the records.
 
 use std::collections::BTreeMap;
 
-use protocol::log::{computer_v1, flight_v1, v1};
+use protocol::log::computer_v1;
+use protocol::log::flight_v1::PilotTick;
 
 use super::report::{FramesReport, Obstacle};
 use super::tally::Tally;
 use super::verifier::Verifier;
-use crate::controller::{LoggedComputer, LoggedController, LoggedPilot, Replayed};
+use crate::controller::{LoggedComputer, LoggedPilot, Replayed as _};
 use crate::log::{FrameOrder, Gap};
-
-/// A tick of either vehicle.
-#[derive(Debug, Clone)]
-pub(super) enum Tick {
-    Plane(Box<v1::ControllerTick>),
-    Space(Box<flight_v1::PilotTick>),
-}
-
-impl Tick {
-    fn number(&self) -> u64 {
-        match self {
-            Self::Plane(tick) => tick.input.tick,
-            Self::Space(tick) => tick.input.frame,
-        }
-    }
-}
 
 /// The flight computer being run again.
 pub(super) struct FromPowerUp {
@@ -37,9 +22,9 @@ pub(super) struct FromPowerUp {
     recorded: u64,
     ticks: Tally,
     /// Ticks that were computed again and whose records have not been read yet.
-    made: BTreeMap<u64, Tick>,
+    made: BTreeMap<u64, PilotTick>,
     /// Recorded ticks whose frames have not been read yet.
-    waiting: BTreeMap<u64, Tick>,
+    waiting: BTreeMap<u64, PilotTick>,
     last_compared: Option<u64>,
     obstacle: Option<Obstacle>,
 }
@@ -75,14 +60,11 @@ impl FromPowerUp {
             None => self.verifier.check(frame).err().map(Obstacle::Frame),
         };
         if self.obstacle.is_none() {
-            let computer = self.verifier.controller();
-            let made = computer.controller_tick().map(|tick| Tick::Plane(Box::new(tick)));
-            let made = made.or_else(|| computer.pilot_tick().map(|tick| Tick::Space(Box::new(tick))));
-            if let Some(made) = made {
-                match self.waiting.remove(&made.number()) {
-                    Some(recorded) => self.compare(&recorded, made),
+            if let Some(made) = self.verifier.controller().pilot_tick() {
+                match self.waiting.remove(&made.input.frame) {
+                    Some(recorded) => self.compare(&recorded, &made),
                     None => {
-                        self.made.insert(made.number(), made);
+                        self.made.insert(made.input.frame, made);
                     }
                 }
             }
@@ -90,10 +72,10 @@ impl FromPowerUp {
     }
 
     /// Takes a recorded tick.
-    pub(super) fn take_tick(&mut self, recorded: Tick) {
-        let number = recorded.number();
+    pub(super) fn take_tick(&mut self, recorded: PilotTick) {
+        let number = recorded.input.frame;
         match self.made.remove(&number) {
-            Some(made) => self.compare(&recorded, made),
+            Some(made) => self.compare(&recorded, &made),
             None if self.last_compared.is_some_and(|last| number <= last) => {
                 self.obstacle.get_or_insert(Obstacle::Repeated { tick: number });
             }
@@ -105,21 +87,9 @@ impl FromPowerUp {
         }
     }
 
-    fn compare(&mut self, recorded: &Tick, made: Tick) {
-        self.last_compared = self.last_compared.max(Some(recorded.number()));
-        match (recorded, made) {
-            (Tick::Plane(recorded), Tick::Plane(mut made)) => {
-                // These times are measured, not decided.
-                (made.solve_time_s, made.deadline_s) = (recorded.solve_time_s, recorded.deadline_s);
-                compare::<LoggedController>(&mut self.ticks, recorded, &made);
-            }
-            (Tick::Space(recorded), Tick::Space(made)) => {
-                compare::<LoggedPilot>(&mut self.ticks, recorded, &made);
-            }
-            (recorded, _) => {
-                self.obstacle.get_or_insert(Obstacle::TickWithoutFrame { tick: recorded.number() });
-            }
-        }
+    fn compare(&mut self, recorded: &PilotTick, made: &PilotTick) {
+        self.last_compared = self.last_compared.max(Some(recorded.input.frame));
+        self.ticks.compare::<LoggedPilot>(LoggedPilot::descriptor().as_ref(), recorded, made);
     }
 
     /// The compared ticks, the report on the frames, and why not all of them were compared. `whole`: the log was read
@@ -143,9 +113,4 @@ impl FromPowerUp {
         };
         (self.ticks, report, self.obstacle)
     }
-}
-
-fn compare<C: Replayed>(tally: &mut Tally, recorded: &C::Tick, made: &C::Tick) {
-    let descriptor = C::descriptor();
-    tally.compare(C::moment(made), descriptor.as_ref(), (recorded, made), || C::apart(recorded, made));
 }

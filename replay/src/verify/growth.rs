@@ -16,8 +16,6 @@ pub struct GrowthStep {
     pub fields_different: usize,
     /// Difference of the gimbal commands, rad.
     pub gimbal_rad: f64,
-    /// Distance of the predicted touchdowns, m; `None` if the record has none.
-    pub touchdown_m: Option<f64>,
     /// The largest distance of the two values of a field, in representable numbers.
     pub worst_ulps: Option<u64>,
 }

@@ -3,7 +3,7 @@
 //! [`verify`] builds the controller from the profile in the log and runs it on every recorded input in tick order. It
 //! compares every field of the output, and the digest of the memory, with the record. Measured times are not compared.
 //!
-//! A log of this release has every frame of the whole flight computer from power-up on, for both vehicles. The whole
+//! A log of this release has every frame of the whole flight computer from power-up on. The whole
 //! computer is then run again, so self-test, arming, countdown, gate and abort are compared as well. Older logs, and
 //! logs of flights that begin at their release, have only ticks from the release on, and the report says so.
 //!

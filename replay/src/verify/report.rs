@@ -1,7 +1,6 @@
 //! The report of a verification.
 
 use serde::Serialize;
-use tick_log::TickLogError;
 
 use super::consequence::Consequence;
 use super::growth::Growth;
@@ -29,7 +28,7 @@ pub enum Verification {
 pub enum Obstacle {
     /// No tick in the log.
     #[error(
-        "it has no controller ticks: replay needs the log of the vehicle or of the demonstration, not of a ground station"
+        "it has no frames of a flight computer that this build knows: replay needs the log of the vehicle or of the demonstration, not of a ground station"
     )]
     NoTicks,
     /// No profile in the log.
@@ -95,9 +94,6 @@ pub enum Obstacle {
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
     Frame(#[from] FrameError),
-    /// This build does not know some value of an input.
-    #[error("{0}")]
-    Input(#[from] TickLogError),
 }
 
 /// As text.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::difference::{FieldDifference, differences};
 use super::growth::{Growth, GrowthStep};
-use crate::controller::Moment;
+use crate::controller::{Moment, Replayed};
 
 /// Most differing fields that are kept of the first diverged tick.
 const FIELDS_KEPT: usize = 32;
@@ -40,15 +40,14 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Compares a record with the recomputed one. `apart` gives the distance of their gimbal commands, rad, and of
-    /// their predicted touchdowns, m.
-    pub(super) fn compare<M: Message>(
+    /// Compares a record with the recomputed one.
+    pub(super) fn compare<C: Replayed>(
         &mut self,
-        moment: Moment,
         descriptor: Option<&MessageDescriptor>,
-        (recorded, again): (&M, &M),
-        apart: impl FnOnce() -> (f64, Option<f64>),
+        recorded: &C::Tick,
+        again: &C::Tick,
     ) {
+        let moment = C::moment(again);
         encode_into(recorded, &mut self.recorded);
         encode_into(again, &mut self.recomputed);
         self.ticks += 1;
@@ -56,16 +55,13 @@ impl Tally {
         self.last = Some(moment);
         if self.recorded != self.recomputed {
             let fields = differences(descriptor, &self.recorded, &self.recomputed);
-            self.differs(moment, fields, apart());
+            let axes = C::gimbal_rad(recorded).iter().zip(C::gimbal_rad(again));
+            let gimbal_rad = axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max);
+            self.differs(moment, fields, gimbal_rad);
         }
     }
 
-    fn differs(
-        &mut self,
-        moment: Moment,
-        mut fields: Vec<FieldDifference>,
-        (gimbal_rad, touchdown_m): (f64, Option<f64>),
-    ) {
+    fn differs(&mut self, moment: Moment, mut fields: Vec<FieldDifference>, gimbal_rad: f64) {
         let Moment { tick, time_s, phase } = moment;
         let fields_different = fields.len();
         self.ticks_different += 1;
@@ -75,7 +71,6 @@ impl Tally {
             time_s,
             fields_different,
             gimbal_rad,
-            touchdown_m,
             worst_ulps: fields.iter().filter_map(|field| field.ulps).max(),
         });
         if self.divergence.is_none() {

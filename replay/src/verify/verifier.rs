@@ -29,8 +29,7 @@ impl<C: Replayed> Verifier<C> {
     /// The recorded input cannot be given to this build's controller.
     pub fn check(&mut self, tick: &C::Tick) -> Result<(), C::Error> {
         let again = self.controller.run_again(tick)?;
-        let compared = (tick, &again);
-        self.tally.compare(C::moment(&again), self.descriptor.as_ref(), compared, || C::apart(tick, &again));
+        self.tally.compare::<C>(self.descriptor.as_ref(), tick, &again);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use replay::sweep::{BisectOptions, bisect};
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
-use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
 
 #[test]
 fn another_seed_is_named_in_the_answer_and_in_the_log() {
@@ -29,7 +29,7 @@ fn another_seed_is_named_in_the_answer_and_in_the_log() {
 #[test]
 fn a_setting_after_the_end_of_the_flight_is_refused() {
     for (log, setting) in
-        [(&NOMINAL.log, "nmpc.weights.w=90@600"), (&LANDED.log, "powered.weights.theta=9@600")]
+        [(&MK2.log, "powered.weights.theta=90@600"), (&LANDED.log, "powered.weights.theta=9@600")]
     {
         let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", setting]));
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
@@ -64,15 +64,15 @@ fn a_bisection_passes_over_values_that_cannot_be_flown() {
 
 #[test]
 fn info_takes_several_logs_and_standard_input() {
-    let (code, stdout, _) = run(replay("info", &NOMINAL.log).arg(&LANDED.log));
+    let (code, stdout, _) = run(replay("info", &MK2.log).arg(&LANDED.log));
     assert!(code == 0 && stdout.matches("grade ").count() == 2, "{stdout}");
-    let (code, stdout, stderr) = run(replay("info", &NOMINAL.log).arg(NOMINAL.beside("none.mcap")));
+    let (code, stdout, stderr) = run(replay("info", &MK2.log).arg(MK2.beside("none.mcap")));
     assert!(
         code == 2 && stdout.contains("grade ") && stderr.contains("none.mcap: cannot be read"),
         "{stderr}"
     );
     let mut child = replay("info", &"-".into()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
-    child.stdin.take().unwrap().write_all(&std::fs::read(&NOMINAL.log).unwrap()).unwrap();
+    child.stdin.take().unwrap().write_all(&std::fs::read(&MK2.log).unwrap()).unwrap();
     let output = child.wait_with_output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(
@@ -83,33 +83,34 @@ fn info_takes_several_logs_and_standard_input() {
 
 #[test]
 fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
-    let text = NOMINAL.beside("notes.mcap");
+    let text = MK2.beside("notes.mcap");
     std::fs::write(&text, "notes").unwrap();
     let telemetry = WITH_FRAMES.beside("swept.tlog");
     let (ground, open) =
         (WITH_FRAMES.beside("swept.mcap"), || replay::log::FlightLog::open(&WITH_FRAMES.log));
     replay::export::export_tlog(&open, None, &telemetry).unwrap();
     replay::import::import_tlog(&telemetry, &ground, &mut |_| {}).unwrap();
-    let (code, stdout, stderr) = run(replay("sweep", &NOMINAL.log).arg(&text).arg(&ground).args([
+    let (code, stdout, stderr) = run(replay("sweep", &MK2.log).arg(&text).arg(&ground).args([
         "--vary",
-        "nmpc.weights.w=80,90",
+        "powered.weights.theta=80,90",
         "--jobs",
         "1",
     ]));
     assert!(code == 0 && stdout.contains("2 points on 1 flight"), "{stdout}{stderr}");
     assert_eq!(stderr.matches("skipped: ").count(), 2, "{stderr}");
-    let (code, _, stderr) = run(replay("sweep", &text).arg(&ground).args(["--vary", "nmpc.weights.w=80,90"]));
+    let (code, _, stderr) =
+        run(replay("sweep", &text).arg(&ground).args(["--vary", "powered.weights.theta=80,90"]));
     assert!(code == 2 && stderr.contains("none of the 2 logs can be flown again"), "{stderr}");
 }
 
 /// A message and its cause do not repeat each other.
 #[test]
 fn no_message_is_printed_twice() {
-    let none = NOMINAL.beside("none.mcap");
-    let mut sweep = replay("sweep", &NOMINAL.log);
-    sweep.args(["--vary", "nmpc.wights.w=80,90"]);
-    let mut unknown = replay("refly", &NOMINAL.log);
-    unknown.args(["--set", "nmpc.wights.w=80"]);
+    let none = MK2.beside("none.mcap");
+    let mut sweep = replay("sweep", &MK2.log);
+    sweep.args(["--vary", "powered.wights.theta=80,90"]);
+    let mut unknown = replay("refly", &MK2.log);
+    unknown.args(["--set", "powered.wights.theta=80"]);
     for mut command in
         [replay("info", &none), replay("verify", &none), replay("report", &none), sweep, unknown]
     {
@@ -129,12 +130,11 @@ fn no_message_is_printed_twice() {
 /// A profile with a key more, and one with a key fewer, are explained.
 #[test]
 fn a_profile_of_another_release_is_explained() {
-    use crate::flown::{FLIGHT, PROFILE, Recipe, write_log};
+    use crate::flown::{FLIGHT, Recipe, mission_toml, write_log};
     let directory = tempfile::tempdir().unwrap();
-    let whole = vehicles::profile::builtin_toml(PROFILE).unwrap();
-    let more = whole.replacen("[nmpc]", "[nmpc]\nfuture_key = 1.0", 1);
-    let fewer: String =
-        whole.split_inclusive('\n').filter(|line| !line.starts_with("sample_time_s")).collect();
+    let whole = mission_toml();
+    let more = whole.replacen("[powered]", "[powered]\nfuture_key = 1.0", 1);
+    let fewer: String = whole.split_inclusive('\n').filter(|line| !line.starts_with("height_m")).collect();
     assert!(more != whole && fewer != whole);
     for (name, text, words) in [
         ("more.mcap", more, "this build does not know that key"),

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, write_log};
 use crate::foreign::foreign_mcap;
 
 pub(crate) struct Files {
@@ -60,7 +60,7 @@ fn the_log_is_identical_with_other_functions_of_the_c_library() {
 fn a_divergence_exits_1_with_both_values_and_bits() {
     let files = Files::new();
     let mut ticks = FLIGHT.ticks[..8].to_vec();
-    let recorded_rad = &mut ticks[6].output.gimbal_command_rad;
+    let recorded_rad = &mut ticks[6].output.fins_rad[2];
     let recomputed_rad = *recorded_rad;
     *recorded_rad = f64::from_bits(recorded_rad.to_bits() ^ 1);
     let (recorded_rad, bits) = (*recorded_rad, recomputed_rad.to_bits());
@@ -69,8 +69,8 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
     assert_eq!(code, 1, "{stdout}");
     for part in [
         "1 of 8 ticks differ, in 1 field",
-        "first at tick 6 (t = 0.600 s, POWERED), 1 field:",
-        "output.gimbal_command_rad",
+        "first at tick 7 (t = 0.035 s, AERO_DESCENT), 1 field:",
+        "output.fins_rad[2]",
         &format!("{recorded_rad:?}"),
         &format!("{recomputed_rad:?}"),
         &format!("0x{bits:016x}"),
@@ -104,8 +104,8 @@ fn a_log_broken_in_the_middle_says_what_span_is_lost() {
     let mut bytes = WHOLE.bytes.clone();
     bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
     let (code, stdout, _) = run(&mut replay("info", &files.file(&bytes)));
-    let until_s = (ticks - 1) as f64 * 0.1;
-    let lost_s = FLIGHT.ticks.len() as f64 * 0.1 - until_s;
+    let until_s = (ticks - 1) as f64 * FRAME_S;
+    let lost_s = FLIGHT.ticks.len() as f64 * FRAME_S - until_s;
     assert_eq!(code, 0);
     assert!(stdout.contains(&format!("readable until {until_s:.3} s")), "{stdout}");
     assert!(stdout.contains(&format!("{lost_s:.3} s after that are lost")), "{stdout}");
@@ -130,7 +130,7 @@ fn a_question_without_an_answer_exits_2_with_the_reason() {
     let (code, stdout, _) =
         run(&mut replay("verify", &files.file(&write_log(&[], &Recipe::default()).bytes)));
     assert_eq!(code, 2);
-    assert!(stdout.contains("no controller ticks"), "{stdout}");
+    assert!(stdout.contains("no frames of a flight computer"), "{stdout}");
     let (code, _, _) = run(Command::new(env!("CARGO_BIN_EXE_replay")).arg("guess"));
     assert_eq!(code, 2);
 }
@@ -139,20 +139,20 @@ fn a_question_without_an_answer_exits_2_with_the_reason() {
 fn the_answers_are_json_too() {
     let files = Files::new();
     let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[7].output.solver.cost = f64::NAN;
+    ticks[7].output.fins_rad[1] = f64::NAN;
     let file = files.file(&write_log(&ticks, &Recipe::default()).bytes);
     let (code, stdout, _) = run(replay("verify", &file).arg("--json"));
     assert_eq!(code, 1);
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(report["outcome"], "diverged");
-    assert_eq!(report["first_divergence"]["tick"], 7);
+    assert_eq!(report["first_divergence"]["tick"], 8);
     assert_eq!(report["first_divergence"]["fields"][0]["recorded"]["value"], "NaN");
 
     let (code, stdout, _) = run(replay("info", &file).arg("--json"));
     assert_eq!(code, 0);
     let info: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(info["grade"]["level"], "bit-exact");
-    assert_eq!(info["ticks"]["count"], 8);
+    assert_eq!(info["frames"]["last"], 8);
 }
 
 #[test]

@@ -1,71 +1,42 @@
 //! Tests the other subcommands: exit codes, formats, and the messages if there is no answer.
 
+use flight::rules::phase::Phase;
+use protocol::log::flight_v1::PilotTick;
+
 use crate::command_line::{Files, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
-use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
 
 #[test]
 fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let files = Files::new();
     let good = files.file(&WHOLE.bytes);
     let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[6].output.gimbal_command_rad = 0.25;
+    ticks[6].output.gimbal_rad[1] = 0.25;
     let bad = files.directory.path().join("bad <&>.mcap");
     std::fs::write(&bad, write_log(&ticks, &Recipe::default()).bytes).unwrap();
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--junit"));
     assert_eq!(code, 1);
     assert!(stdout.contains("tests=\"2\" skipped=\"0\" failures=\"1\" errors=\"0\""), "{stdout}");
-    // The hand-made log ends slightly below the ground; the simulation does not.
-    assert!(stdout.contains("verdict: would CHANGE: recorded NOT LANDED"), "{stdout}");
-    assert!(
-        stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_command_rad"),
-        "{stdout}"
-    );
+    // The verdict of this log is hand-made; the flight itself lands.
+    assert!(stdout.contains("verdict: would not change: recorded LANDED"), "{stdout}");
+    assert!(stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--json"));
     let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, reports.as_array().unwrap().len()), (1, 2));
-    assert_eq!(reports[1]["growth"]["steps"][0]["tick"], 6);
-    assert_eq!(reports[1]["growth"]["peak"]["tick"], 6);
-}
-
-/// The record claims another command; this build, flying on from there, lands as the vehicle did.
-#[test]
-fn a_divergence_report_says_whether_the_verdict_would_change() {
-    let recording = NOMINAL.recording();
-    let path = NOMINAL.beside("forged.mcap");
-    let options = replay::refly::ReflyOptions::default();
-    let (report, mut flight) = replay::refly::refly_flight(&recording, &options).unwrap();
-    flight.ticks[20].record.output.gimbal_command_rad = 0.2;
-    replay::refly::write_log(&path, &recording, &options, &report, &flight).unwrap();
-    let (code, stdout, _) = run(&mut replay("verify", &path));
-    assert_eq!(code, 1);
-    assert!(stdout.contains("how it grows"), "{stdout}");
-    assert!(
-        stdout.contains("verdict: would not change: recorded LANDED, flown on by this build from tick"),
-        "{stdout}"
-    );
-    // A motor that is weak in the record is weak again when the flight is continued.
-    let weak = replay::refly::ReflyOptions {
-        plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],
-        ..options
-    };
-    let (report, mut flight) = replay::refly::refly_flight(&recording, &weak).unwrap();
-    flight.ticks[20].record.output.gimbal_command_rad = 0.2;
-    let path = NOMINAL.beside("crashed.mcap");
-    replay::refly::write_log(&path, &recording, &weak, &report, &flight).unwrap();
-    let (_, stdout, _) = run(&mut replay("verify", &path));
-    assert!(stdout.contains("verdict: would not change: recorded NOT LANDED"), "{stdout}");
+    assert_eq!(reports[1]["growth"]["steps"][0]["tick"], 7);
+    assert_eq!(reports[1]["growth"]["peak"]["tick"], 7);
 }
 
 #[test]
 fn a_comparison_exits_1_outside_its_tolerance() {
-    let nominal = &NOMINAL;
+    let nominal = &MK2;
     let dispersed = &DISPERSED;
     let (code, stdout, _) = run(replay("compare", &nominal.log).arg(&nominal.log));
     assert_eq!(code, 0, "{stdout}");
     assert!(stdout.contains("**Within tolerance.**"), "{stdout}");
     let tolerances = nominal.beside("tolerances.toml");
-    std::fs::write(&tolerances, "[signals.\"vehicle_truth.state.x_m\"]\nmax = 1e-6\n").unwrap();
+    std::fs::write(&tolerances, "[signals.\"vehicle_truth3d.state.position_m.x\"]\nmax = 1e-6\n").unwrap();
     let compare = |flag: Option<&str>| {
         let mut command = replay("compare", &nominal.log);
         command.arg(&dispersed.log).arg("--tolerances").arg(&tolerances).args(flag);
@@ -73,37 +44,44 @@ fn a_comparison_exits_1_outside_its_tolerance() {
     };
     let (code, stdout, _) = compare(None);
     assert_eq!(code, 1);
-    assert!(stdout.contains("| vehicle_truth.state.x_m |") && stdout.contains("**EXCEEDED**"), "{stdout}");
+    assert!(
+        stdout.contains("| vehicle_truth3d.state.position_m.x |") && stdout.contains("**EXCEEDED**"),
+        "{stdout}"
+    );
     let (code, stdout, _) = compare(Some("--junit"));
     assert_eq!(code, 1);
-    assert!(stdout.contains("failures=\"1\"") && stdout.contains("vehicle_truth.state.x_m"), "{stdout}");
+    assert!(
+        stdout.contains("failures=\"1\"") && stdout.contains("vehicle_truth3d.state.position_m.x"),
+        "{stdout}"
+    );
     let (code, stdout, _) = compare(Some("--json"));
     let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, found[0]["align"].as_str()), (1, Some("ignition")));
-    std::fs::write(&tolerances, "[signals.\"vehicle_truth.stat.x_m\"]\nmax = 1e-6\n").unwrap();
+    std::fs::write(&tolerances, "[signals.\"vehicle_truth3d.stat.position_m.x\"]\nmax = 1e-6\n").unwrap();
     let (code, _, stderr) = compare(None);
     assert_eq!(code, 2);
-    assert!(stderr.contains("the nearest is `vehicle_truth.state.x_m`"), "{stderr}");
+    assert!(stderr.contains("the nearest is `vehicle_truth3d.state.position_m.x`"), "{stderr}");
 }
 
 #[test]
 fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
-    let log = &NOMINAL.log;
+    let log = &MK2.log;
     for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
-        let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75"]));
+        let (code, stdout, _) = run(replay(question, log).args(["--set", "powered.weights.theta=75"]));
         assert_eq!(code, 0);
         assert!(stdout.contains(kind), "{stdout}");
-        let (code, stdout, _) = run(replay(question, log).args(["--set", "nmpc.weights.w=75", "--json"]));
+        let (code, stdout, _) =
+            run(replay(question, log).args(["--set", "powered.weights.theta=75", "--json"]));
         let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
         assert!(code == 0 && report["kind"].as_str().unwrap().starts_with(kind));
-        let (code, stdout, stderr) = run(replay(question, log).args(["--set", "nmpc.wieghts.w=75"]));
+        let (code, stdout, stderr) = run(replay(question, log).args(["--set", "powered.wieghts.theta=75"]));
         assert_eq!((code, stdout.as_str()), (2, ""));
-        assert!(stderr.contains("did you mean `nmpc.weights.w`?"), "{stderr}");
+        assert!(stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
     }
-    let settings = NOMINAL.beside("settings.toml");
-    std::fs::write(&settings, "nmpc.weights.w = 75\n").unwrap();
+    let settings = MK2.beside("settings.toml");
+    std::fs::write(&settings, "powered.weights.theta = 75\n").unwrap();
     let (_, from_file, _) = run(replay("evaluate", log).arg("--settings").arg(&settings).arg("--csv"));
-    let (_, from_flag, _) = run(replay("evaluate", log).args(["--set", "nmpc.weights.w=75", "--csv"]));
+    let (_, from_flag, _) = run(replay("evaluate", log).args(["--set", "powered.weights.theta=75", "--csv"]));
     assert_eq!(from_file, from_flag);
 }
 
@@ -114,7 +92,12 @@ fn a_sweep_says_the_same_on_any_number_of_threads() {
     let log = &DISPERSED.log;
     let sweep = |jobs: &str, tunables: &str| {
         let mut command = replay("sweep", log);
-        command.args(["--vary", "nmpc.weights.w=50:110:3", "--vary-plant", "plant.thrust_scale=0.99,1.0"]);
+        command.args([
+            "--vary",
+            "powered.weights.theta=50:110:3",
+            "--vary-plant",
+            "truth.impulse_scale=0.99,1.0",
+        ]);
         command.args(["--csv", "--jobs", jobs]).env("GLIBC_TUNABLES", tunables);
         run(&mut command)
     };
@@ -143,33 +126,36 @@ fn an_unreadable_log_does_not_hide_the_others() {
 
 #[test]
 fn a_tick_is_shown_and_a_missing_tick_exits_2() {
-    let (code, stdout, _) = run(replay("tick", &NOMINAL.log).arg("30"));
+    let frames = MK2.recording().frames;
+    let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+    let planning = frames.iter().filter(in_burn).nth(40).unwrap().input.frame.next_multiple_of(10);
+    let planning = planning.to_string();
+    let (code, stdout, _) = run(replay("tick", &MK2.log).arg(&planning));
     assert_eq!(code, 0);
     for part in [
         "identical bit for bit",
         "warm     converged",
         "cold     converged",
         "active   z_m = 0",
-        "path     +0.1 s",
+        "path     +0.0 s",
     ] {
         assert!(stdout.contains(part), "{part} is not in\n{stdout}");
     }
-    let (code, stdout, _) = run(replay("tick", &NOMINAL.log).args(["30", "--json"]));
+    let (code, stdout, _) = run(replay("tick", &MK2.log).args([&planning, "--json"]));
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-    assert_eq!((code, report["tick"].as_u64()), (0, Some(30)));
-    let (code, _, stderr) = run(replay("tick", &NOMINAL.log).arg("3000"));
-    assert!(code == 2 && stderr.contains("no tick 3000"), "{stderr}");
+    assert_eq!((code, report["tick"].as_u64()), (0, planning.parse().ok()));
+    let (code, _, stderr) = run(replay("tick", &MK2.log).arg("300000"));
+    assert!(code == 2 && stderr.contains("no tick 300000"), "{stderr}");
 }
 
 #[test]
 fn a_bisection_is_shown() {
     let arguments =
-        ["plant.thrust_scale", "--of-plant", "--value", "1", "--lowest", "0.95", "--highest", "1.01"];
-    let (code, stdout, _) = run(replay("bisect", &NOMINAL.log).args(arguments));
+        ["truth.impulse_scale", "--of-plant", "--lowest", "0.6", "--highest", "1.3", "--steps", "4"];
+    let (code, stdout, _) = run(replay("bisect", &MK2.log).args(arguments));
     assert_eq!(code, 0);
     assert!(stdout.contains("the smallest change that changes the verdict: -"), "{stdout}");
-    let (code, _, stderr) =
-        run(replay("bisect", &NOMINAL.log).args(["a.b", "--lowest", "2", "--highest", "1"]));
+    let (code, _, stderr) = run(replay("bisect", &MK2.log).args(["a.b", "--lowest", "2", "--highest", "1"]));
     assert!(code == 2 && stderr.contains("must be below"), "{stderr}");
 }
 
@@ -181,8 +167,8 @@ fn the_command_exports_and_imports_logs() {
     for format in ["csv", "parquet"] {
         let (code, stdout, _) =
             run(replay("export", &WITH_FRAMES.log).args(["--to", format, "--output"]).arg(at(format)));
-        assert!(code == 0 && stdout.contains("vehicle_truth"), "{stdout}");
-        assert!(at(format).join(format!("controller_tick.{format}")).exists());
+        assert!(code == 0 && stdout.contains("vehicle_truth3d"), "{stdout}");
+        assert!(at(format).join(format!("pilot_tick.{format}")).exists());
     }
     let tlog = at("flight.tlog");
     let (code, stdout, _) =
@@ -196,7 +182,7 @@ fn the_command_exports_and_imports_logs() {
     assert!(code == 0 && stdout.contains("page.html"), "{stdout}");
     assert!(std::fs::read_to_string(at("page.html")).unwrap().starts_with("<!DOCTYPE html>"));
     let (code, _, stderr) =
-        run(replay("export", &NOMINAL.log).args(["--to", "tlog", "--output"]).arg(at("none.tlog")));
+        run(replay("export", &MK2.log).args(["--to", "tlog", "--output"]).arg(at("none.tlog")));
     assert!(code == 2 && stderr.contains("no raw MAVLink frames"), "{stderr}");
 }
 
@@ -237,8 +223,8 @@ fn every_command_refuses_a_file_that_is_not_a_log() {
             &["evaluate"][..],
             &["refly"],
             &["tick", "1"],
-            &["sweep", "--vary", "nmpc.weights.w=1:2:2"],
-            &["bisect", "nmpc.weights.w", "--lowest", "1", "--highest", "2"],
+            &["sweep", "--vary", "powered.weights.theta=1:2:2"],
+            &["bisect", "powered.weights.theta", "--lowest", "1", "--highest", "2"],
             &["report", "--output", "-"],
             &["export", "--to", "csv", "--output", output],
             &["compare"],

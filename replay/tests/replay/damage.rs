@@ -1,19 +1,19 @@
 //! Tests cut and broken logs: no panic, everything before the damage is used, and no damage goes unnoticed.
 
 use proptest::prelude::*;
-use protocol::log::v1::ControllerTick;
+use protocol::log::flight_v1::PilotTick;
 use replay::info::{GradeLevel, info_of};
 use replay::log::{Entry, FlightLog, LogError};
 use replay::verify::Verification;
 
-use crate::flown::{FLIGHT, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
+use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
 
 /// Every tick that can be read, and whether the log is damaged.
-fn read_ticks(bytes: &[u8]) -> Result<(Vec<ControllerTick>, bool), LogError> {
+fn read_ticks(bytes: &[u8]) -> Result<(Vec<PilotTick>, bool), LogError> {
     let mut log = FlightLog::read("test.mcap".to_owned(), bytes)?;
     let mut ticks = Vec::new();
     while let Some(stamped) = log.next_entry()? {
-        if let Entry::Tick(tick) = stamped.entry {
+        if let Entry::PilotTick(tick) = stamped.entry {
             ticks.push(*tick);
         }
     }
@@ -65,10 +65,10 @@ fn a_cut_log_is_described_up_to_the_cut() {
     let mut log = FlightLog::read("test.mcap".to_owned(), cut).unwrap();
     let info = info_of(&mut log, || None).unwrap();
     assert_eq!(info.grade.level, GradeLevel::BitExact);
-    assert_eq!(info.ticks.unwrap().count, ticks as u64);
+    assert_eq!(info.frames.unwrap().last, ticks as u64);
     assert!(!info.completeness.complete);
     let until_s = info.completeness.readable_until_s.unwrap();
-    assert!((until_s - (ticks - 1) as f64 * 0.1).abs() < 1e-6, "{until_s}");
+    assert!((until_s - (ticks - 1) as f64 * FRAME_S).abs() < 1e-6, "{until_s}");
 }
 
 /// Records shorter than their fields, of every known and unknown type, after a good beginning.
@@ -93,20 +93,20 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
 #[test]
 fn every_bit_pattern_survives_the_log() {
     let patterns = [0x7ff8_0000_0000_0001, 0xfff0_dead_beef_cafe, 0x8000_0000_0000_0000, 1, u64::MAX];
-    let ticks: Vec<ControllerTick> = (0..)
+    let ticks: Vec<PilotTick> = (1..)
         .zip(patterns)
         .map(|(number, bits)| {
             let mut tick = idle_tick(number);
-            tick.input.state.w_m_s = f64::from_bits(bits);
-            tick.output.gimbal_command_rad = f64::from_bits(bits);
+            tick.input.time_s = f64::from_bits(bits);
+            tick.output.gimbal_rad[0] = f64::from_bits(bits);
             tick
         })
         .collect();
     let (read, damaged) = read_ticks(&write_log(&ticks, &Recipe::default()).bytes).unwrap();
     assert!(!damaged);
     for (tick, bits) in read.iter().zip(patterns) {
-        assert_eq!(tick.input.state.w_m_s.to_bits(), bits);
-        assert_eq!(tick.output.gimbal_command_rad.to_bits(), bits);
+        assert_eq!(tick.input.time_s.to_bits(), bits);
+        assert_eq!(tick.output.gimbal_rad[0].to_bits(), bits);
     }
     assert_eq!(read.len(), patterns.len());
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
-use crate::simulated::{NOMINAL, WITH_FRAMES};
+use crate::simulated::{MK2, WITH_FRAMES};
 use crate::tampered::Held;
 
 /// The log with one byte changed in the middle of a chunk, a quarter of the way in.
@@ -42,7 +42,7 @@ fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String
 #[test]
 fn a_log_with_a_flipped_byte_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
-    for log in [&LANDED.log, &NOMINAL.log] {
+    for log in [&LANDED.log, &MK2.log] {
         let all = Held::read(log).ticks();
         let path = flipped(log, &directory);
         let (code, stdout, _) = run(&mut replay("verify", &path));
@@ -78,7 +78,7 @@ fn a_log_cut_before_its_first_message_has_no_answer() {
     let tables = directory.path().join("csv").display().to_string();
     let questions: [&[&str]; 4] =
         [&["info"], &["verify"], &["evaluate"], &["export", "--to", "csv", "--output", &tables]];
-    for log in [&LANDED.log, &NOMINAL.log] {
+    for log in [&LANDED.log, &MK2.log] {
         std::fs::write(&path, &std::fs::read(log).unwrap()[..100]).unwrap();
         for question in questions {
             let (code, stdout, stderr) = run(replay(question[0], &path).args(&question[1..]));
@@ -106,8 +106,8 @@ fn no_command_is_silent_about_damage() {
         &["evaluate"],
         &["refly", "--log", &again],
         &["tick", "20"],
-        &["sweep", "--vary", "nmpc.weights.w=75,80"],
-        &["bisect", "nmpc.weights.w", "--lowest", "70", "--highest", "80"],
+        &["sweep", "--vary", "powered.weights.theta=75,80"],
+        &["bisect", "powered.weights.theta", "--lowest", "70", "--highest", "80"],
         &["report", "--output", &html],
         &["export", "--to", "csv", "--output", &csv],
         &["export", "--to", "tlog", "--output", &tlog],

@@ -14,16 +14,15 @@ fn log(name: &str) -> PathBuf {
 
 #[test]
 fn the_recorded_decisions_are_made_again_bit_for_bit() {
-    for (name, ticks, digests) in [("planar-schema-1.mcap", 68, true), ("mk2-schema-1.mcap", 3_132, false)] {
-        let report = verify(&log(name)).unwrap().remove(0);
-        assert_eq!(report.outcome, Verification::Identical, "{report:?}");
-        assert_eq!((report.ticks_compared, report.ticks_identical), (ticks, ticks));
-        assert_eq!((report.frames.as_ref(), report.digests_compared), (None, digests));
-        let mut said = Vec::new();
-        print_verify(&report, &mut said).unwrap();
-        let said = String::from_utf8(said).unwrap();
-        assert!(said.contains("no frames of the flight computer from power-up"), "{said}");
-        assert_eq!(said.contains("what it remembered was not compared"), !digests, "{said}");
-        assert_eq!(info(&log(name)).unwrap().schema.version, 1);
-    }
+    let name = "mk2-schema-1.mcap";
+    let report = verify(&log(name)).unwrap().remove(0);
+    assert_eq!(report.outcome, Verification::Identical, "{report:?}");
+    assert_eq!((report.ticks_compared, report.ticks_identical), (3_132, 3_132));
+    assert_eq!((report.frames.as_ref(), report.digests_compared), (None, false));
+    let mut said = Vec::new();
+    print_verify(&report, &mut said).unwrap();
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("no frames of the flight computer from power-up"), "{said}");
+    assert!(said.contains("what it remembered was not compared"), "{said}");
+    assert_eq!(info(&log(name)).unwrap().schema.version, 1);
 }

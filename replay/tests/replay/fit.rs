@@ -12,7 +12,7 @@ use sim::recipe::Recipe;
 
 use crate::command_line::run;
 use crate::from_apogee::LANDED;
-use crate::simulated::{MK2, NOMINAL};
+use crate::simulated::MK2;
 
 fn asked(arguments: &[&str]) -> (i32, String, String) {
     run(Command::new(env!("CARGO_BIN_EXE_replay")).arg("fit").args(arguments))
@@ -103,13 +103,6 @@ fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
     let (code, stdout, stderr) = asked(&[landed, "none.mcap"]);
     assert_eq!(code, 2);
     assert!(stdout.contains("thrust_scale") && stderr.contains("none.mcap: cannot be read"), "{stderr}");
-}
-
-#[test]
-fn a_planar_log_is_refused_with_the_reason() {
-    let (code, _, stderr) = asked(&[NOMINAL.log.to_str().unwrap()]);
-    assert_eq!(code, 2);
-    assert!(stderr.contains("it is the planar vehicle's"), "{stderr}");
 }
 
 #[test]

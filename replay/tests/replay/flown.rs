@@ -1,84 +1,68 @@
-//! Flies a short landing with the real controller against its own model, and writes logs of it.
+//! The first frames of a simulated flight, and logs of them: short, so that they can be cut and broken everywhere.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
 use std::sync::LazyLock;
 
-use flight::guidance::controller::{ControllerConfig, ControllerInput, ControllerState, step};
-use flight::rules::phase::Phase;
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use protocol::log::flight_v1::{PilotStart, PilotTick, PilotTiming};
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::log::{FlightLog, LogError};
 use replay::verify::{VerifyReport, verify_log};
-use tick_log::{state_to_log, tick_to_log, verdict_to_log};
+use sim::recipe::Recipe as FlightRecipe;
+use sim::sortie::Sortie;
+use tick_log::pilot::tick_to_log;
+use tick_log::sortie::{campaign_header, pilot_start};
 
-pub(crate) const PROFILE: &str = "paper-calibrated";
-const PAD_TICKS: u64 = 4;
-const TICK_NS: u64 = 100_000_000;
-const DEADLINE_S: f64 = 0.1;
-const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
+pub(crate) const MISSION: &str = "mk2";
+const FRAMES: usize = 68;
+const NUMBER: u64 = 3;
+pub(crate) const FRAME_NS: u64 = 5_000_000;
+pub(crate) const FRAME_S: f64 = 0.005;
+const DEADLINE_S: f64 = 0.005;
 
-/// A flown landing.
+/// The beginning of a flight from apogee, with a verdict as if it had come down then.
 pub(crate) struct Flight {
-    pub(crate) ticks: Vec<v1::ControllerTick>,
+    pub(crate) start: PilotStart,
+    pub(crate) ticks: Vec<PilotTick>,
     pub(crate) verdict: v1::LandingVerdict,
+    header: LogHeader,
 }
 
-/// The landing every test starts from, flown once.
-pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| fly(|_| ()));
-
-/// Pad, release and landing burn to the ground; the plant is the controller's own model, stepped at 1 ms. The
-/// controller's inputs may be changed.
-pub(crate) fn fly(tell: impl Fn(&mut ControllerInput)) -> Flight {
-    let profile = vehicles::profile::builtin(PROFILE).unwrap();
-    let config = ControllerConfig::from_profile(&profile);
-    let model = profile.planar_model();
-    let mut controller = ControllerState::new(&config);
-    let mut plant = profile.start.planar_state();
-    // The command of a tick is held during the next one.
-    let mut held_rad = 0.0;
+/// The flight every test starts from, flown once.
+pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
+    let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
+    let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
+    let start = pilot_start(&flight);
     let mut ticks = Vec::new();
-    for tick in 0..1000_u64 {
-        let burn_tick = tick.checked_sub(PAD_TICKS);
-        let since_s = burn_tick.map_or(0.0, |n| n as f64 * config.sample_time_s());
-        let phase = match (tick, burn_tick) {
-            (0 | 1, _) => Phase::PadIdle,
-            (_, None) => Phase::PadArmed,
-            (_, Some(0)) => Phase::Ignition,
-            _ => Phase::Powered,
-        };
-        let mut input = ControllerInput {
-            tick,
-            time_s: tick as f64 * config.sample_time_s(),
-            phase,
-            time_since_ignition_s: since_s,
-            state: plant,
-            gimbal_applied_rad: held_rad,
-            thrust_scale: 1.0,
-            degraded: false,
-            lands_here: false,
-            deadline_missed: false,
-        };
-        tell(&mut input);
-        let output = step(&mut controller, &input);
-        let solve_time_s = 0.001 * (tick % 7 + 1) as f64;
-        ticks.push(tick_to_log(&input, &output, controller.digest(), solve_time_s, DEADLINE_S));
-        if burn_tick.is_some() {
-            for millisecond in 0..100 {
-                let thrust_n = profile.motor.mean_thrust_n(since_s + f64::from(millisecond) * 1e-3, 1e-3);
-                plant = model.rk4_step(&plant, held_rad, thrust_n, 1e-3);
-                if plant.z_m <= 0.0 {
-                    let verdict = LandingVerdict::judge(&TouchdownLimits::from_profile(&profile), &plant);
-                    return Flight { ticks, verdict: verdict_to_log(input.time_s, &plant, &verdict) };
-                }
-            }
-            held_rad = output.gimbal_command_rad;
-        }
+    while ticks.len() < FRAMES {
+        flight.step();
+        let (input, output) = flight.computer().piloted().unwrap();
+        ticks.push(tick_to_log(input, output, flight.computer().flight_digest()));
     }
-    panic!("the test flight has not come down");
+    let limit = |name: &str| v1::LimitResult {
+        name: name.to_owned(),
+        value: 0.5,
+        minimum: -1.0,
+        maximum: 1.0,
+        unit: "m".to_owned(),
+        passed: true,
+    };
+    let verdict = v1::LandingVerdict {
+        time_s: FRAMES as f64 * FRAME_S,
+        landed: true,
+        limits: ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"]
+            .map(limit)
+            .into(),
+        ..v1::LandingVerdict::default()
+    };
+    Flight { start, ticks, verdict, header: campaign_header(&recipe, NUMBER) }
+});
+
+/// The mission of the flight.
+pub(crate) fn mission_toml() -> &'static str {
+    vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap().1
 }
 
 /// Options of a log.
@@ -89,41 +73,35 @@ pub(crate) struct Recipe {
 
 impl Default for Recipe {
     fn default() -> Self {
-        Self { profile_toml: vehicles::profile::builtin_toml(PROFILE).map(str::to_owned), with_frames: true }
+        Self { profile_toml: Some(mission_toml().to_owned()), with_frames: true }
     }
 }
 
 /// A written log.
 pub(crate) struct Written {
     pub(crate) bytes: Vec<u8>,
-    /// File size and number of ticks at each sync.
+    /// File size and number of frames at each sync.
     pub(crate) synced: Vec<(u64, usize)>,
 }
 
-/// A log of these ticks, synced after every fifth.
-pub(crate) fn write_log(ticks: &[v1::ControllerTick], recipe: &Recipe) -> Written {
+/// A log of these frames, synced after every fifth. The start is left out if there are no frames.
+pub(crate) fn write_log(ticks: &[PilotTick], recipe: &Recipe) -> Written {
     let file = tempfile::tempfile().unwrap();
-    let header = LogHeader {
-        writer: "test".to_owned(),
-        start_unix_ns: START_UNIX_NS,
-        run: BTreeMap::from([
-            ("profile".to_owned(), PROFILE.to_owned()),
-            ("seed".to_owned(), "7".to_owned()),
-        ]),
-        profile_toml: recipe.profile_toml.clone(),
-        scenario_toml: None,
-    };
+    let header = LogHeader { profile_toml: recipe.profile_toml.clone(), ..FLIGHT.header.clone() };
     let mut writer = LogWriter::new(file.try_clone().unwrap(), &header).unwrap();
     let mut synced = Vec::new();
     let size = |file: &File| file.metadata().unwrap().len();
+    if !ticks.is_empty() {
+        writer.write(&Record::PilotStart(Box::new(FLIGHT.start)), 0).unwrap();
+    }
     for (index, tick) in ticks.iter().enumerate() {
-        let time_ns = index as u64 * TICK_NS;
+        let time_ns = index as u64 * FRAME_NS;
         if recipe.with_frames {
             for record in around(tick) {
                 writer.write(&record, time_ns).unwrap();
             }
         }
-        writer.write(&Record::from(tick.clone()), time_ns).unwrap();
+        writer.write(&Record::PilotTick(Box::new(tick.clone())), time_ns).unwrap();
         if index % 5 == 4 {
             writer.flush().unwrap();
             synced.push((size(&file), index + 1));
@@ -131,7 +109,7 @@ pub(crate) fn write_log(ticks: &[v1::ControllerTick], recipe: &Recipe) -> Writte
     }
     if recipe.with_frames {
         let verdict = Record::LandingVerdict(Box::new(FLIGHT.verdict.clone()));
-        writer.write(&verdict, ticks.len() as u64 * TICK_NS).unwrap();
+        writer.write(&verdict, ticks.len() as u64 * FRAME_NS).unwrap();
     }
     writer.flush().unwrap();
     synced.push((size(&file), ticks.len()));
@@ -142,22 +120,23 @@ pub(crate) fn write_log(ticks: &[v1::ControllerTick], recipe: &Recipe) -> Writte
     Written { bytes, synced }
 }
 
-/// What else a vehicle records at a tick.
-fn around(tick: &v1::ControllerTick) -> [Record; 3] {
+/// What else a vehicle records in a frame.
+fn around(tick: &PilotTick) -> [Record; 3] {
     let frame = RawFrame {
         direction: Direction::Tx,
         endpoint: "vehicle",
         link: "udpout:127.0.0.1:14550".to_owned(),
         bytes: vec![0xfd; 40],
     };
-    let truth = v1::PlantTruth {
-        time_s: tick.input.time_s,
-        phase: tick.input.phase,
-        state: tick.input.state,
-        ..v1::PlantTruth::default()
+    let PilotTick { input, .. } = tick;
+    let timing = PilotTiming {
+        frame: input.frame,
+        time_s: input.time_s,
+        solve_time_s: 0.001 * (input.frame % 7 + 1) as f64,
+        deadline_s: DEADLINE_S,
     };
-    let event = Event { level: EventLevel::Info, name: "vehicle".to_owned(), message: "tick".to_owned() };
-    [Record::RawFrame(frame), Record::PlantTruth(Box::new(truth)), Record::Event(event)]
+    let event = Event { level: EventLevel::Info, name: "vehicle".to_owned(), message: "frame".to_owned() };
+    [Record::RawFrame(frame), Record::PilotTiming(timing), Record::Event(event)]
 }
 
 /// A log of the whole flight.
@@ -180,16 +159,15 @@ pub(crate) fn verify_bytes(bytes: &[u8]) -> Result<VerifyReport, LogError> {
     reports.map(only)
 }
 
-/// Verifies a log of these ticks.
-pub(crate) fn verify_ticks(ticks: &[v1::ControllerTick]) -> VerifyReport {
+/// Verifies a log of these frames.
+pub(crate) fn verify_ticks(ticks: &[PilotTick]) -> VerifyReport {
     let recipe = Recipe { with_frames: false, ..Recipe::default() };
     verify_bytes(&write_log(ticks, &recipe).bytes).unwrap()
 }
 
-/// A tick whose state estimate is upright and still; for tests that need no flight.
-pub(crate) fn idle_tick(number: u64) -> v1::ControllerTick {
+/// A frame with this number; for tests that need no flight.
+pub(crate) fn idle_tick(number: u64) -> PilotTick {
     let mut tick = FLIGHT.ticks[0].clone();
-    tick.input.tick = number;
-    tick.input.state = state_to_log(&vehicles::profile::builtin(PROFILE).unwrap().start.planar_state());
+    tick.input.frame = number;
     tick
 }

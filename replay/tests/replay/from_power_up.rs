@@ -1,5 +1,4 @@
-//! Tests that the whole flight computer is run again from power-up on, for both vehicles: pin, arming, countdown, hold,
-//! abort, restart.
+//! Tests that the whole flight computer is run again from power-up on: pin, arming, countdown, hold, abort, restart.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,13 +16,11 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, refly};
 use replay::verify::{Obstacle, Verification, VerifyReport, verify};
-use sim::plane::draw::draw;
-use sim::plane::{DeadlinePolicy, PlanarFlight};
 use sim::recipe::Recipe;
 use simulated_vehicle::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use tempfile::TempDir;
 
-/// More frames than any flight of either vehicle has.
+/// More frames than any flight has.
 const LONGEST: u64 = 20_000;
 
 const STATION: Station = Station { system: 255, component: 190, number: 1 };
@@ -50,26 +47,37 @@ fn of(frame: u64, role: Role, asked: Asked, confirms: Option<u16>) -> Reached {
     Reached { request: Some(request), ..self::asked(frame, asked) }
 }
 
+/// The frame in which the second one confirms the arming.
+const CONFIRMED: u64 = 1_210;
+
 /// Two people arm and start; then the second one taps this many times.
 fn two_people(taps: u64) -> Vec<Reached> {
     let (flight, range) = (Role::Flight, Role::RangeSafety);
     let mut crew = vec![
-        of(100, flight, Asked::Arm, None),
+        of(1_200, flight, Asked::Arm, None),
         // The same role, and the number of another ask.
-        of(105, flight, Asked::Arm, Some(65_535)),
-        of(106, range, Asked::Arm, Some(7)),
-        of(110, range, Asked::Arm, Some(65_535)),
-        of(120, flight, Asked::Start, None),
+        of(1_205, flight, Asked::Arm, Some(65_535)),
+        of(1_206, range, Asked::Arm, Some(7)),
+        of(CONFIRMED, range, Asked::Arm, Some(65_535)),
+        of(1_220, flight, Asked::Start, None),
         // The numbers have begun again.
-        of(130, range, Asked::Start, Some(1)),
+        of(1_230, range, Asked::Start, Some(1)),
     ];
-    crew.extend((1..=taps).map(|nth| of(130 + 50 * nth, range, Asked::Tap, None)));
+    crew.extend((1..=taps).map(|nth| of(1_230 + 200 * nth, range, Asked::Tap, None)));
     crew
 }
 
 /// A crew that arms, starts, and does nothing else.
 fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
+}
+
+/// A vehicle, and the header of its log.
+fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
+    let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+    let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
+    let header = tick_log::sortie::header("test", &recipe, 0, 0);
+    (Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), header)
 }
 
 /// A flight with its log.
@@ -81,21 +89,10 @@ struct Flown {
 }
 
 impl Flown {
-    fn in_plane(crew: &[Reached]) -> Self {
-        Self::in_plane_with(crew, |vehicle| vehicle)
-    }
-
     /// Of a vehicle that two people arm and start.
     fn by_two(crew: &[Reached]) -> Self {
-        Self::in_plane_with(crew, |vehicle| vehicle.with_crew(People::Two { first_ask: 65_534 }, Vec::new()))
-    }
-
-    fn in_plane_with(crew: &[Reached], prepared: impl FnOnce(Vehicle) -> Vehicle) -> Self {
-        let toml = vehicles::profile::BUILTIN.iter().find(|(name, _)| *name == "paper-calibrated").unwrap().1;
-        let profile = vehicles::profile::builtin("paper-calibrated").unwrap();
-        let flight = PlanarFlight::new(&profile, draw(&profile, 1), DeadlinePolicy::Observe).unwrap();
-        let header = LogHeader { profile_toml: Some(toml.to_owned()), ..LogHeader::default() };
-        Self::fly(prepared(Vehicle::in_plane(flight)), header, crew)
+        let (vehicle, header) = vehicle(StartPoint::Apogee, &[]);
+        Self::fly(vehicle.with_crew(People::Two { first_ask: 65_534 }, Vec::new()), header, crew)
     }
 
     fn in_space(crew: &[Reached], faults: &[&str]) -> Self {
@@ -103,11 +100,8 @@ impl Flown {
     }
 
     fn from(start: StartPoint, crew: &[Reached], faults: &[&str]) -> Self {
-        let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-        let recipe =
-            Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
-        let header = tick_log::sortie::header("test", &recipe, 0, 0);
-        Self::fly(Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), header, crew)
+        let (vehicle, header) = vehicle(start, faults);
+        Self::fly(vehicle, header, crew)
     }
 
     fn fly(mut vehicle: Vehicle, header: LogHeader, crew: &[Reached]) -> Self {
@@ -143,13 +137,6 @@ impl Flown {
         let mut changed = false;
         for event in events {
             match event {
-                VehicleEvent::Tick(tick) => keep(Record::from(tick_log::tick_to_log(
-                    &tick.tick.input,
-                    &tick.tick.output,
-                    tick.tick.state_digest,
-                    tick.solve_time_s,
-                    tick.deadline_s,
-                ))),
                 VehicleEvent::Verdict { .. } => {
                     keep(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
@@ -157,7 +144,7 @@ impl Flown {
                     self.phases.push(*to);
                     changed = true;
                 }
-                VehicleEvent::Planned { .. } | VehicleEvent::Text { .. } => {}
+                _ => {}
             }
         }
         vehicle.records(changed).into_iter().for_each(&mut keep);
@@ -210,19 +197,16 @@ fn frame_of(record: &Record) -> Option<u64> {
 }
 
 #[test]
-fn both_vehicles_verify_from_power_up_to_safed() {
-    for flown in [Flown::in_plane(&armed_and_started(100)), Flown::in_space(&armed_and_started(1_200), &[])] {
-        assert!(flown.phases.starts_with(&[Phase::PadIdle, Phase::PadArmed]), "{:?}", flown.phases);
-        assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
-        let report = flown.verified();
-        assert_eq!(report.outcome, Verification::Identical, "{report:?}");
-        assert_eq!(all_frames_identical(&report), flown.frames());
-        assert!(report.ticks_compared > 60);
-    }
+fn a_flight_verifies_from_power_up_to_safed() {
+    let flown = Flown::in_space(&armed_and_started(1_200), &[]);
+    assert!(flown.phases.starts_with(&[Phase::PadIdle, Phase::PadArmed]), "{:?}", flown.phases);
+    assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
+    let report = flown.verified();
+    assert_eq!(report.outcome, Verification::Identical, "{report:?}");
+    assert_eq!(all_frames_identical(&report), flown.frames());
+    assert!(report.ticks_compared > 60);
 }
 
-/// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and with a booster that
-/// stays; and from below a drone.
 #[test]
 fn what_two_people_do_verifies() {
     let flown = Flown::by_two(&two_people(9));
@@ -237,7 +221,7 @@ fn what_two_people_do_verifies() {
         |_| true,
         |record| {
             if let Record::ComputerFrame(frame) = record
-                && frame.input.frame == 110
+                && frame.input.frame == CONFIRMED
             {
                 frame.input.requests.clear();
             }
@@ -246,6 +230,8 @@ fn what_two_people_do_verifies() {
     assert!(changed.frames.is_some_and(|frames| frames.different > 0));
 }
 
+/// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and with a booster that
+/// stays; and from below a drone.
 #[test]
 fn flights_from_the_pad_and_from_a_drone_verify() {
     let started = armed_and_started(2_600);
@@ -289,11 +275,11 @@ fn a_restart_of_the_computer_in_the_air_verifies() {
 
 #[test]
 fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
-    let flown = Flown::in_plane(&armed_and_started(100));
+    let flown = &*FLOWN;
     let report = flown.verified_with(
         |_| true,
         |record| match record {
-            Record::ComputerFrame(frame) if frame.input.frame == 100 => {
+            Record::ComputerFrame(frame) if frame.input.frame == 1_200 => {
                 assert_eq!(frame.input.requests.len(), 1);
                 frame.input.requests.clear();
             }
@@ -302,7 +288,7 @@ fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
     );
     assert_eq!(report.outcome, Verification::Diverged);
     let first = report.frames.unwrap().first_divergence.unwrap();
-    assert_eq!((first.tick, first.phase), (100, "PAD_IDLE"));
+    assert_eq!((first.tick, first.phase), (1_200, "PAD_IDLE"));
     assert!(first.fields.iter().any(|field| field.path == "output.phase"), "{first:?}");
 }
 
@@ -329,7 +315,7 @@ fn a_flight_from_the_pad_is_flown_again_as_recorded() {
     let path = flown.written(flown.records.iter().cloned());
     let recording = Recording::open(&path).unwrap();
     let report = refly(&recording, &ReflyOptions::default()).unwrap();
-    let reached = report.reached.expect("the frames before the landing were flown again");
+    let reached = report.reached;
     assert_eq!((reached.identical, reached.first_different), (reached.frames, None));
     assert!(reached.frames > 2_000);
 }
@@ -355,9 +341,8 @@ fn without_frames(from: &std::path::Path, to: &std::path::Path, left_out: std::o
 
 #[test]
 fn a_tick_missing_in_the_log_is_reported() {
-    let flown = Flown::in_plane(&armed_and_started(100));
-    let lost = |record: &Record| !matches!(record, Record::ControllerTick(tick) if tick.input.tick == 40);
-    assert_eq!(flown.verified_with(lost, |_| ()).obstacle, Some(Obstacle::TickLost { tick: 40 }));
+    let lost = |record: &Record| !matches!(record, Record::PilotTick(tick) if tick.input.frame == 40);
+    assert_eq!(FLOWN.verified_with(lost, |_| ()).obstacle, Some(Obstacle::TickLost { tick: 40 }));
 }
 
 #[test]
@@ -417,8 +402,8 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
-    fn whatever_a_crew_does_is_replayed(crew in any_crew(), in_space in prop::bool::weighted(0.2)) {
-        let flown = if in_space { Flown::in_space(&crew, &[]) } else { Flown::in_plane(&crew) };
+    fn whatever_a_crew_does_is_replayed(crew in any_crew()) {
+        let flown = Flown::in_space(&crew, &[]);
         prop_assert_eq!(all_frames_identical(&flown.verified()), flown.frames());
     }
 
@@ -429,9 +414,7 @@ proptest! {
         frame in prop_oneof![Just(u64::MAX), any::<u64>(), 0_u64..2_000],
         number in prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(f64::NAN), Just(f64::INFINITY)],
         asked: u32,
-        in_space: bool,
     ) {
-        let flown = if in_space { &*SPACE } else { &*PLANE };
         let nonsense = |record: &mut Record| {
             if let Record::ComputerFrame(found) = record
                 && found.input.frame == at as u64
@@ -442,21 +425,15 @@ proptest! {
                 for request in &mut found.input.requests {
                     request.asked = asked;
                 }
-                if let Some(sensed) = &mut found.input.in_plane {
-                    (sensed.thrust_n, sensed.state.x_m) = (number, number);
-                }
                 if let Some(measured) = &mut found.input.measured {
                     measured.gyro_rad_s.x = number;
                 }
             }
         };
-        let report = flown.verified_with(|_| true, nonsense);
+        let report = FLOWN.verified_with(|_| true, nonsense);
         prop_assert!(report.frames.is_some());
     }
 }
 
-/// With a short time on the pad, so that the nonsense falls into the flight.
-static PLANE: std::sync::LazyLock<Flown> =
-    std::sync::LazyLock::new(|| Flown::in_plane(&armed_and_started(100)));
-static SPACE: std::sync::LazyLock<Flown> =
+static FLOWN: std::sync::LazyLock<Flown> =
     std::sync::LazyLock::new(|| Flown::in_space(&armed_and_started(1_200), &[]));

@@ -5,6 +5,8 @@ use std::process::Command;
 
 use campaign::order::{Order, Shard};
 use campaign::store::Store;
+use prost::Message as _;
+use protocol::log::flight_v1::PilotTick;
 use quick_xml::events::Event as Xml;
 use serde_json::Value;
 use sim::recipe::Recipe;
@@ -13,7 +15,8 @@ use tempfile::TempDir;
 use crate::command_line::run;
 use crate::flown::write_log;
 use crate::from_apogee::LANDED;
-use crate::simulated::{DISPERSED, NOMINAL};
+use crate::simulated::{DISPERSED, MK2};
+use crate::tampered::Held;
 
 struct Season {
     directory: TempDir,
@@ -25,7 +28,7 @@ impl Season {
         let directory = tempfile::tempdir().unwrap();
         let season = Self { directory };
         for (from, to) in [
-            (&NOMINAL.log, "week-1/nominal.mcap"),
+            (&MK2.log, "week-1/nominal.mcap"),
             (&DISPERSED.log, "week-1/dispersed.mcap"),
             (&LANDED.log, "week-2/mk2.mcap"),
         ] {
@@ -146,11 +149,12 @@ fn a_log_that_diverges_or_breaks_fails() {
     let season = Season::new();
     season.gate(&["--accept"]);
     // A forged command: the recorded decisions are not those of this build.
-    let mut ticks = NOMINAL.recording().ticks;
-    ticks[50].output.gimbal_command_rad += 0.01;
-    let recipe = crate::flown::Recipe { with_frames: true, ..crate::flown::Recipe::default() };
-    let forged = crate::flown::write_log(&ticks, &recipe).bytes;
-    std::fs::write(season.logs().join("week-1/nominal.mcap"), forged).unwrap();
+    let mut held = Held::read(&MK2.log);
+    let forged = held.messages.iter_mut().filter(|message| message.is_tick()).nth(50).unwrap();
+    let mut tick = PilotTick::decode(forged.data.as_slice()).unwrap();
+    tick.output.fins_rad[0] += 0.01;
+    forged.data = tick.encode_to_vec();
+    held.write(&season.logs().join("week-1/nominal.mcap"));
     std::fs::write(season.logs().join("week-1/dispersed.mcap"), "no log").unwrap();
     let (code, stdout, _) = season.gate(&[]);
     assert_eq!(code, 1, "{stdout}");
@@ -176,7 +180,7 @@ fn a_file_without_a_flight_is_no_flight_of_the_baseline() {
     let (code, stdout, _) = season.gate(&[]);
     assert_eq!(code, 1, "{stdout}");
     let nominal = row(&stdout, "week-1/nominal.mcap");
-    assert!(nominal.contains("LOST") && nominal.contains("no controller ticks"), "{stdout}");
+    assert!(nominal.contains("LOST") && nominal.contains("no frames of a flight computer"), "{stdout}");
 }
 
 #[test]

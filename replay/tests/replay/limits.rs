@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 use proptest::prelude::*;
+use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::Record;
-use protocol::log::v1::ControllerTick;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Align, Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
@@ -16,7 +16,7 @@ use replay::report::report;
 use replay::sweep::{State, grid, sweep};
 use replay::tick::tick;
 
-use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+use crate::flown::{FLIGHT, FRAME_NS, Recipe, WHOLE, write_log};
 
 /// Runs the command with limited memory; returns the result and the output.
 fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
@@ -45,7 +45,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
         (&["info"][..], "type 0, which does not exist".to_owned()),
         (&["verify"], format!("{ticks} of {ticks} ticks identical of the readable part")),
         (&["evaluate"], "open loop".to_owned()),
-        (&["refly"], "closed loop".to_owned()),
+        (&["refly", "--tick", "12"], "closed loop".to_owned()),
         (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
     ] {
         let (code, said) = within(200, arguments, &path);
@@ -55,7 +55,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     let recovered = directory.path().join("recovered.mcap");
     let recovery = replay::recover::recover(&path, &recovered).unwrap();
     assert_eq!(recovery.lost[0].bytes, (10 << 30) - at);
-    assert_eq!(Recording::open(&recovered).unwrap().ticks.len(), ticks);
+    assert_eq!(Recording::open(&recovered).unwrap().frames.len(), ticks);
 
     file.set_len(0).unwrap();
     file.set_len(10 << 30).unwrap();
@@ -97,7 +97,7 @@ fn a_chunk_that_unpacks_to_gigabytes_does_not_fill_the_memory() {
     }
 }
 
-/// Writes a log of at least this many bytes; returns its number of ticks.
+/// Writes a log of at least this many bytes; returns its number of frames.
 fn write_long_log(path: &Path, bytes: u64) -> u64 {
     let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
     let mut writer = LogWriter::new(file, &LogHeader::default()).unwrap();
@@ -105,16 +105,16 @@ fn write_long_log(path: &Path, bytes: u64) -> u64 {
     while std::fs::metadata(path).unwrap().len() < bytes {
         for tick in &FLIGHT.ticks {
             let mut tick = tick.clone();
-            tick.input.tick = number;
-            // Numbers that do not compress, as in a flight.
-            let mut noise = number;
-            for state in &mut tick.output.plan.states {
-                noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                state.x_m += noise as f64 / 1e18;
-                state.q_rad_s += noise as f64 / 1e19;
-            }
-            writer.write(&Record::from(tick), number * 100_000_000).unwrap();
             number += 1;
+            tick.input.frame = number;
+            // Numbers that do not compress, as in a flight; many, so that the log grows fast.
+            let mut noise = number;
+            tick.input.fins_rad = Vec::new();
+            for _ in 0..150 {
+                noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                tick.input.fins_rad.push(noise as f64 / 1e18);
+            }
+            writer.write(&Record::PilotTick(Box::new(tick)), number * FRAME_NS).unwrap();
         }
     }
     writer.finish().unwrap();
@@ -128,7 +128,7 @@ fn assert_described_within(megabytes: u32, bytes: u64) {
     let ticks = write_long_log(&path, bytes);
     let (code, said) = within(megabytes, &["info"], &path);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains(&format!("{ticks}, from 0")), "{said}");
+    assert!(said.contains(&format!("frames      1 to {ticks},")), "{said}");
 }
 
 /// The same memory for one megabyte as for a hundred: what is held does not grow with the log.
@@ -148,7 +148,7 @@ fn a_hundred_megabytes_are_exported_in_bounded_memory() {
     let arguments = ["export", "--to", "csv", "--output", tables.to_str().unwrap()];
     let (code, said) = within(64, &arguments, &path);
     assert_eq!(code, 0, "{said}");
-    let table = std::fs::read_to_string(tables.join("controller_tick.csv")).unwrap();
+    let table = std::fs::read_to_string(tables.join("pilot_tick.csv")).unwrap();
     assert_eq!(table.lines().count() as u64, ticks + 1);
 }
 
@@ -158,31 +158,32 @@ fn a_gigabyte_is_described_within_200_megabytes() {
     assert_described_within(200, 1 << 30);
 }
 
-/// Changes some number of a tick to arbitrary bits.
-fn spoil(tick: &mut ControllerTick, field: usize, bits: u64) {
+/// Changes some number of a frame to arbitrary bits.
+fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
-    let input = &mut tick.input;
+    let (input, output) = (&mut tick.input, &mut tick.output);
+    let measured = input.measured.as_mut().unwrap();
     match field {
         0 => input.time_s = number,
-        1 => input.time_since_ignition_s = number,
-        2 => input.state.x_m = number,
-        3 => input.state.theta_rad = number,
-        4 => input.state.u_m_s = number,
-        5 => input.gimbal_applied_rad = number,
-        6 => input.thrust_scale = number,
-        7 => input.phase = (bits % 13) as u32,
-        8 => tick.output.gimbal_command_rad = number,
-        9 => tick.output.level = bits as u32,
-        10 => tick.output.solver.cost = number,
-        11 => tick.solve_time_s = number,
-        12 => tick.output.predicted_touchdown.state.z_m = number,
-        13 => tick.output.plan.step_s = number,
-        _ => tick.output.fin_command_rad = vec![number; (bits % 6) as usize],
+        1 => measured.gyro_rad_s.x = number,
+        2 => measured.specific_force_m_s2.z = number,
+        3 => measured.pressure_altitude_m = Some(number),
+        4 => measured.lidar_range_m = Some(number),
+        5 => input.fins_rad[0] = number,
+        6 => input.contact = true,
+        7 => output.phase = (bits % 13) as u32,
+        8 => output.gimbal_rad[0] = number,
+        9 => output.level = bits as u32,
+        10 => input.igniter_continuity = false,
+        11 => tick.state_digest = bits,
+        12 => input.abort = true,
+        13 => output.ignite = true,
+        _ => output.fins_rad = vec![number; (bits % 6) as usize],
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     /// A log with correct checksums and nonsense numbers: every command gives an answer or a reason.
     #[test]
@@ -195,8 +196,8 @@ proptest! {
         let path = directory.path().join("nonsense.mcap");
         std::fs::write(&path, write_log(&ticks, &Recipe::default()).bytes).unwrap();
         let recording = Recording::open(&path).unwrap();
-        prop_assert_eq!(recording.ticks.len(), 30);
-        let evaluated = evaluate(&recording, &["nmpc.weights.w=90".parse().unwrap()]).unwrap();
+        prop_assert_eq!(recording.frames.len(), 30);
+        let evaluated = evaluate(&recording, &["powered.weights.theta=90".parse().unwrap()]).unwrap();
         let gimbal_rad = |tick: &replay::evaluate::EvaluatedTick| tick.evaluated.gimbal_rad.clone();
         prop_assert!(evaluated.ticks.iter().flat_map(gimbal_rad).all(f64::is_finite));
         prop_assert_eq!(tick(&recording, 20).unwrap().tick, 20);
@@ -212,9 +213,9 @@ proptest! {
         let compared = compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap();
         let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
-        let points = grid(&["nmpc.weights.w=50:90:2".parse().unwrap()], &[]).unwrap();
+        let points = grid(&["powered.weights.theta=50:90:2".parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(2);
-        let options = ReflyOptions::default();
+        let options = ReflyOptions { start: StartAt::Tick(12), ..ReflyOptions::default() };
         if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut state, &mut |_| {}) {
             prop_assert_eq!(swept.points.len(), 2);
         }

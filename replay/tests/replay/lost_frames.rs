@@ -85,7 +85,7 @@ fn the_grade_says_up_to_which_frame_the_log_can_be_run_again() {
 fn a_flight_is_flown_again_across_the_loss() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let flown = refly(&recording, &ReflyOptions::default()).unwrap();
-    let reached = flown.reached.unwrap();
+    let reached = flown.reached;
     assert_eq!((reached.identical, reached.first_different), (reached.frames, None));
     assert_eq!(reached.frames + flown.commands_identical, recording.frames.len());
 }

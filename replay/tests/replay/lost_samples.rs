@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK, TOPIC_PLANT_TRUTH, TOPIC_TRUTH_SAMPLE};
+use protocol::log::record::{TOPIC_PILOT_TICK, TOPIC_TRUTH_SAMPLE};
 
 use crate::command_line::{replay, run};
 use crate::flown::WHOLE;
 use crate::from_apogee::LANDED;
-use crate::simulated::NOMINAL;
+use crate::simulated::MK2;
 use crate::tampered::Held;
 
 /// The log with every other tick and two thirds of the truth left out.
@@ -15,11 +15,11 @@ fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
     let (mut ticks, mut truths) = (0, 0);
     held.keep(|message| match message.topic.as_str() {
-        TOPIC_CONTROLLER_TICK | TOPIC_PILOT_TICK => {
+        TOPIC_PILOT_TICK => {
             ticks += 1;
             ticks % 2 == 1
         }
-        TOPIC_PLANT_TRUTH | TOPIC_TRUTH_SAMPLE => {
+        TOPIC_TRUTH_SAMPLE => {
             truths += 1;
             truths % 3 == 1
         }
@@ -33,7 +33,8 @@ fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
 #[test]
 fn a_flight_that_lost_half_its_ticks_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
-    for (log, truth) in [(&NOMINAL.log, "vehicle_truth"), (&LANDED.log, "vehicle_truth3d")] {
+    for log in [&MK2.log, &LANDED.log] {
+        let truth = "vehicle_truth3d";
         let (code, stdout, _) = run(replay("compare", log).arg(log));
         assert_eq!(code, 0, "{stdout}");
         let thinned = thinned(log, &directory);
@@ -63,7 +64,7 @@ fn a_flight_that_lost_half_its_ticks_does_not_pass() {
 #[test]
 fn tolerances_limit_what_may_be_missing() {
     let directory = tempfile::tempdir().unwrap();
-    let log = &NOMINAL.log;
+    let log = &MK2.log;
     let thinned = thinned(log, &directory);
     let tolerances = directory.path().join("tolerances.toml");
     let compared = |text: &str| {
@@ -74,9 +75,9 @@ fn tolerances_limit_what_may_be_missing() {
     assert_eq!(code, 0, "{stdout}{stderr}");
     let (code, stdout, _) = compared("samples_missing = 0.6\n");
     assert_eq!(code, 1, "{stdout}");
-    assert!(stdout.contains("vehicle_truth") && !stdout.contains("- controller_tick"), "{stdout}");
+    assert!(stdout.contains("vehicle_truth3d") && !stdout.contains("- pilot_tick"), "{stdout}");
     let (code, stdout, _) =
-        compared("samples_missing = 0.6\n[signals.\"vehicle_truth.*\"]\nsamples_missing = 0.7\n");
+        compared("samples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n");
     assert_eq!(code, 0, "{stdout}");
     let (code, _, stderr) = compared("samples_missing = 1.5\n");
     assert!(code == 2 && stderr.contains("from 0 to 1"), "{stderr}");
@@ -86,11 +87,11 @@ fn tolerances_limit_what_may_be_missing() {
 #[test]
 fn a_lost_topic_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
-    let mut held = Held::read(&NOMINAL.log);
-    held.keep(|message| message.topic != TOPIC_PLANT_TRUTH);
+    let mut held = Held::read(&MK2.log);
+    held.keep(|message| message.topic != TOPIC_TRUTH_SAMPLE);
     let path = directory.path().join("no-truth.mcap");
     held.write(&path);
-    for (a, b, word) in [(&NOMINAL.log, &path, "missing"), (&path, &NOMINAL.log, "added")] {
+    for (a, b, word) in [(&MK2.log, &path, "missing"), (&path, &MK2.log, "added")] {
         let (code, stdout, _) = run(replay("compare", a).arg(b));
         assert_eq!(code, 1, "{stdout}");
         assert!(stdout.contains(&format!("signals are {word} (tolerated 0)")), "{stdout}");

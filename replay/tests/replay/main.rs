@@ -39,7 +39,6 @@ mod planned_paths;
 mod recovery;
 mod reflown_logs;
 mod resumed_sweep;
-mod shadow;
 mod simulated;
 mod solve_times;
 mod tables;

@@ -5,7 +5,7 @@ use replay::report::report;
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::{self, LANDED, Logged};
-use crate::simulated::{MK2, NOMINAL};
+use crate::simulated::MK2;
 
 /// The sentence of `info`, after checking that text and page say it, too.
 fn said_alike(log: &std::path::PathBuf) -> String {
@@ -39,7 +39,6 @@ fn both_verdicts_are_shown_with_every_row() {
             assert!(stdout.contains(words), "{words} is not in {stdout}");
         }
     }
-    assert_eq!(said_alike(&NOMINAL.log), "LANDED inside every limit");
 }
 
 fn aborted(fault: &str) -> Logged {

@@ -7,7 +7,6 @@ use replay::verify::{Verification, verify};
 use crate::command_line::{replay, run};
 use crate::flown::only;
 use crate::from_apogee::{self, LANDED};
-use crate::simulated::NOMINAL;
 
 fn changed(with: &[&str], without: &[&str]) -> ReflyOptions {
     let owned = |given: &[&str]| given.iter().map(|text| (*text).to_owned()).collect();
@@ -64,7 +63,6 @@ fn a_fault_that_cannot_be_is_refused_with_what_could() {
         "no fault `gnss-out` to leave out; it was flown with no faults",
     );
     refused(&LANDED.log, &["--fault", "gnss-gone@5"], "fault `gnss-gone@5`");
-    refused(&NOMINAL.log, &["--fault", "gnss-out@5"], "only for a flight from apogee");
     let (code, stdout, stderr) = run(replay("refly", &LANDED.log).args(["--fault", "no-light@0"]));
     assert!(
         code == 0 && stdout.contains("with the fault no-light@0, from the beginning"),

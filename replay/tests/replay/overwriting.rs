@@ -5,7 +5,7 @@ use std::process::Command;
 
 use crate::command_line::{Files, replay, run};
 use crate::flown::WHOLE;
-use crate::simulated::{NOMINAL, WITH_FRAMES};
+use crate::simulated::{MK2, WITH_FRAMES};
 
 const OTHERS: &[u8] = b"somebody else's bytes";
 
@@ -80,18 +80,6 @@ fn what_a_board_gets_is_whole_or_absent() {
     assert_eq!(listed(directory.path()), ["answers", "flight.mcap", "frames"]);
 }
 
-#[test]
-fn a_shadow_of_nothing_leaves_no_log() {
-    let directory = tempfile::tempdir().unwrap();
-    for connect in ["no-file.mcap", "udpin:192.0.2.1:5"] {
-        let mut command = replay("shadow", &PathBuf::from("--profile"));
-        command.args(["mk2", "--connect", connect]).current_dir(directory.path());
-        let (code, stdout, stderr) = run(&mut command);
-        assert!(code == 2 && stderr.contains(connect), "{stdout}{stderr}");
-        assert!(listed(directory.path()).is_empty(), "{connect}: {stderr}");
-    }
-}
-
 /// Not even with --force or under another name of the same file.
 #[test]
 fn the_log_that_is_read_is_never_written() {
@@ -120,7 +108,7 @@ fn tables_and_imports_overwrite_nothing_either() {
     let (directory, log) = copied(&WITH_FRAMES.log);
     let at = |name: &str| directory.path().join(name);
     for format in ["csv", "parquet"] {
-        let table = at("tables").join(format!("vehicle_truth.{format}"));
+        let table = at("tables").join(format!("vehicle_truth3d.{format}"));
         std::fs::create_dir_all(at("tables")).unwrap();
         std::fs::write(&table, OTHERS).unwrap();
         let before = listed(&at("tables"));
@@ -150,7 +138,7 @@ fn tables_and_imports_overwrite_nothing_either() {
 /// A page with the default name does not replace a page that was edited.
 #[test]
 fn a_report_twice_needs_force() {
-    let (_directory, log) = copied(&NOMINAL.log);
+    let (_directory, log) = copied(&MK2.log);
     let (code, ..) = run(&mut replay("report", &log));
     assert_eq!(code, 0);
     let (code, _, stderr) = run(&mut replay("report", &log));
@@ -201,7 +189,7 @@ fn half_an_output_replaces_nothing() {
         expected.sort();
         assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
     }
-    let (_directory, log) = copied(&NOMINAL.log);
+    let (_directory, log) = copied(&MK2.log);
     let (code, _, stderr) = run(replay("report", &log).args(["--output", "/dev/full"]));
     assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
 }
@@ -209,14 +197,14 @@ fn half_an_output_replaces_nothing() {
 /// The state of another sweep, or any other file, is never continued.
 #[test]
 fn a_sweep_state_never_replaces_other_files() {
-    let (directory, log) = copied(&NOMINAL.log);
+    let (directory, log) = copied(&MK2.log);
     for state in [log.clone(), directory.path().join("notes.txt")] {
         if state != log {
             std::fs::write(&state, OTHERS).unwrap();
         }
         let before = std::fs::read(&state).unwrap();
         let (code, _, stderr) =
-            run(replay("sweep", &log).args(["--vary", "nmpc.weights.w=75,80", "--state"]).arg(&state));
+            run(replay("sweep", &log).args(["--vary", "powered.weights.theta=75,80", "--state"]).arg(&state));
         assert_eq!(code, 2, "{stderr}");
         assert_eq!(std::fs::read(&state).unwrap(), before);
     }

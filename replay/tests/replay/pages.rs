@@ -6,7 +6,7 @@ use replay::report::{report, report_with};
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{self, LANDED};
-use crate::simulated::{DISPERSED, NOMINAL, WITH_FRAMES};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
 
 /// Every tag is closed, and the page refers to nothing outside itself.
 fn check(page: &str) {
@@ -34,42 +34,20 @@ fn check(page: &str) {
     }
 }
 
+/// A flight is shown in the plane of its landing; the flight computer is run again to get its plans.
 #[test]
 fn the_report_says_the_verdict_first_and_then_why() {
-    for flight in [&*NOMINAL, &*DISPERSED, &*WITH_FRAMES] {
-        let page = report(&flight.log).unwrap().html;
-        check(&page);
-        let order = [
-            "LANDED inside every limit",
-            "Touchdown at T+",
-            "ignition delay",
-            "thrust fell through weight",
-            "Path in the pitch plane",
-            "Gimbal angle, deg",
-            "Tracking error by phase",
-            "gimbal at its stop of 20.0 deg",
-            "solve time, 99 of 100 within",
-            "x at touchdown, m",
-            "Thrust, N",
-            "estimate less truth",
-            "<h2>Link</h2>",
-            "every checksum holds",
-        ];
-        let places: Vec<usize> = order.iter().map(|words| page.find(words).unwrap()).collect();
-        assert!(places.is_sorted(), "{places:?}");
-        assert!(page.matches("<svg").count() > 15);
-        assert!(page.contains("prefers-color-scheme: dark"));
+    for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log] {
+        says_the_verdict_first_and_then_why(&report(log).unwrap().html);
     }
     assert!(report(&WITH_FRAMES.log).unwrap().html.contains("/mavlink/tx/raw"));
 }
 
-/// A flight from apogee is shown in the plane of its landing; the flight computer is run again to get its plans.
-#[test]
-fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
-    let page = report(&LANDED.log).unwrap().html;
-    check(&page);
+fn says_the_verdict_first_and_then_why(page: &str) {
+    check(page);
     let order = [
         "LANDED ",
+        "Touchdown at T+",
         "by the limits of the legs",
         "vertical speed",
         "by the landing paper's Table 2",
@@ -89,11 +67,14 @@ fn the_report_of_a_flight_from_apogee_has_the_same_sections() {
         "inferred impulse at the end, of certified",
         "Thrust, N",
         "estimate less truth",
+        "<h2>Link</h2>",
         "every checksum holds",
     ];
-    let places: Vec<usize> = order.iter().map(|words| page.find(words).unwrap()).collect();
+    let places: Vec<usize> =
+        order.iter().map(|words| page.find(words).unwrap_or_else(|| panic!("{words}"))).collect();
     assert!(places.is_sorted(), "{places:?}");
-    assert!(page.contains(">planned<"));
+    assert!(page.contains(">planned<") && page.contains("prefers-color-scheme: dark"));
+    assert!(page.matches("<svg").count() > 15);
 }
 
 /// Logs with ticks only, a cut log, a log without a flight, and names that contain markup.
@@ -110,9 +91,9 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let ticks = write_log(&FLIGHT.ticks, &Recipe { with_frames: false, profile_toml: None }).bytes;
     let page = page_of("ticks.mcap", &ticks);
     assert!(page.contains("No verdict in this log") && page.contains("no profile"));
-    assert!(
-        page.contains("From the controller&quot;s") || page.contains("state estimate; the log has no plant")
-    );
+    assert!(page.contains("has no positions of the vehicle"));
+    let ticks = write_log(&FLIGHT.ticks, &Recipe { with_frames: false, ..Recipe::default() }).bytes;
+    assert!(page_of("estimate.mcap", &ticks).contains("estimate; the log has no truth"));
     let page = page_of("cut <b>&.mcap", &WHOLE.bytes[..WHOLE.bytes.len() / 2]);
     assert!(page.contains("without an end mark") && page.contains("cut &lt;b&gt;&amp;.mcap"));
     let page =
@@ -132,9 +113,7 @@ fn telemetry_alone_makes_a_page() {
     replay::import::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
-    assert!(
-        page.contains("From the telemetry of a ground station") && page.contains("LANDED inside every limit")
-    );
+    assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED"));
 }
 
 /// The mission's own words for a start on its pad.
@@ -189,7 +168,7 @@ fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
 /// Two flights in the same pictures: both are named, and every picture has a line of each.
 #[test]
 fn a_report_with_another_log_draws_both_flights() {
-    let page = report_with(&NOMINAL.log, &DISPERSED.log).unwrap().html;
+    let page = report_with(&MK2.log, &DISPERSED.log).unwrap().html;
     check(&page);
     let both = page.split("<h2>").find(|section| section.starts_with("Two flights")).unwrap();
     for words in ["Both paths of the landing", "altitude of both, m", "commanded, deg", "LANDED"] {
@@ -198,6 +177,5 @@ fn a_report_with_another_log_draws_both_flights() {
     for figure in both.split("<figure").skip(1) {
         assert!(figure.contains("class=\"l a\"") && figure.contains("class=\"l b\""), "{figure}");
     }
-    // A rocket in space beside a planar landing is no mistake either.
-    check(&report_with(&NOMINAL.log, &LANDED.log).unwrap().html);
+    check(&report_with(&MK2.log, &LANDED.log).unwrap().html);
 }

@@ -152,8 +152,8 @@ fn a_missing_record_is_named_in_the_report() {
     };
     assert_eq!(refused(write(None, &FALL.ticks, Some(mission_toml()))), Obstacle::NoStart);
     assert_eq!(refused(write(Some(&FALL.start), &FALL.ticks, None)), Obstacle::NoProfile);
-    let planar = vehicles::profile::builtin_toml("paper-calibrated");
-    let reason = refused(write(Some(&FALL.start), &FALL.ticks, planar)).to_string();
+    let other = Some("name = \"x\"\n");
+    let reason = refused(write(Some(&FALL.start), &FALL.ticks, other)).to_string();
     assert!(reason.contains("profile.toml"), "{reason}");
     let mut twice = FALL.ticks.clone();
     twice.push(twice[twice.len() - 1].clone());

@@ -12,7 +12,7 @@ use replay::recover::recover;
 use replay::verify::{Verification, verify};
 
 use crate::command_line::{replay, run};
-use crate::flown::{WHOLE, only};
+use crate::flown::{FRAME_S, WHOLE, only};
 use crate::from_apogee::LANDED;
 use crate::simulated::DISPERSED;
 
@@ -32,7 +32,7 @@ fn a_whole_log_recovers_whole() {
     let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
     assert!(recovery.ended && recovery.lost.is_empty(), "{recovery:?}");
     let then = DISPERSED.recording();
-    assert_eq!((again.ticks, again.truth, again.verdict), (then.ticks, then.truth, then.verdict));
+    assert_eq!((again.frames, again.world, again.verdict), (then.frames, then.world, then.verdict));
     assert_eq!(again.damage, None);
     let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
     assert_eq!(verified.outcome, Verification::Identical, "profile and all");
@@ -45,7 +45,7 @@ fn a_cut_log_recovers_what_was_synced() {
     for (at, ticks) in &WHOLE.synced[..WHOLE.synced.len() - 1] {
         let cut = &WHOLE.bytes[..usize::try_from(*at).unwrap() + 3];
         let (recovery, again) = recovered(cut, directory.path()).unwrap();
-        assert_eq!(again.ticks.len(), *ticks, "cut after {at}");
+        assert_eq!(again.frames.len(), *ticks, "cut after {at}");
         assert!(!recovery.ended);
         assert!(again.damage.unwrap().contains("it had no end mark"), "the recovered log says so");
         let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
@@ -64,11 +64,13 @@ fn chunks_after_a_broken_chunk_are_kept() {
     bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
     let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
     let all = WHOLE.synced.last().unwrap().1;
-    assert_eq!(again.ticks.len(), all - 5, "{recovery:?}");
-    assert_eq!(again.ticks_unbroken, before);
+    assert_eq!(again.frames.len(), all - 5, "{recovery:?}");
+    assert_eq!(again.frames_unbroken, before);
     assert_eq!(recovery.lost.len(), 1);
     let (from_s, until_s) = recovery.lost[0].span_s.unwrap();
-    assert!((from_s - before as f64 * 0.1).abs() < 1e-6 && (until_s - from_s - 0.4).abs() < 1e-6);
+    assert!(
+        (from_s - before as f64 * FRAME_S).abs() < 1e-6 && (until_s - from_s - 4.0 * FRAME_S).abs() < 1e-6
+    );
 }
 
 /// The length of a record is broken: the next chunk is found by what it looks like.
@@ -79,7 +81,7 @@ fn after_a_broken_length_the_next_chunk_is_found() {
     let (at, before) = WHOLE.synced[3];
     bytes[usize::try_from(at).unwrap() + 8] = 0x7f;
     let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
-    assert!(again.ticks.len() > before, "{recovery:?}");
+    assert!(again.frames.len() > before, "{recovery:?}");
     assert!(recovery.ended && recovery.lost.len() == 1, "{recovery:?}");
 }
 
@@ -265,8 +267,8 @@ proptest! {
         bytes[place..end].copy_from_slice(&stretch[..end - place]);
         bytes.truncate(bytes.len().max(cut + 1) - cut / 2);
         if let Some((_, again)) = recovered(&bytes, directory.path()) {
-            for tick in &again.ticks {
-                let number = usize::try_from(tick.input.tick).unwrap();
+            for tick in &again.frames {
+                let number = usize::try_from(tick.input.frame).unwrap() - 1;
                 let then = &crate::flown::FLIGHT.ticks[number];
                 prop_assert_eq!(&tick.input, &then.input);
                 prop_assert_eq!(tick.state_digest, then.state_digest);

@@ -7,12 +7,12 @@ use replay::refly::ReflyOptions;
 use replay::sweep::{State, SweepReport, grid, sweep};
 
 use crate::from_apogee::LANDED;
-use crate::simulated::NOMINAL;
+use crate::simulated::MK2;
 
 /// Only flights with missing jobs are prepared: if all outcomes are known, the flight need not even be flyable.
 #[test]
 fn a_finished_flight_is_not_prepared_again() {
-    let points = grid(&["nmpc.weights.w=50,110".parse().unwrap()], &[]).unwrap();
+    let points = grid(&["powered.weights.theta=50,110".parse().unwrap()], &[]).unwrap();
     let fly = |flight: &Recording, state: &mut State| -> Result<SweepReport, String> {
         let flights = std::slice::from_ref(flight);
         let options = ReflyOptions::default();
@@ -20,7 +20,7 @@ fn a_finished_flight_is_not_prepared_again() {
             .map_err(|error| format!("{:#}", anyhow::Error::from(error)))
     };
     let mut state = State::in_memory(points.len());
-    let swept = fly(&NOMINAL.recording(), &mut state).unwrap();
+    let swept = fly(&MK2.recording(), &mut state).unwrap();
     let mut without_recipe = Recording::open(&LANDED.log).unwrap();
     without_recipe.head.run.remove("flight");
     without_recipe.name.clone_from(&swept.flights[0]);

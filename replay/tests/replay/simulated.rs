@@ -7,8 +7,7 @@ use std::sync::LazyLock;
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;
-use sim::plane::DeadlinePolicy;
-use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
+use simulated_vehicle::fly::{DeadlinePolicy, FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
 use tempfile::TempDir;
 use tokio::sync::watch;
 
@@ -21,17 +20,14 @@ pub(crate) struct Simulated {
     pub(crate) log: PathBuf,
 }
 
-/// The nominal landing, without links.
-pub(crate) static NOMINAL: LazyLock<Simulated> = LazyLock::new(|| simulate("paper-calibrated", 1, &[]));
-
-/// A landing with a scattered start and motor.
-pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("paper-dispersed", 2, &[]));
-
-/// A rocket from apogee, flown as the vehicle flies it.
+/// A rocket from apogee, flown as the vehicle flies it, without links.
 pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 1, &[]));
 
-/// The nominal landing with telemetry to no receiver, so that its log has raw frames.
-pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frames("paper-calibrated"));
+/// The same with other dispersions.
+pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 2, &[]));
+
+/// The first flight with telemetry to no receiver, so that its log has raw frames.
+pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frames("mk2"));
 
 /// A landing with telemetry to no receiver.
 pub(crate) fn with_frames(profile: &str) -> Simulated {

@@ -12,7 +12,7 @@ use replay::log::{FlightLog, Recording};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
-use crate::simulated::{DISPERSED, NOMINAL, Simulated, WITH_FRAMES};
+use crate::simulated::{DISPERSED, MK2, Simulated, WITH_FRAMES};
 
 fn read_text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -25,7 +25,7 @@ fn flown(flight: &Simulated) -> Flown {
 #[test]
 fn a_flight_equals_itself_in_every_signal() {
     for align in [Align::Ignition, Align::Touchdown, Align::Time] {
-        let a = flown(&NOMINAL);
+        let a = flown(&MK2);
         let found = compare(&a, &a.clone(), align, &Tolerances::default()).unwrap();
         assert!(found.failures.is_empty() && found.missing.is_empty() && found.added.is_empty());
         assert_eq!(found.identical(), found.signals.len());
@@ -37,7 +37,7 @@ fn a_flight_equals_itself_in_every_signal() {
 /// A flight shifted in time is the same flight, aligned on an event; on time alone it is not.
 #[test]
 fn a_shifted_flight_equals_itself_when_aligned_on_an_event() {
-    let a = flown(&NOMINAL);
+    let a = flown(&MK2);
     let mut b = a.clone();
     for series in b.signals.values_mut() {
         series.times_s.iter_mut().for_each(|time_s| *time_s += 3.0);
@@ -61,23 +61,24 @@ fn a_shifted_flight_equals_itself_when_aligned_on_an_event() {
 
 #[test]
 fn a_known_difference_has_its_rms_its_maximum_and_its_time() {
-    let a = flown(&NOMINAL);
+    let a = flown(&MK2);
     let mut b = a.clone();
-    let name = "vehicle_truth.state.x_m";
+    let name = "vehicle_truth3d.state.position_m.x";
     let series = b.signals.get_mut(name).unwrap();
     series.values.iter_mut().for_each(|value| *value += 0.5);
     series.values[100] += 1.5;
     let at_s = series.times_s[100];
-    b.signals.remove("vehicle_truth.mass_kg");
+    b.signals.remove("vehicle_truth3d.mass_kg");
     b.signals.insert("new.signal".to_owned(), replay::compare::Series::default());
     let tolerances = |text| Tolerances::from_toml(text, "t.toml").unwrap();
-    let loose =
-        tolerances("missing = 1\nadded = 1\n[signals.\"vehicle_truth.state.*\"]\nmax = 2.1\nrms = 1.0\n");
+    let loose = tolerances(
+        "missing = 1\nadded = 1\n[signals.\"vehicle_truth3d.state.position_m.*\"]\nmax = 2.1\nrms = 1.0\n",
+    );
     let found = compare(&a, &b, Align::Time, &loose).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);
     assert_eq!(
         (found.missing.as_slice(), found.added.as_slice()),
-        (&["vehicle_truth.mass_kg".to_owned()][..], &["new.signal".to_owned()][..])
+        (&["vehicle_truth3d.mass_kg".to_owned()][..], &["new.signal".to_owned()][..])
     );
     let signal = found.signals.iter().find(|signal| signal.signal == name).unwrap();
     let count = signal.samples as f64;
@@ -92,20 +93,20 @@ fn a_known_difference_has_its_rms_its_maximum_and_its_time() {
 
 #[test]
 fn different_verdicts_fail_unless_they_are_tolerated() {
-    let recording = NOMINAL.recording();
+    let recording = MK2.recording();
     let options = ReflyOptions {
-        plant_settings: vec!["plant.thrust_scale=0.95".parse().unwrap()],
+        plant_settings: vec!["truth.impulse_scale=0.7".parse().unwrap()],
         ..ReflyOptions::default()
     };
     let (report, flight) = refly_flight(&recording, &options).unwrap();
-    let path = NOMINAL.beside("weak.mcap");
+    let path = MK2.beside("weak.mcap");
     write_log(&path, &recording, &options, &report, &flight).unwrap();
-    let (a, b) = (flown(&NOMINAL), Flown::open(&path).unwrap());
+    let (a, b) = (flown(&MK2), Flown::open(&path).unwrap());
     let found = compare(&a, &b, Align::Ignition, &Tolerances::default()).unwrap();
     assert!(found.failures.contains(&"the verdicts differ: landed and not landed".to_owned()));
     // The weak motor's flight is shorter, so samples are missing at its end.
     assert!(
-        found.failures.iter().any(|failure| failure.starts_with("vehicle_truth: ")),
+        found.failures.iter().any(|failure| failure.starts_with("vehicle_truth3d: ")),
         "{:?}",
         found.failures
     );
@@ -125,41 +126,38 @@ fn export(flight: &Simulated, format: TableFormat, name: &str) -> std::path::Pat
 /// Every number of the CSV reads back as the recorded one.
 #[test]
 fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
-    let directory = export(&NOMINAL, TableFormat::Csv, "csv");
-    let text = read_text(&directory.join("controller_tick.csv"));
+    let directory = export(&MK2, TableFormat::Csv, "csv");
+    let text = read_text(&directory.join("pilot_tick.csv"));
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| names.iter().position(|known| *known == name).unwrap();
-    let (gimbal, u, fin) = (
-        column("output.gimbal_command_rad"),
-        column("input.state.u_m_s"),
-        column("output.fin_command_4_rad"),
-    );
-    let recording = NOMINAL.recording();
+    let (gimbal, gyro, fin) =
+        (column("output.gimbal_2_rad"), column("input.measured.gyro_rad_s.x"), column("output.fins_4_rad"));
+    let recording = MK2.recording();
     let mut count = 0;
-    for (line, tick) in lines.zip(&recording.ticks) {
+    for (line, tick) in lines.zip(&recording.frames) {
         let cells: Vec<&str> = line.split(',').collect();
         assert_eq!(cells.len(), names.len());
         let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
-        assert_eq!(number(gimbal), tick.output.gimbal_command_rad.to_bits());
-        assert_eq!(number(u), tick.input.state.u_m_s.to_bits());
-        assert_eq!(number(fin), tick.output.fin_command_rad[3].to_bits());
+        assert_eq!(number(gimbal), tick.output.gimbal_rad[1].to_bits());
+        assert_eq!(number(gyro), tick.input.measured.as_ref().unwrap().gyro_rad_s.x.to_bits());
+        assert_eq!(number(fin), tick.output.fins_rad[3].to_bits());
         count += 1;
     }
-    assert_eq!(count, recording.ticks.len());
+    assert_eq!(count, recording.frames.len());
     assert!(read_text(&directory.join("events.csv")).contains("phase "));
-    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 7);
+    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 13);
 }
 
 #[test]
 fn the_parquet_holds_the_recorded_numbers_bit_for_bit() {
     let directory = export(&DISPERSED, TableFormat::Parquet, "parquet");
-    let file = std::fs::File::open(directory.join("vehicle_truth.parquet")).unwrap();
+    let file = std::fs::File::open(directory.join("vehicle_truth3d.parquet")).unwrap();
     let reader = SerializedFileReader::new(file).unwrap();
     let recording = DISPERSED.recording();
     let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
-    assert_eq!(rows.len(), recording.truth.len());
-    for (row, truth) in rows.iter().zip(&recording.truth) {
+    assert_eq!(rows.len(), recording.world.len());
+    for (row, truth) in rows.iter().zip(&recording.world) {
         let field = |name: &str| {
             let found = row.get_column_iter().find(|(known, _)| *known == name).unwrap();
             match found.1 {
@@ -167,7 +165,7 @@ fn the_parquet_holds_the_recorded_numbers_bit_for_bit() {
                 other => panic!("{name}: {other:?}"),
             }
         };
-        assert_eq!(field("state.z_m"), truth.state.z_m.to_bits());
+        assert_eq!(field("state.position_m.z"), truth.state.position_m.z.to_bits());
         assert_eq!(field("thrust_n"), truth.thrust_n.to_bits());
         assert_eq!(field("time_s"), truth.time_s.to_bits());
     }
@@ -219,7 +217,7 @@ fn a_tlog_is_found_between_garbage() {
     std::fs::write(&path, b"no frames here at all, only text").unwrap();
     let refused = import_tlog(&path, &WITH_FRAMES.beside("none.mcap"), &mut |_| {}).unwrap_err();
     assert!(matches!(refused, ImportError::NoFrames { .. }));
-    let error = export_tlog(&|| FlightLog::open(&NOMINAL.log), None, &NOMINAL.beside("no.tlog")).unwrap_err();
+    let error = export_tlog(&|| FlightLog::open(&MK2.log), None, &MK2.beside("no.tlog")).unwrap_err();
     assert!(error.to_string().contains("no raw MAVLink frames"), "{error}");
 }
 
@@ -257,19 +255,19 @@ fn every_column_is_in_the_dictionary_and_parquet_knows_units_and_words() {
     }
     assert_eq!(text.lines().count(), columns + 1);
     for row in [
-        "controller_tick,input.time_s,number,s,,\n",
+        "pilot_tick,input.time_s,number,s,,\n",
         "mavlink_1_1_td_flight_status,time_boot_ms,whole number,ms,Time since boot.,\n",
     ] {
         assert!(text.contains(row), "{row}");
     }
-    let file = std::fs::File::open(directory.join("controller_tick.parquet")).unwrap();
+    let file = std::fs::File::open(directory.join("pilot_tick.parquet")).unwrap();
     let reader = SerializedFileReader::new(file).unwrap();
     let facts = reader.metadata().file_metadata().key_value_metadata().unwrap();
     let fact =
         |key: &str| facts.iter().find(|fact| fact.key == key).and_then(|fact| fact.value.clone()).unwrap();
-    assert_eq!(fact("output.gimbal_command_rad.unit"), "rad");
-    assert_eq!(fact("input.phase.meaning"), "Index of the flight phase, as in the dialect's TD_PHASE.");
-    assert!(fact("input.phase.values").contains("9 TD_PHASE_POWERED"));
+    assert_eq!(fact("output.gimbal_1_rad.unit"), "rad");
+    assert_eq!(fact("output.phase.meaning"), "Index of the flight phase, as in the dialect's TD_PHASE.");
+    assert!(fact("output.phase.values").contains("9 TD_PHASE_POWERED"));
 }
 
 /// The components of a vector have the vector's unit and meaning.

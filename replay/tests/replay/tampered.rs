@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
 use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::{TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK};
+use protocol::log::record::TOPIC_PILOT_TICK;
 
 /// A message of a log, by its topic.
 #[derive(Debug, Clone)]
@@ -25,9 +25,9 @@ impl Kept {
         Self { log_time_ns, ..self.clone() }
     }
 
-    /// A tick of the planar controller or a frame of the flight computer.
+    /// A frame of the flight computer.
     pub(crate) fn is_tick(&self) -> bool {
-        [TOPIC_CONTROLLER_TICK, TOPIC_PILOT_TICK].contains(&self.topic.as_str())
+        self.topic == TOPIC_PILOT_TICK
     }
 }
 

@@ -7,13 +7,13 @@ use replay::refly::ReflyOptions;
 use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
 
 use crate::asked::with;
-use crate::simulated::NOMINAL;
+use crate::simulated::MK2;
 
-const STEPS: &str = "nmpc.horizon_steps";
+const STEPS: &str = "powered.solver.max_iterations";
 
 #[test]
 fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
-    let flights = [NOMINAL.recording()];
+    let flights = [MK2.recording()];
     let fly = |range: &str| {
         let points = grid(&[format!("{STEPS}={range}").parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(points.len());
@@ -29,13 +29,13 @@ fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
         listed
     });
     let refusal = fly("10:11:3").unwrap_err();
-    assert!(refusal.contains("nmpc.horizon_steps=10.5`: must be a whole number"), "{refusal}");
+    assert!(refusal.contains("powered.solver.max_iterations=10.5`: must be a whole number"), "{refusal}");
 }
 
 /// Only whole numbers are tried, and the two on the sides of the change are neighbours.
 #[test]
 fn a_bisection_ends_between_neighbouring_whole_numbers() {
-    let recording = NOMINAL.recording();
+    let recording = MK2.recording();
     let options = BisectOptions {
         path: STEPS.to_owned(),
         plant_alone: false,

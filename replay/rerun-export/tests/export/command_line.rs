@@ -18,7 +18,7 @@ fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
     write_log(&log, true);
     let (code, said) = run(&[&log]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("flight.rrd: 40 poses, 4 controller ticks, 1 events"), "{said}");
+    assert!(said.contains("flight.rrd: 4 poses, 4 frames, 1 events"), "{said}");
     assert!(!said.contains("warning"), "{said}");
     std::fs::write(&rrd, "precious").unwrap();
     let (code, said) = run(&[&log]);

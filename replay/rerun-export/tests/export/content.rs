@@ -12,7 +12,7 @@ fn a_flight_is_exported_whole() {
     let (_folder, log, rrd) = folder();
     write_log(&log, true);
     let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses, exported.events), (TICKS, 10 * TICKS, 1));
+    assert_eq!((exported.ticks, exported.poses, exported.events), (TICKS, TICKS, 1));
     assert_eq!((exported.damage, exported.unreadable), (None, 0));
 
     let recording = Recording::read(&rrd);
@@ -20,53 +20,47 @@ fn a_flight_is_exported_whole() {
     assert_eq!(recording.ids, BTreeSet::from([format!("recorded-{START_UNIX_NS}-flight")]));
     assert_eq!(recording.layouts, 1);
     assert!(recording.layout_chunks > 10);
-    let (ticks, poses) = (TICKS as usize, 10 * TICKS as usize);
+    let ticks = TICKS as usize;
     for (path, rows) in [
-        (entity::ROCKET, poses),
-        (entity::NOZZLE, poses),
-        (entity::THRUST, poses),
-        (entity::PREDICTED, ticks),
-        (entity::PREDICTED_TOUCHDOWN, ticks),
+        (entity::ROCKET, ticks),
+        (entity::NOZZLE, ticks),
+        (entity::THRUST, ticks),
         (entity::PHASE, 1),
         (entity::LEVEL, 1),
+        (entity::LEVEL_REPLAYED, 1),
         (entity::EVENTS, 1),
         (entity::VERDICT, 1),
-        ("plots/altitude_m/true", poses),
-        ("plots/altitude_m/estimated", ticks),
-        ("plots/gimbal_deg/commanded", poses),
-        ("plots/gimbal_deg/limit_high", 2),
-        ("plots/u_m_s/limit_low", 2),
-        ("plots/q_deg_s/limit_high", 2),
-        ("plots/solve_time_ms/controller", ticks),
-        ("plots/iterations/controller", ticks),
-        ("plots/level/controller", ticks),
+        ("plots/altitude_m/true", ticks),
+        ("plots/gimbal_pitch_deg/commanded", ticks),
+        ("plots/gimbal_pitch_deg/replayed", ticks),
+        ("plots/gimbal_pitch_deg/limit_high", 2),
+        ("plots/vertical_m_s/limit_low", 2),
     ] {
         assert_eq!(recording.rows(path), rows, "{path}");
     }
     for path in
-        [entity::BODY, entity::PAD, entity::PAD_LIMIT, entity::FLOWN, entity::FIRST_PLAN, entity::REPORT]
+        [entity::BODY, entity::PAD, entity::PAD_LIMIT, entity::FLOWN, entity::REPORT]
     {
         assert!(recording.is_static(path), "{path}");
     }
-    assert_eq!(recording.times(entity::PREDICTED, entity::TIMELINE_TICK), [0, 1, 2, 3]);
-    let times_ns = recording.times(entity::PREDICTED, entity::TIMELINE_FLIGHT_TIME);
-    assert_eq!(times_ns, [0, 100_000_000, 200_000_000, 300_000_000]);
-    assert_eq!(recording.times(entity::VERDICT, entity::TIMELINE_FLIGHT_TIME), [400_000_000]);
+    assert_eq!(recording.times(entity::ROCKET, entity::TIMELINE_TICK), [1, 2, 3, 4]);
+    let times_ns = recording.times(entity::ROCKET, entity::TIMELINE_FLIGHT_TIME);
+    assert_eq!(times_ns, [5_000_000, 10_000_000, 15_000_000, 20_000_000]);
+    assert_eq!(recording.times(entity::VERDICT, entity::TIMELINE_FLIGHT_TIME), [20_000_000]);
     let timelines: BTreeSet<String> =
         recording.chunks.iter().flat_map(|chunk| chunk.timelines().keys()).map(ToString::to_string).collect();
     assert_eq!(timelines, BTreeSet::from(["flight_time".to_owned(), "tick".to_owned()]));
 }
 
 #[test]
-fn without_a_plant_the_estimate_is_shown() {
+fn without_the_truth_the_decisions_are_shown() {
     let (_folder, log, rrd) = folder();
     write_log(&log, false);
     let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses), (TICKS, TICKS));
+    assert_eq!((exported.ticks, exported.poses), (TICKS, 0));
     let recording = Recording::read(&rrd);
-    assert_eq!(recording.rows(entity::ROCKET), TICKS as usize);
-    assert_eq!(recording.rows(entity::THRUST), 0);
-    assert_eq!(recording.rows("plots/gimbal_deg/actual"), TICKS as usize);
+    assert_eq!(recording.rows(entity::ROCKET), 0);
+    assert_eq!(recording.rows("plots/fins_mean_deg/replayed"), TICKS as usize);
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn a_log_that_stops_growing_is_recorded_as_far_as_it_goes() {
     std::fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
     let followed = follow_file(&log, Towards::File(&rrd, Overwrite::Never), || false).unwrap();
     assert!(followed.damage.is_some() && followed.ticks < TICKS, "{followed:?}");
-    assert_eq!(Recording::read(&rrd).rows(entity::PREDICTED), followed.ticks as usize);
+    assert_eq!(Recording::read(&rrd).rows("plots/fins_mean_deg/replayed"), followed.ticks as usize);
     let again = follow_file(&log, Towards::File(&rrd, Overwrite::Never), || false).unwrap_err();
     assert!(matches!(again, ExportError::Exists { .. }), "{again}");
 }
@@ -70,7 +70,7 @@ fn two_flights_lie_in_one_recording() {
     assert_eq!((own.ticks, of_other.ticks), (TICKS, TICKS));
     let (both, alone) = (Recording::read(&rrd), Recording::read(&alone));
     assert_eq!((both.ids.len(), both.layouts), (1, 1));
-    for path in [entity::ROCKET, entity::PREDICTED, entity::PHASE, "plots/x_m/estimated"] {
+    for path in [entity::LEVEL, entity::PHASE, "plots/fins_mean_deg/replayed"] {
         let beside = entity::beside(path);
         assert!(alone.rows(path) > 0 && both.rows(path) > 0, "{path}");
         assert_eq!(both.rows(&beside), alone.rows(path), "{beside}");

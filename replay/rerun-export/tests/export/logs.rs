@@ -1,84 +1,54 @@
 //! Makes logs to export.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flight::guidance::controller::{ControlLevel, ControllerConfig, ControllerInput, ControllerState, step};
+use flight::guidance::controller::ControlLevel;
 use flight::rules::phase::Phase;
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
-use tick_log::{state_to_log, tick_to_log, verdict_to_log};
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use tick_log::sortie::{frame, header, start, time_ns};
 
-const PROFILE: &str = "paper-calibrated";
 pub(crate) const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
 pub(crate) const TICKS: u64 = 4;
+const FRAME_S: f64 = 0.005;
 
-/// A log of the first ticks of a landing; the plant is the controller's own model, recorded every 10 ms.
+/// A log of the first frames of a flight from apogee, with a verdict as if it had come down then.
 pub(crate) fn write_log(path: &Path, with_truth: bool) {
-    let profile = vehicles::profile::builtin(PROFILE).unwrap();
-    let config = ControllerConfig::from_profile(&profile);
-    let model = profile.planar_model();
-    let mut controller = ControllerState::new(&config);
-    let mut plant = profile.start.planar_state();
-    let header = LogHeader {
-        writer: "test".to_owned(),
-        start_unix_ns: START_UNIX_NS,
-        run: BTreeMap::from([("start_unix_ns".to_owned(), START_UNIX_NS.to_string())]),
-        profile_toml: vehicles::profile::builtin_toml(PROFILE).map(str::to_owned),
-        ..LogHeader::default()
-    };
+    let recipe = Recipe::built_in("mk2", "field").unwrap();
+    let header = header("test", &recipe, 0, START_UNIX_NS);
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
+    let mut flight = Sortie::new(&recipe, 0).unwrap();
+    log.write(&start(&flight), 0).unwrap();
     let event = Event {
         level: EventLevel::Warning,
         name: "vehicle".to_owned(),
         message: "landing motor commanded to light".to_owned(),
     };
     log.write(&Record::Event(event), 0).unwrap();
-    let mut held_rad = 0.0;
-    for tick in 0..TICKS {
-        let time_s = tick as f64 * config.sample_time_s();
-        let input = ControllerInput {
-            tick,
-            time_s,
-            phase: Phase::Powered,
-            time_since_ignition_s: time_s,
-            state: plant,
-            gimbal_applied_rad: held_rad,
-            thrust_scale: 1.0,
-            degraded: false,
-            lands_here: false,
-            deadline_missed: false,
-        };
-        let output = step(&mut controller, &input);
-        assert_eq!(output.level, ControlLevel::Converged);
-        let record = Record::from(tick_to_log(&input, &output, controller.digest(), 0.003, 0.1));
-        log.write(&record, nanoseconds(time_s)).unwrap();
-        for centisecond in 0..10 {
-            let truth = v1::PlantTruth {
-                time_s: time_s + 0.01 * f64::from(centisecond),
-                phase: u32::from(Phase::Powered.index()),
-                state: state_to_log(&plant),
-                gimbal_commanded_rad: held_rad,
-                gimbal_actual_rad: held_rad,
-                thrust_n: profile.motor.thrust_n,
-                mass_kg: profile.vehicle.mass_kg,
-                ..v1::PlantTruth::default()
-            };
-            let time_ns = nanoseconds(truth.time_s);
-            if with_truth {
-                log.write(&Record::PlantTruth(Box::new(truth)), time_ns).unwrap();
+    for _ in 0..TICKS {
+        flight.step();
+        for record in frame(&flight) {
+            if with_truth || !matches!(record, Record::TruthSample(_)) {
+                log.write(&record, time_ns(&flight)).unwrap();
             }
-            plant = model.rk4_step(&plant, held_rad, profile.motor.thrust_n, 0.01);
         }
-        held_rad = output.gimbal_command_rad;
         log.flush().unwrap();
     }
-    let judged = LandingVerdict::judge(&TouchdownLimits::from_profile(&profile), &plant);
-    let verdict = verdict_to_log(0.4, &plant, &judged);
-    log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(0.4)).unwrap();
+    let limit = v1::LimitResult {
+        name: "vertical speed".to_owned(),
+        value: -0.2,
+        minimum: -0.4,
+        maximum: 0.4,
+        unit: "m/s".to_owned(),
+        passed: true,
+    };
+    let time_s = TICKS as f64 * FRAME_S;
+    let verdict = v1::LandingVerdict { time_s, landed: true, limits: vec![limit], ..Default::default() };
+    log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(time_s)).unwrap();
     log.finish().unwrap();
 }
 

@@ -22,7 +22,6 @@ pub(super) fn html(info: &Info) -> String {
     let readable_s = found.readable_until_s.filter(|_| found.damage.is_some());
     row("readable until", readable_s.map(|until_s| format!("{until_s:.3} s after the first record")));
     row("lost after that", found.missing_s.map(|missing_s| format!("{missing_s:.3} s")));
-    row("ticks missing", Some(found.ticks_missing.to_string()));
     row("messages missing", Some(found.messages_lost.to_string()));
     row("size", info.size_bytes.map(|bytes| format!("{bytes} bytes")));
     row(

@@ -11,7 +11,7 @@ use crate::report::track::Flight;
 const CLASSES: [&str; 4] = ["a", "b", "c", "d"];
 
 pub(super) fn html(flight: &Flight) -> String {
-    let Some(in_space) = &flight.from_apogee else {
+    let Some(in_space) = &flight.in_space else {
         return String::new();
     };
     let world: Vec<&TruthSample> =

@@ -28,7 +28,7 @@ pub(super) struct Section {
 /// Every section.
 pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
     let section = |title, html| Section { title, html };
-    let in_space = flight.from_apogee.is_some();
+    let in_space = flight.in_space.is_some();
     let mut all = vec![
         section("", verdict::html(flight, info)),
         section("Phases", phases::html(flight, info)),

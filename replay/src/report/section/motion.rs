@@ -8,12 +8,12 @@ use crate::report::track::{Flight, GimbalAxis, Teller};
 pub(super) fn html(flight: &Flight) -> String {
     let who = match flight.teller {
         Teller::Plant => "From the simulated plant.",
-        Teller::Estimate => "From the controller's state estimate; the log has no plant.",
-        Teller::Telemetry => "From the telemetry of a ground station; the log has neither plant nor ticks.",
+        Teller::Estimate => "From the flight computer's estimate; the log has no truth.",
+        Teller::Telemetry => "From the telemetry of a ground station; the log has no frames.",
         Teller::Nobody => return paragraph("The log has no positions of the vehicle."),
     };
     // Without a landing, the pictures of the whole flight show all there is of its path.
-    let lands = flight.from_apogee.is_none() || !flight.plans.is_empty();
+    let lands = flight.in_space.is_none() || !flight.plans.is_empty();
     let mut pictures = Vec::new();
     if lands {
         pictures.push(path(flight));
@@ -21,7 +21,7 @@ pub(super) fn html(flight: &Flight) -> String {
     pictures.extend((0..COMPONENTS.len()).map(|component| state(flight, component)));
     pictures.extend(flight.gimbal.iter().map(|axis| input(flight, axis)));
     let mut words = who.to_owned();
-    if let Some(in_space) = &flight.from_apogee {
+    if let Some(in_space) = &flight.in_space {
         put(&mut words, format_args!(" Seen in {}.", in_space.plane));
         if lands {
             words.push_str(" The plans were made in air that moves over the ground.");
@@ -47,7 +47,7 @@ fn path(flight: &Flight) -> String {
         .collect();
     lines.push(Line { name: "flown", class: "a", points: flown });
     Chart {
-        title: match &flight.from_apogee {
+        title: match &flight.in_space {
             None => "Path in the pitch plane".to_owned(),
             Some(_) => "Path of the landing in its plane".to_owned(),
         },
@@ -68,12 +68,10 @@ fn state(flight: &Flight, component: usize) -> String {
     let shown = flight.track.iter().filter(|sample| flight.is_shown(sample.time_s));
     let points: Vec<(f64, f64)> =
         shown.map(|sample| (flight.axis_s(sample.time_s), factor * sample.state[component])).collect();
-    let estimate = flight.recording.ticks.iter().filter(|tick| flight.is_shown(tick.input.time_s));
-    let estimate: Vec<(f64, f64)> = estimate
-        .map(|tick| {
-            let state = crate::report::track::state_of(&tick.input.state);
-            (flight.axis_s(tick.input.time_s), factor * state[component])
-        })
+    let thoughts = flight.thoughts.iter().map(|thought| &thought.sample);
+    let estimate: Vec<(f64, f64)> = thoughts
+        .filter(|sample| flight.is_shown(sample.time_s))
+        .map(|sample| (flight.axis_s(sample.time_s), factor * sample.state[component]))
         .collect();
     let mut lines = vec![Line { name: "flown", class: "a", points }];
     if flight.teller == Teller::Plant {

@@ -19,7 +19,7 @@ pub(in crate::report) fn html(flights: [Told<'_>; 2]) -> String {
     });
     let flights = flights.map(|(flight, _)| flight);
     let mut words = format!("Each flight has its own {}.", flights[0].axis_name());
-    if flights.iter().any(|flight| flight.from_apogee.is_some()) {
+    if flights.iter().any(|flight| flight.in_space.is_some()) {
         words.push_str(" x is the distance in the plane of each landing.");
     }
     let mut pictures = vec![path(flights)];

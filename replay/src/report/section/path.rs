@@ -5,7 +5,7 @@ use protocol::log::flight_v1::TruthSample;
 
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, paragraph, table};
-use crate::report::track::{Flight, phase_of};
+use crate::report::track::Flight;
 
 /// A part of the flight: its name, its class, and whether a phase belongs to it.
 type Part = (&'static str, &'static str, fn(Phase) -> bool);
@@ -83,9 +83,8 @@ pub(super) fn html(flight: &Flight) -> String {
 const GAP: (f64, f64) = (f64::NAN, f64::NAN);
 
 fn phase_at(flight: &Flight, sample: &TruthSample) -> Option<Phase> {
-    let truth = &flight.recording.truth;
-    let place = truth.partition_point(|plant| plant.time_s < sample.time_s);
-    phase_of(truth.get(place)?.phase)
+    let place = flight.plant.partition_point(|plant| plant.sample.time_s < sample.time_s);
+    flight.plant.get(place)?.sample.phase
 }
 
 /// What happened when, as far as it did.

@@ -4,7 +4,7 @@ use flight::rules::phase::Phase;
 
 use crate::info::{Info, PhaseSpan};
 use crate::report::html::{escaped, paragraph, put, table};
-use crate::report::track::{Flight, phase_of};
+use crate::report::track::Flight;
 
 pub(super) fn html(flight: &Flight, info: &Info) -> String {
     let Some(timeline) = info.phases.first() else {
@@ -102,16 +102,14 @@ fn moments(flight: &Flight) -> Vec<(&'static str, Option<f64>)> {
 
 fn thrust_above_half_s(flight: &Flight) -> Option<f64> {
     let half_n = flight.vehicle.as_ref()?.half_thrust_n;
-    let lit = flight.recording.truth.iter().find(|truth| truth.thrust_n >= half_n)?;
-    Some(lit.time_s)
+    let lit = flight.plant.iter().find(|plant| plant.thrust_n >= half_n)?;
+    Some(lit.sample.time_s)
 }
 
 /// The last time thrust falls from above the weight to below it.
 fn thrust_through_weight_s(flight: &Flight) -> Option<f64> {
     let gravity_m_s2 = flight.vehicle.as_ref()?.gravity_m_s2;
-    let above = |truth: &&protocol::log::v1::PlantTruth| truth.thrust_n > truth.mass_kg * gravity_m_s2;
-    let last = flight.recording.truth.iter().rposition(|truth| above(&truth))?;
-    let after = flight.recording.truth.get(last + 1)?;
-    phase_of(after.phase)?;
-    Some(after.time_s)
+    let last = flight.plant.iter().rposition(|plant| plant.thrust_n > plant.mass_kg * gravity_m_s2)?;
+    let after = flight.plant.get(last + 1)?.sample;
+    after.phase.map(|_| after.time_s)
 }

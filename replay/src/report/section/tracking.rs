@@ -74,7 +74,7 @@ pub(super) fn html(flight: &Flight) -> String {
 
 /// A plan lies in a plane; what the vehicle moved across it is no part of the table.
 fn across(flight: &Flight) -> String {
-    let Some(in_space) = &flight.from_apogee else {
+    let Some(in_space) = &flight.in_space else {
         return String::new();
     };
     let at = |time_s: f64| {

@@ -10,9 +10,9 @@ use sim::sortie::Sortie;
 use tick_log::pilot::{state_from_log, vector_from_log};
 use tick_log::sortie as sortie_log;
 
+use super::{FaultChanges, ReflyError};
 use crate::controller::LoggedPilot;
 use crate::log::Recording;
-use crate::refly::{FaultChanges, ReflyError};
 use crate::settings::Schedule;
 
 /// Stands for every recorded fault.

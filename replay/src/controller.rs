@@ -1,22 +1,154 @@
-//! The flight computer of a flight from apogee.
+//! The flight computer that a log's frames came from, run again on their inputs.
+//!
+//! Two records of a frame are read: [`LoggedComputer`] runs every frame from power-up on, and [`LoggedPilot`] the frames
+//! from the release on, some of which plan a landing. Verification is written for any [`Replayed`].
 
 use std::collections::BTreeMap;
 
 use flight::computer::pilot::{Pilot, PilotInput, PilotOutput};
 use flight::computer::{Computer, Input, flight_time_s};
-use flight::guidance::baseline::{Controller, Law};
+use flight::guidance::baseline::{Controller, Law, UnknownController};
 use flight::guidance::controller::ControlLevel;
-use flight::guidance::powered::LandingSolved;
+use flight::guidance::powered::{LandingSolved, Plane};
+use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
+use nalgebra::Vector3;
 use nmpc::SolveStatus;
+use prost::Message;
 use prost_reflect::MessageDescriptor;
-use protocol::log::flight_v1;
-use tick_log::again::FrameError;
+use protocol::log::{computer_v1, flight_v1};
+use serde::Serialize;
+pub use tick_log::again::FrameError;
+use tick_log::again::RecordedComputer;
 use tick_log::pilot::{input_from_log, state_from_log, tick_to_log, vector_from_log};
 
-use super::{Decided, Decides, Moment, Replayed, phase_name};
-use crate::log::pilot_descriptor;
+use crate::log::{computer_descriptor, pilot_descriptor};
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
+
+/// A flight computer that can be run on the frames of a log; frames must come in order, from the first one on.
+pub trait Replayed {
+    /// The record of a frame in a log.
+    type Tick: Message;
+    /// Why a frame cannot be run again.
+    type Error: std::error::Error + 'static;
+
+    /// Describes the record's fields.
+    fn descriptor() -> Option<MessageDescriptor>;
+
+    /// The frame that a record belongs to.
+    fn moment(tick: &Self::Tick) -> Moment;
+
+    /// The gimbal commands of a record, rad.
+    fn gimbal_rad(tick: &Self::Tick) -> &[f64];
+
+    /// Runs a recorded frame again: the result has the recorded input and the new decision.
+    ///
+    /// # Errors
+    /// The recorded input cannot be given to this build's flight computer.
+    fn run_again(&mut self, tick: &Self::Tick) -> Result<Self::Tick, Self::Error>;
+}
+
+/// A frame, its vehicle time and its phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    pub phase: &'static str,
+}
+
+/// Summary of a frame's decision.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Decided {
+    /// Gimbal commands in pitch and yaw, rad.
+    pub gimbal_rad: Vec<f64>,
+    /// Fin commands, rad.
+    pub fins_rad: Vec<f64>,
+    pub phase: &'static str,
+    /// The control level that decided the gimbal command.
+    pub level: &'static str,
+    /// Cost of the last plan.
+    pub cost: f64,
+    /// Iterations of the last plan's solve.
+    pub iterations: u32,
+    /// Whether the end of the plan meets every condition; `None` without a plan.
+    pub plan_lands: Option<bool>,
+}
+
+fn phase_name(number: u32) -> &'static str {
+    let phase = u8::try_from(number).ok().and_then(flight::rules::phase::Phase::from_index);
+    phase.map_or("unknown", flight::rules::phase::Phase::name)
+}
+
+/// Why a flight computer cannot be built as it was at power-up.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    #[error("controller {0}")]
+    Controller(#[from] UnknownController),
+    #[error(
+        "its record /computer/start is of another vehicle than a rocket in space, and no other is run again"
+    )]
+    OtherVehicle,
+}
+
+/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order.
+#[derive(Debug, Clone)]
+pub struct LoggedComputer(RecordedComputer);
+
+impl LoggedComputer {
+    /// The flight computer that a log's frames came from, before its first frame. It is built from the text of the
+    /// mission and from the law that the run facts name.
+    ///
+    /// # Errors
+    /// This build cannot use the text, or a name is unknown.
+    pub fn recorded(
+        toml: &str,
+        start: &computer_v1::ComputerStart,
+        run: &BTreeMap<String, String>,
+    ) -> Result<Self, StartError> {
+        let start = start.in_space.as_ref().ok_or(StartError::OtherVehicle)?;
+        let schedule = LoggedPilot::schedule(toml, start, &[])?;
+        let controller = run.get("controller").map(|name| name.parse::<Controller>()).transpose()?;
+        Ok(Self(RecordedComputer::in_space(schedule.base(), start, controller.unwrap_or_default())))
+    }
+
+    /// The pilot's part of the last frame, as a log has it; `None` on the pad.
+    pub fn pilot_tick(&self) -> Option<flight_v1::PilotTick> {
+        let computer = self.0.computer();
+        let (input, output) = computer.piloted()?;
+        Some(tick_to_log(input, output, computer.flight_digest()))
+    }
+}
+
+impl Replayed for LoggedComputer {
+    type Tick = computer_v1::ComputerFrame;
+    type Error = FrameError;
+
+    fn descriptor() -> Option<MessageDescriptor> {
+        computer_descriptor()
+    }
+
+    fn moment(frame: &computer_v1::ComputerFrame) -> Moment {
+        let input = &frame.input;
+        Moment { tick: input.frame, time_s: input.time_s, phase: phase_name(frame.output.phase) }
+    }
+
+    fn gimbal_rad(frame: &computer_v1::ComputerFrame) -> &[f64] {
+        &frame.output.gimbal_rad
+    }
+
+    fn run_again(
+        &mut self,
+        frame: &computer_v1::ComputerFrame,
+    ) -> Result<computer_v1::ComputerFrame, FrameError> {
+        let read = self.0.read(&frame.input)?;
+        let output = self.0.step(&read);
+        Ok(self.0.record(&read, &output))
+    }
+}
 
 /// Run fact of a re-flown flight's log: the settings that changed in flight, one on each line.
 pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
@@ -183,9 +315,8 @@ impl Replayed for LoggedPilot {
         Moment { tick: input.frame, time_s: input.time_s, phase: phase_name(tick.output.phase) }
     }
 
-    fn apart(a: &flight_v1::PilotTick, b: &flight_v1::PilotTick) -> (f64, Option<f64>) {
-        let axes = a.output.gimbal_rad.iter().zip(&b.output.gimbal_rad);
-        (axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max), None)
+    fn gimbal_rad(tick: &flight_v1::PilotTick) -> &[f64] {
+        &tick.output.gimbal_rad
     }
 
     fn run_again(&mut self, tick: &flight_v1::PilotTick) -> Result<flight_v1::PilotTick, FrameError> {
@@ -196,8 +327,9 @@ impl Replayed for LoggedPilot {
     }
 }
 
-impl Decides for LoggedPilot {
-    fn decided(&self, tick: &flight_v1::PilotTick) -> Decided {
+impl LoggedPilot {
+    /// A summary of a frame's decision; the pilot has just run that frame.
+    pub fn decided(&self, tick: &flight_v1::PilotTick) -> Decided {
         let output = &tick.output;
         let report = self.pilot().report();
         let level = u8::try_from(output.level).ok().and_then(ControlLevel::from_index);
@@ -212,4 +344,38 @@ impl Decides for LoggedPilot {
             plan_lands: planned.then(|| report.level == ControlLevel::Converged),
         }
     }
+}
+
+/// Tells a new plan from an earlier plan that is still being flown; frames must come in order.
+#[derive(Debug, Clone, Default)]
+pub struct NewPlans {
+    flown: Vec<PlanarState>,
+}
+
+impl NewPlans {
+    /// The plan that a flight computer made in the frame it has just run, in which `level` decided: states relative to
+    /// the air in the plane of the landing, and the time between them, s. `None` if it flies an earlier plan or none.
+    pub fn made<'p>(&mut self, pilot: &'p Pilot, level: u32) -> Option<(&'p [PlanarState], f64)> {
+        let planned = level != u32::from(ControlLevel::Idle.index());
+        let (states, step_s) =
+            pilot.planned().filter(|(states, _)| planned && *states != self.flown.as_slice())?;
+        self.flown = states.to_vec();
+        Some((states, step_s))
+    }
+}
+
+/// The path of the centre of gravity in a plan just made, m: x, y, z of the world. It begins at the estimated position;
+/// motion across the plane of the landing is not planned.
+pub fn path_in_world_m(pilot: &Pilot, states: &[PlanarState], step_s: f64) -> Vec<[f64; 3]> {
+    let (Some(plane), Some(estimate), Some(first)) = (pilot.plane(), pilot.estimate(), states.first()) else {
+        return Vec::new();
+    };
+    let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
+    let place = |(node, state): (usize, &PlanarState)| {
+        let over_ground = Plane::over_ground(state, wind_m_s, node as f64 * step_s);
+        let moved =
+            plane.along * (over_ground.x_m - first.x_m) + Vector3::z() * (over_ground.z_m - first.z_m);
+        (estimate.state.position_m + moved).into()
+    };
+    states.iter().enumerate().map(place).collect()
 }
