@@ -53,10 +53,8 @@ impl Extent {
     /// Where a flight is expected before it is flown: between the height of its start and the pad.
     pub(crate) fn expected(survey: &Survey) -> Self {
         let shape = shape_of(survey);
-        let top_m = survey
-            .mission
-            .as_ref()
-            .map_or(4.0 * shape.length_m(), |mission| mission.start.height_m as f32);
+        let top_m =
+            survey.mission.as_ref().map_or(4.0 * shape.length_m(), |mission| mission.start.height_m as f32);
         Self { top_m, x_m: (0.0, 0.0), ground_z_m: ground_z_m(survey, &shape), rocket_m: shape.length_m() }
     }
 

@@ -17,7 +17,7 @@ pub struct FrameOrder {
     behind_another: bool,
 }
 
-/// The highest number that a flight's first frame can have; from power-up the first frame has number 0.
+/// The number of a flight's first frame.
 const FIRST_FRAME: u64 = 1;
 
 impl FrameOrder {

@@ -59,13 +59,13 @@ impl FromPowerUp {
             Some(Gap { after, before }) => Some(Obstacle::FramesLost { after, before }),
             None => self.verifier.check(frame).err().map(Obstacle::Frame),
         };
-        if self.obstacle.is_none() {
-            if let Some(made) = self.verifier.controller().pilot_tick() {
-                match self.waiting.remove(&made.input.frame) {
-                    Some(recorded) => self.compare(&recorded, &made),
-                    None => {
-                        self.made.insert(made.input.frame, made);
-                    }
+        if self.obstacle.is_none()
+            && let Some(made) = self.verifier.controller().pilot_tick()
+        {
+            match self.waiting.remove(&made.input.frame) {
+                Some(recorded) => self.compare(&recorded, &made),
+                None => {
+                    self.made.insert(made.input.frame, made);
                 }
             }
         }

@@ -221,7 +221,7 @@ fn what_two_people_do_verifies() {
         |_| true,
         |record| {
             if let Record::ComputerFrame(frame) = record
-                && frame.input.frame == CONFIRMED
+                && frame.input.frame == CONFIRMED + 1
             {
                 frame.input.requests.clear();
             }
@@ -279,7 +279,7 @@ fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
     let report = flown.verified_with(
         |_| true,
         |record| match record {
-            Record::ComputerFrame(frame) if frame.input.frame == 1_200 => {
+            Record::ComputerFrame(frame) if frame.input.frame == 1_201 => {
                 assert_eq!(frame.input.requests.len(), 1);
                 frame.input.requests.clear();
             }
@@ -288,7 +288,7 @@ fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
     );
     assert_eq!(report.outcome, Verification::Diverged);
     let first = report.frames.unwrap().first_divergence.unwrap();
-    assert_eq!((first.tick, first.phase), (1_200, "PAD_IDLE"));
+    assert_eq!((first.tick, first.phase), (1_201, "PAD_IDLE"));
     assert!(first.fields.iter().any(|field| field.path == "output.phase"), "{first:?}");
 }
 

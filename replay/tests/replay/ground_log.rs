@@ -89,7 +89,8 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
 fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     let recording = Recording::open(&GROUND).unwrap();
     let contact_s = recording.contact_s().unwrap();
-    let own_s = WITH_FRAMES.recording().verdict.unwrap().time_s;
+    let own = info(&WITH_FRAMES.log).unwrap();
+    let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
     let page = replay::report::report(&GROUND).unwrap().html;
     assert!(page.contains("LANDED") && page.contains(">touchdown<"));

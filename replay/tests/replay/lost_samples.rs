@@ -69,15 +69,20 @@ fn tolerances_limit_what_may_be_missing() {
     let tolerances = directory.path().join("tolerances.toml");
     let compared = |text: &str| {
         std::fs::write(&tolerances, text).unwrap();
-        run(replay("compare", log).arg(&thinned).arg("--tolerances").arg(&tolerances))
+        run(replay("compare", log)
+            .args(["--align", "time"])
+            .arg(&thinned)
+            .arg("--tolerances")
+            .arg(&tolerances))
     };
-    let (code, stdout, stderr) = compared("samples_missing = 0.7\n");
+    let (code, stdout, stderr) = compared("missing = 2\nsamples_missing = 0.7\n");
     assert_eq!(code, 0, "{stdout}{stderr}");
     let (code, stdout, _) = compared("samples_missing = 0.6\n");
     assert_eq!(code, 1, "{stdout}");
     assert!(stdout.contains("vehicle_truth3d") && !stdout.contains("- pilot_tick"), "{stdout}");
-    let (code, stdout, _) =
-        compared("samples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n");
+    let (code, stdout, _) = compared(
+        "missing = 2\nsamples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n",
+    );
     assert_eq!(code, 0, "{stdout}");
     let (code, _, stderr) = compared("samples_missing = 1.5\n");
     assert!(code == 2 && stderr.contains("from 0 to 1"), "{stderr}");

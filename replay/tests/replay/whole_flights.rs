@@ -119,7 +119,6 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
             (reports[0]["flight"]["number"].as_u64(), reports[1]["flight"]["of"].as_u64()),
             (Some(1), Some(2))
         );
-        assert!(stdout.contains("flight 2 of 2"), "{stdout}");
         b.messages.iter_mut().filter(|message| message.is_tick()).skip(30).take(1).for_each(tamper);
         let (code, stdout, _) = verify(&both(&b, "tampered.mcap"), &[]);
         assert_eq!(code, 1, "{stdout}");
@@ -152,7 +151,7 @@ fn commands_for_one_flight_refuse_a_log_with_two() {
 #[test]
 fn a_log_without_its_last_ticks_is_not_complete() {
     let directory = tempfile::tempdir().unwrap();
-    for (log, lost) in logs().into_iter().map(|log| (log, 500)) {
+    for (log, lost) in logs().into_iter().zip([500, 600]) {
         let whole = Held::read(log);
         let kept = whole.ticks() - lost;
         let last_ns =

@@ -38,9 +38,7 @@ fn a_flight_is_exported_whole() {
     ] {
         assert_eq!(recording.rows(path), rows, "{path}");
     }
-    for path in
-        [entity::BODY, entity::PAD, entity::PAD_LIMIT, entity::FLOWN, entity::REPORT]
-    {
+    for path in [entity::BODY, entity::PAD, entity::PAD_LIMIT, entity::FLOWN, entity::REPORT] {
         assert!(recording.is_static(path), "{path}");
     }
     assert_eq!(recording.times(entity::ROCKET, entity::TIMELINE_TICK), [1, 2, 3, 4]);

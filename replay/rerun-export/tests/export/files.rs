@@ -23,7 +23,11 @@ fn the_readable_part_of_a_cut_log_is_exported() {
                 continue;
             }
         };
-        assert_eq!(Recording::read(&rrd).rows("plots/fins_mean_deg/replayed"), exported.ticks as usize, "{percent} %");
+        assert_eq!(
+            Recording::read(&rrd).rows("plots/fins_mean_deg/replayed"),
+            exported.ticks as usize,
+            "{percent} %"
+        );
         assert!(exported.damage.is_some() || exported.ticks == TICKS, "{percent} %");
         partly += usize::from((1..TICKS).contains(&exported.ticks));
     }
