@@ -11,8 +11,6 @@ with open(sys.argv[1], "rb") as file:
     assert reader.get_summary() is not None
     for schema, channel, message, decoded in reader.iter_decoded_messages(
         topics=[
-            "/controller/tick",
-            "/vehicle/truth",
             "/pilot/start",
             "/pilot/tick",
             "/pilot/estimate",
@@ -24,8 +22,6 @@ with open(sys.argv[1], "rb") as file:
     ):
         assert message.log_time == message.publish_time
         counts[channel.topic] += 1
-        if channel.topic == "/controller/tick":
-            command = decoded.output.gimbal_command_rad
         if channel.topic == "/pilot/tick":
             command = decoded.output.gimbal_rad[0]
 for topic in sorted(counts):

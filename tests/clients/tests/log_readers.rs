@@ -19,7 +19,7 @@ use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 
 use from_apogee::LANDED;
-use simulated::{DISPERSED, MK2, NOMINAL, WITH_FRAMES};
+use simulated::{DISPERSED, MK2, WITH_FRAMES};
 
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap();
@@ -35,29 +35,26 @@ fn hex(number: f64) -> String {
 
 /// Logs of the recorder, one flown again, one recovered, and one of a flight from apogee.
 static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
-    let recording = NOMINAL.recording();
+    let recording = MK2.recording();
     let options = ReflyOptions::default();
     let (report, flight) = refly_flight(&recording, &options).unwrap();
-    let again = NOMINAL.beside("again.mcap");
+    let again = MK2.beside("again.mcap");
     write_log(&again, &recording, &options, &report, &flight).unwrap();
-    let cut = NOMINAL.beside("cut.mcap");
-    let bytes = std::fs::read(&NOMINAL.log).unwrap();
+    let cut = MK2.beside("cut.mcap");
+    let bytes = std::fs::read(&MK2.log).unwrap();
     // This cuts the file in the middle of the messages.
     std::fs::write(&cut, &bytes[..bytes.len() * 4 / 5]).unwrap();
-    let recovered = NOMINAL.beside("recovered.mcap");
+    let recovered = MK2.beside("recovered.mcap");
     recover(&cut, &recovered).unwrap();
     assert!(LANDED.landed);
-    let flown = [&NOMINAL, &DISPERSED, &WITH_FRAMES, &MK2].map(|flight| flight.log.clone());
+    let flown = [&MK2, &DISPERSED, &WITH_FRAMES].map(|flight| flight.log.clone());
     flown.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
 });
 
-/// The topic of the controller's ticks, their number, and the last gimbal command, rad.
+/// The topic of the flight computer's frames, their number, and the last gimbal command, rad.
 fn commands(recording: &Recording) -> (&'static str, usize, f64) {
-    if let Some(last) = recording.frames.last() {
-        return ("/pilot/tick", recording.frames.len(), last.output.gimbal_rad[0]);
-    }
-    let last_rad = recording.ticks.last().unwrap().output.gimbal_command_rad;
-    ("/controller/tick", recording.ticks.len(), last_rad)
+    let last = recording.frames.last().unwrap();
+    ("/pilot/tick", recording.frames.len(), last.output.gimbal_rad[0])
 }
 
 #[test]
@@ -104,8 +101,8 @@ fn logs_are_read_by_foxgloves_library() {
 fn logs_open_in_foxglove_with_plots() {
     let browser = found(&["chromium", "chromium-browser", "google-chrome"], "chromium");
     let flights = [
-        (&NOMINAL, "/vehicle/truth.state.z_m", "/controller/tick.output.gimbal_command_rad"),
         (&MK2, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[0]"),
+        (&DISPERSED, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[1]"),
     ];
     for (flight, height, gimbal) in flights {
         let picture = flight.beside("foxglove.png");
@@ -155,10 +152,11 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
             }
         }
     };
-    let recording = NOMINAL.recording();
-    let last = recording.truth.last().unwrap();
-    let values = [("state.x_m", last.state.x_m), ("fin_actual_2_rad", last.fin_actual_rad[1])];
-    check(&NOMINAL.log, NOMINAL.beside("tables"), "vehicle_truth.parquet", recording.truth.len(), &values);
+    let recording = MK2.recording();
+    let last = recording.world.last().unwrap();
+    let values =
+        [("state.position_m.y", last.state.position_m.y), ("fins_actual_2_rad", last.fins_actual_rad[1])];
+    check(&MK2.log, MK2.beside("tables"), "vehicle_truth3d.parquet", recording.world.len(), &values);
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.world.last().unwrap();
     let values = [("state.position_m.x", last.state.position_m.x), ("height_m", last.height_m)];

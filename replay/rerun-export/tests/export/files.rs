@@ -2,7 +2,7 @@
 
 use replay::log::FlightLog;
 use replay_rerun::survey::Survey;
-use replay_rerun::{ExportError, Overwrite, entity, export, export_file};
+use replay_rerun::{ExportError, Overwrite, export, export_file};
 
 use crate::logs::{TICKS, folder, write_log};
 use crate::read_back::Recording;
