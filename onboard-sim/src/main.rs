@@ -36,10 +36,6 @@ enum Command {
         after_help = "Examples:\n  onboard-sim fly --profile mk2 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
     Fly(cli::fly::FlyArguments),
-    /// Map where a mission lands, over two quantities: one simulated flight for each cell, or with `--ask attainable` what
-    /// perfect information could land.
-    #[command(after_help = "Example: onboard-sim landability --profile mk2 --svg mk2.svg")]
-    Landability(cli::landability::LandabilityArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     #[command(
         after_help = "Example: onboard-sim campaign --profile mk2 --dispersion real --flights 1000 --out mk2-real"
@@ -50,14 +46,14 @@ enum Command {
     /// Each motor gets the ballast and the height of the start with which one ignition height suits the largest scatter of
     /// impulse, burn time and ignition delay; `scatter` is that as a multiple of what the mission plans for (1 and more is
     /// good). The best ones are then flown.
-    #[command(after_help = cli::motors::EXAMPLE)]
+    #[command(after_help = cli::motors::MOTORS_EXAMPLE)]
     Motors(cli::motors::MotorsArguments),
     /// Write the page that a team takes to the field, and the mission to load; refused for what cannot land.
     ///
     /// The folder gets card.html and card.txt (the same page), mission.toml (for fly, campaign and the vehicle) and day.toml
     /// (the set of dispersions with the wind of the day).
-    #[command(after_help = cli::card::EXAMPLE)]
-    Card(cli::card::CardArguments),
+    #[command(after_help = cli::motors::CARD_EXAMPLE)]
+    Card(cli::motors::CardArguments),
     /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
@@ -96,15 +92,12 @@ enum Command {
         #[arg(long, value_name = "NAME")]
         show: Option<String>,
     },
-    /// Print a shell's completions.
-    #[command(after_help = "Example: onboard-sim completions bash")]
-    Completions {
+    /// Print a shell's completions, or without a shell the manual page (roff).
+    #[command(hide = true)]
+    Manual {
         /// The shell.
-        shell: clap_complete::Shell,
+        shell: Option<clap_complete::Shell>,
     },
-    /// Print the manual page (roff).
-    #[command(after_help = "Example: onboard-sim man")]
-    Man,
 }
 
 fn main() -> ExitCode {
@@ -120,10 +113,9 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
-        Command::Landability(arguments) => cli::landability::run(&arguments),
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
-        Command::Motors(arguments) => cli::motors::run(&arguments),
-        Command::Card(arguments) => cli::card::run(&arguments),
+        Command::Motors(arguments) => cli::motors::motors(&arguments),
+        Command::Card(arguments) => cli::motors::card(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Paper(arguments) => cli::paper::run(&arguments),
         Command::World(arguments) => cli::world::run(arguments),
@@ -131,9 +123,19 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
-        Command::Completions { shell } => cli::manual::completions(Arguments::command(), shell),
-        Command::Man => cli::manual::page(Arguments::command()),
+        Command::Manual { shell } => manual(Arguments::command(), shell),
     }
+}
+
+/// The command line in other forms: a shell's completions, or the manual page.
+fn manual(mut command: clap::Command, shell: Option<clap_complete::Shell>) -> anyhow::Result<ExitCode> {
+    let mut text = Vec::new();
+    match shell {
+        Some(shell) => clap_complete::generate(shell, &mut command, "onboard-sim", &mut text),
+        None => clap_mangen::Man::new(command).render(&mut text)?,
+    }
+    std::io::stdout().lock().write_all(&text)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {

@@ -220,7 +220,7 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
         assert!(text.contains(expected), "{expected} in\n{text}");
     }
     let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
-    assert!(csv.starts_with("wind_m_s,way,flight,x_m,y_m,landed\n0,\"as planned\",0,"), "{csv}");
+    assert!(csv.starts_with("wind_m_s,way,flight,x_m,y_m,landed\n0,as planned,0,"), "{csv}");
     let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();
     assert!(svg.contains("vlr: where it comes down") && svg.contains("NAR 9 m"), "{svg}");
     let again = hazard(&["--csv", "hazard.csv"]);

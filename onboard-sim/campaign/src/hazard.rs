@@ -20,7 +20,7 @@ use statrs::distribution::{Binomial, DiscreteCDF as _};
 use world::wind::Wind;
 use world::{Actuators, Fault};
 
-use crate::work::in_parallel;
+use crate::run::in_parallel;
 
 /// The share of the flights that a radius has to hold.
 const HELD: f64 = 0.99;
@@ -232,11 +232,10 @@ const NEARLY: f64 = 0.9;
 /// of how many.
 ///
 /// # Errors
-/// A flight cannot be set up, or a thread could not be started.
+/// A flight cannot be set up.
 pub fn study(
     recipe: &Recipe,
     flights: Flights,
-    jobs: usize,
     done: &(dyn Fn(u64, u64) + Sync),
 ) -> Result<Vec<Impact>, HazardError> {
     let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
@@ -245,7 +244,7 @@ pub fn study(
         let from = numbers.start;
         let numbers: Vec<u64> = numbers.collect();
         let told = |flown: usize| done(from + flown as u64, of_widest);
-        let flown = in_parallel(&numbers, jobs, |number| fly(recipe, ways, *number), &told)?;
+        let flown = in_parallel(&numbers, |number| fly(recipe, ways, *number), &told);
         let flown = numbers
             .iter()
             .zip(flown)
@@ -293,9 +292,6 @@ pub enum HazardError {
     /// Nothing was flown.
     #[error("no flight was flown")]
     NoFlight,
-    /// A thread could not be started.
-    #[error("a thread could not be started")]
-    Thread(#[from] std::io::Error),
 }
 
 /// Flies flight `number` of a recipe in some ways.

@@ -1,19 +1,48 @@
-//! Flies the missing flights of a campaign on several threads.
+//! The same work on many things, on several threads: the missing flights of a campaign, and then its results.
 //!
-//! Each thread takes the next chunk of flights. A flight depends only on the order and its number, so the results do
-//! not depend on the thread that flew it.
+//! What a thread does depends only on its thing (of a flight on the order and its number), so no result depends on the
+//! number of threads.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+use std::sync::{Mutex, PoisonError};
 
-use crate::order::Order;
-use crate::row::Row;
-use crate::store::{Store, StoreError};
-use crate::tally;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use sim::sortie::SetUpError;
+
+use crate::figure::FigureError;
+use crate::picture::{PICTURES, pictures};
+use crate::row::{Row, to_csv, to_parquet};
+use crate::store::{Order, Store, StoreError};
+use crate::summary::{Summary, to_markdown};
+use crate::tally;
+
+/// So many threads, or as many as there are processors, for all work inside their `install`.
+///
+/// # Errors
+/// A thread could not be started.
+pub fn threads(jobs: Option<usize>) -> Result<ThreadPool, ThreadPoolBuildError> {
+    // 0 means as many as there are processors.
+    ThreadPoolBuilder::new().num_threads(jobs.map_or(0, |jobs| jobs.max(1))).build()
+}
+
+/// Results of `work` for each item, in the order of the items. `done` is told how many items are finished, after each.
+pub fn in_parallel<T: Sync, R: Send>(
+    items: &[T],
+    work: impl Fn(&T) -> R + Sync,
+    done: &(dyn Fn(usize) + Sync),
+) -> Vec<R> {
+    let finished = AtomicUsize::new(0);
+    let one = |item| {
+        let result = work(item);
+        done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+        result
+    };
+    // Each item is long enough to be stolen alone.
+    items.par_iter().with_max_len(1).map(one).collect()
+}
 
 /// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -50,66 +79,37 @@ pub enum RunError {
     /// The directory cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A thread could not be started.
-    #[error("a thread could not be started")]
-    Thread(#[source] std::io::Error),
 }
 
-/// Flies the chunks that are not in the store yet, on `jobs` threads. `progress` is called after every flight.
+/// Flies the chunks that are not in the store yet. `progress` is called after every flight.
 ///
 /// # Errors
 /// The first error; the chunks that were finished before it stay in the store.
 pub fn run(
     order: &Order,
     store: &Store,
-    jobs: usize,
     progress: &(dyn Fn(&Progress) + Sync),
 ) -> Result<Progress, RunError> {
     let missing: Vec<u64> = store.chunks().filter(|chunk| !store.has(*chunk)).collect();
     let of = missing.iter().map(|chunk| store.flights_of(*chunk).count() as u64).sum();
-    let state = Mutex::new((Progress { of, ..Progress::default() }, None::<RunError>));
-    let next = AtomicUsize::new(0);
-    // Only `progress` can panic with the lock held, and then the counts are still valid.
-    let locked = || state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let fly_chunk = |chunk: u64| -> Result<(), RunError> {
-        let mut rows = Vec::new();
-        for number in store.flights_of(chunk) {
-            if locked().1.is_some() {
-                return Ok(());
-            }
+    let total = Mutex::new(Progress { of, ..Progress::default() });
+    let fly_chunk = |chunk: &u64| -> Result<(), RunError> {
+        let fly = |number| {
             let row = fly_caught(order, number)?;
-            let mut state = locked();
-            state.0.flown += 1;
-            state.0.legs += u64::from(row.legs);
-            state.0.strict += u64::from(row.strict);
-            state.0.flight_time_ms += (row.flight_time_s * 1e3) as u64;
-            progress(&state.0);
-            drop(state);
-            rows.push(row);
-        }
-        Ok(store.write(chunk, &rows)?)
+            // Only `progress` can panic with the lock held, and then the counts are still valid.
+            let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
+            total.flown += 1;
+            total.legs += u64::from(row.legs);
+            total.strict += u64::from(row.strict);
+            total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
+            progress(&total);
+            Ok::<_, RunError>(row)
+        };
+        let rows: Vec<Row> = store.flights_of(*chunk).map(fly).collect::<Result<_, _>>()?;
+        Ok(store.write(*chunk, &rows)?)
     };
-    let work = || {
-        while let Some(chunk) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-            if let Err(error) = fly_chunk(*chunk) {
-                locked().1.get_or_insert(error);
-            }
-            if locked().1.is_some() {
-                return;
-            }
-        }
-    };
-    thread::scope(|scope| {
-        for job in 1..jobs.max(1) {
-            let started = thread::Builder::new().name(format!("flights-{job}")).spawn_scoped(scope, work);
-            if let Err(error) = started {
-                locked().1.get_or_insert(RunError::Thread(error));
-            }
-        }
-        work();
-    });
-    let (progress, error) = state.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    error.map_or(Ok(progress), Err)
+    missing.par_iter().with_max_len(1).try_for_each(fly_chunk)?;
+    Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 fn fly_caught(order: &Order, number: u64) -> Result<Row, RunError> {
@@ -122,4 +122,43 @@ fn fly_caught(order: &Order, number: u64) -> Result<Row, RunError> {
 fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without words".to_owned())
+}
+
+/// Writes `flights.csv`, `flights.parquet`, `summary.json`, `summary.md` and the pictures from the store's chunks.
+///
+/// # Errors
+/// A chunk is missing or damaged, or a file cannot be written.
+pub fn publish(order: &Order, store: &Store) -> Result<Summary, StoreError> {
+    let rows = store.rows()?;
+    let summary = Summary::new(store.manifest(), &rows);
+    let write = |name: &str, made: Result<Vec<u8>, String>| match made {
+        Ok(bytes) => store.publish(name, &bytes),
+        Err(message) => Err(StoreError::Content { path: store.path().join(name), message }),
+    };
+    write("flights.csv", to_csv(&rows).map_err(|error| error.to_string()))?;
+    write("flights.parquet", to_parquet(&rows).map_err(|error| error.to_string()))?;
+    write("summary.json", serde_json::to_vec_pretty(&summary).map_err(|error| error.to_string()))?;
+    write("summary.md", Ok(to_markdown(&summary).into_bytes()))?;
+    for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, &order.recipe.mission.leg_limits)) {
+        write(name, picture.map(String::into_bytes).map_err(|error: FigureError| error.to_string()))?;
+    }
+    Ok(summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_are_in_order_for_any_number_of_threads() {
+        let items: Vec<u64> = (0..50).collect();
+        for jobs in [0, 1, 3, 80] {
+            let finished = AtomicUsize::new(0);
+            let count = |count| _ = finished.fetch_max(count, Ordering::Relaxed);
+            let square = || in_parallel(&items, |item| item * item, &count);
+            let squares = threads(Some(jobs)).unwrap().install(square);
+            assert_eq!(squares, items.iter().map(|item| item * item).collect::<Vec<_>>());
+            assert_eq!(finished.into_inner(), 50);
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Scenarios: faults and the expected outcome of the flight, as data; and the expected outcome of each kind of fault.
+//! Scenarios: faults and the expected outcome of the flight, as data.
 
 use serde::Deserialize;
 
@@ -49,79 +49,6 @@ impl Expected {
             Self::Parachute => row.parachute && !row.ignited,
         }
     }
-}
-
-/// A fault, the expected outcome of a flight with it, and the reason.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Expectation {
-    /// The fault, as written on a command line.
-    pub fault: &'static str,
-    /// The expected outcome.
-    pub expected: Expected,
-    pub because: &'static str,
-}
-
-/// The expected outcome of each fault, with nominal data, sensors and still air. With real dispersions fewer flights
-/// land.
-pub const EXPECTATIONS: &[Expectation] = &[
-    expectation("link-loss@0", Expected::Land, "nothing on board depends on the radio"),
-    expectation(
-        "link-delay:1@0",
-        Expected::Land,
-        "nothing on board depends on the radio; an abort is late by the delay",
-    ),
-    expectation(
-        "gnss-out@5",
-        Expected::Degrade,
-        "without satellites the lateral velocity is known less well than the legs' limit",
-    ),
-    expectation("barometer-out@5", Expected::Land, "satellite heights and the lidar remain"),
-    expectation(
-        "lidar-out@0",
-        Expected::Land,
-        "satellites and barometer remain, accurate to some decimetres",
-    ),
-    expectation(
-        "accelerometer-bias:30@5",
-        Expected::Land,
-        "the filter estimates the bias before the landing",
-    ),
-    expectation(
-        "gyro-bias:1@5",
-        Expected::Parachute,
-        "satellites contradict the estimate, so the gate stays closed; the parachute is what is left",
-    ),
-    expectation(
-        "fin-stuck:2@descent+2",
-        Expected::Parachute,
-        "the fin does not follow its command, so the gate stays closed, and there is room for the parachute",
-    ),
-    expectation("fin-stuck:1@armed", Expected::Parachute, "the same, even seconds before the ignition"),
-    expectation(
-        "gimbal-slow:0.3@ignition",
-        Expected::Degrade,
-        "three of four `field` flights land; the others are still turning at contact",
-    ),
-    expectation("gimbal-stuck@powered+0.5", Expected::Degrade, "the thrust brakes, but nothing steers"),
-    expectation("no-light@0", Expected::Inhibit, "no thrust within half a second latches the inhibit"),
-    expectation(
-        "late-light:0.3@0",
-        Expected::Degrade,
-        "the thrust begins 13 m lower than chosen, at the edge of the band",
-    ),
-    expectation(
-        "weak-motor:0.8@0",
-        Expected::Degrade,
-        "a loss of a fifth of the impulse is more than the band allows for",
-    ),
-    expectation("early-burnout:2@0", Expected::Degrade, "the vehicle falls the rest of the way"),
-    expectation("reboot:0.2@descent+3", Expected::Land, "the restart keeps the phase and the last estimate"),
-    expectation("parachute-fails@0", Expected::Land, "a landing does not need the parachute"),
-    expectation("abort@descent+1", Expected::Parachute, "there is room for the parachute"),
-];
-
-const fn expectation(fault: &'static str, expected: Expected, because: &'static str) -> Expectation {
-    Expectation { fault, expected, because }
 }
 
 /// The faults of a flight, from a file.
@@ -181,13 +108,6 @@ impl Scenario {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_expectation_names_a_known_fault() {
-        for expectation in EXPECTATIONS {
-            assert_eq!(expectation.fault.parse::<TimedFault>().unwrap().to_string(), expectation.fault);
-        }
-    }
 
     #[test]
     fn a_scenario_is_parsed_and_errors_name_the_key() {

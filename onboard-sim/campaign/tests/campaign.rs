@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use campaign::order::{Order, Shard};
-use campaign::store::{CHUNK_FLIGHTS, Store, StoreError, merge};
-use campaign::{results, run, table};
+use campaign::row;
+use campaign::run::{publish, run, threads};
+use campaign::store::{CHUNK_FLIGHTS, Order, Shard, Store, StoreError, merge};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::RowAccessor as _;
 use sim::dispersion;
@@ -25,8 +25,8 @@ fn order(seed: u64) -> Order {
 
 fn fly(order: &Order, shard: Shard, jobs: usize, out: &Path) -> u64 {
     let store = Store::open(out, order, &order.manifest("test", shard)).unwrap();
-    let flown = run::run(order, &store, jobs, &|_| ()).unwrap().flown;
-    results::publish(order, &store).unwrap();
+    let flown = threads(Some(jobs)).unwrap().install(|| run(order, &store, &|_| ()).unwrap().flown);
+    publish(order, &store).unwrap();
     flown
 }
 
@@ -61,7 +61,7 @@ fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
         (1..=2).zip(&parts).map(|(index, part)| fly(&order, Shard { index, count: 2 }, 1, part)).sum();
     assert_eq!(flown, FLIGHTS);
     let (store, merged) = merge(&parts, &at("merged"), |_, _, _| Ok(order.clone())).unwrap();
-    results::publish(&merged, &store).unwrap();
+    publish(&merged, &store).unwrap();
     assert_same(&at("one"), &at("merged"));
 
     // Stopped after a chunk, then continued.
@@ -77,10 +77,10 @@ fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
 /// The formats that other programs read.
 fn read_them(out: &Path) {
     let csv = fs::read(out.join("flights.csv")).unwrap();
-    let rows = table::from_csv(&csv).unwrap();
+    let rows = row::from_csv(&csv).unwrap();
     assert!(rows.iter().map(|row| row.number).eq(0..FLIGHTS));
     assert!(rows.iter().all(|row| row.touchdown_vertical_m_s.is_some_and(f64::is_finite)));
-    assert_eq!(table::to_csv(&rows).unwrap(), csv);
+    assert_eq!(row::to_csv(&rows).unwrap(), csv);
 
     let reader = SerializedFileReader::new(fs::File::open(out.join("flights.parquet")).unwrap()).unwrap();
     let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use campaign::hazard::{Flights, Impact, Radius, Way, fly, study, widest};
+use campaign::run::threads;
 use flight::vehicle::profile::StartPoint;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -60,7 +61,8 @@ fn under_the_parachute_the_computer_changes_nothing() {
 #[test]
 fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
     let recipe = recipe("mk2", StartPoint::Apogee);
-    let flown = |jobs| study(&recipe, Flights { survey: 1, of_widest: 3 }, jobs, &|_, _| {}).unwrap();
+    let study = || study(&recipe, Flights { survey: 1, of_widest: 3 }, &|_, _| {}).unwrap();
+    let flown = |jobs| threads(Some(jobs)).unwrap().install(study);
     let alone = flown(1);
     assert_eq!(alone, flown(2));
     // A parachute drifts with the wind; what falls without one does not.

@@ -1,13 +1,16 @@
-//! The main loop: Newton on the optimality conditions, globalised by a line search on the exact penalty.
+//! The main loop: Newton on the optimality conditions from bent initial guesses, globalised by a line search on the exact
+//! penalty.
 
-use super::condense::Linearised;
-use super::convexify::convexified;
-use super::line_search::{Iterate, line_search};
-use super::polish::{ActiveSet, Place, Role, polished};
-use super::qp::{Qp, QpRow, QpSolution};
+use core::f64::consts::PI;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
 use nmpc::dynamics::PlanarState;
-use nmpc::problem::{Condition, Problem};
-use nmpc::{Solution, SolveStatus, WarmStart};
+use nmpc::problem::Condition;
+use nmpc::rollout::Trajectory;
+use nmpc::{Problem, Solution, SolveStatus, WarmStart};
+
+use super::linearised::Linearised;
+use super::subproblem::{ActiveSet, Place, Qp, QpRow, QpSolution, Role, convexified, polished};
 
 /// A new iterate must have a lower merit than the worst of this many iterates. A full Newton step along a curved
 /// condition raises the penalty briefly, and its refusal would cost many short steps.
@@ -220,3 +223,165 @@ fn subproblem(
 fn pushes_out(slope: f64, input_rad: f64, limit_rad: f64) -> bool {
     (input_rad >= limit_rad && slope < 0.0) || (input_rad <= -limit_rad && slope > 0.0)
 }
+
+/// Fraction of the predicted decrease that a step must reach.
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+
+/// Shortest fraction of a step that is tried.
+const SHORTEST_STEP: f64 = 1.0 / 4096.0;
+
+/// A full step this small (rad) is taken without a test: the merit's rounding error is larger than its possible
+/// decrease.
+const TINY_STEP_RAD: f64 = 1e-7;
+
+/// Relative rounding error of the merit that a comparison allows.
+const MERIT_ROUNDING: f64 = 1e-12;
+
+/// An iterate: inputs and their path.
+pub(super) struct Iterate {
+    pub(super) inputs_rad: Vec<f64>,
+    pub(super) trajectory: Trajectory,
+    /// Cost plus the price of every broken condition.
+    pub(super) merit: f64,
+}
+
+impl Iterate {
+    pub(super) fn of(problem: &Problem, conditions: &[Condition], inputs_rad: Vec<f64>) -> Self {
+        let trajectory = Trajectory::of(problem, &inputs_rad);
+        let merit = trajectory.merit(conditions, problem.solver.terminal_penalty);
+        Self { inputs_rad, trajectory, merit }
+    }
+}
+
+/// The next iterate along the step and the fraction taken, or `None` if no fraction brings the merit far enough below
+/// `reference`.
+pub(super) fn line_search(
+    problem: &Problem,
+    conditions: &[Condition],
+    linear: &Linearised,
+    current: &Iterate,
+    step: &QpSolution,
+    reference: f64,
+) -> Option<(Iterate, f64)> {
+    let limit = problem.gimbal_limit_rad;
+    let predicted = predicted_change(problem, conditions, linear, &step.step).min(0.0);
+    let forgiven = MERIT_ROUNDING * reference.abs();
+    let largest = step.step.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
+    let mut fraction = 1.0;
+    while fraction >= SHORTEST_STEP {
+        let inputs_rad = current
+            .inputs_rad
+            .iter()
+            .zip(&step.step)
+            .map(|(input, component)| snapped(input + fraction * component, limit))
+            .collect();
+        let candidate = Iterate::of(problem, conditions, inputs_rad);
+        let wanted = reference + SUFFICIENT_DECREASE * fraction * predicted + forgiven;
+        let full = fraction >= 1.0;
+        if candidate.merit <= wanted || (full && largest <= TINY_STEP_RAD && candidate.merit.is_finite()) {
+            return Some((candidate, fraction));
+        }
+        if full {
+            let corrected = corrected(problem, conditions, linear, &candidate, &step.multipliers);
+            if let Some(corrected) = corrected.filter(|corrected| corrected.merit <= wanted) {
+                return Some((corrected, fraction));
+            }
+        }
+        fraction *= 0.5;
+    }
+    None
+}
+
+/// A full step's candidate, moved back onto the curved conditions that it left (second-order correction), by the
+/// smallest change of the free inputs that meets them to first order.
+fn corrected(
+    problem: &Problem,
+    conditions: &[Condition],
+    linear: &Linearised,
+    candidate: &Iterate,
+    multipliers: &[f64],
+) -> Option<Iterate> {
+    let price = problem.solver.terminal_penalty;
+    let limit = problem.gimbal_limit_rad;
+    let held: Vec<usize> = (0..conditions.len())
+        .filter(|row| {
+            let multiplier = multipliers[*row].abs();
+            multiplier < price && (conditions[*row].equality || multiplier > 0.0)
+        })
+        .collect();
+    let free: Vec<usize> =
+        (0..candidate.inputs_rad.len()).filter(|j| candidate.inputs_rad[*j].abs() < limit).collect();
+    let rows = DMatrix::from_fn(held.len(), free.len(), |i, j| linear.rows[(held[i], free[j])]);
+    let missed = DVector::from_fn(held.len(), |i, _| conditions[held[i]].value(&candidate.trajectory.states));
+    let change = -rows.transpose() * Cholesky::new(&rows * rows.transpose())?.solve(&missed);
+    let mut inputs_rad = candidate.inputs_rad.clone();
+    for (j, change) in free.iter().zip(change.iter()) {
+        inputs_rad[*j] = snapped(inputs_rad[*j] + change, limit);
+    }
+    Some(Iterate::of(problem, conditions, inputs_rad))
+}
+
+/// Change of the merit along a whole step, to first order in the cost and the conditions.
+fn predicted_change(problem: &Problem, conditions: &[Condition], linear: &Linearised, step: &[f64]) -> f64 {
+    let cost: f64 = linear.gradient.iter().zip(step).map(|(slope, component)| slope * component).sum();
+    let broken: f64 = conditions
+        .iter()
+        .enumerate()
+        .map(|(index, condition)| {
+            let value = linear.values[index];
+            let moved: f64 =
+                linear.rows.row(index).iter().zip(step).map(|(slope, component)| slope * component).sum();
+            condition.violation(value + moved) - condition.violation(value)
+        })
+        .sum();
+    cost + problem.solver.terminal_penalty * broken
+}
+
+/// An input within the limit, and exactly on it when an interior-point step ends just inside.
+fn snapped(input_rad: f64, limit_rad: f64) -> f64 {
+    const HAIR_RAD: f64 = 1e-8;
+    if input_rad > limit_rad - HAIR_RAD {
+        limit_rad
+    } else if input_rad < HAIR_RAD - limit_rad {
+        -limit_rad
+    } else {
+        input_rad
+    }
+}
+
+/// Inputs whose path follows the pitch `pi/2 + amplitude sin(m pi t / T)`: the vehicle tilts one way and then the
+/// other, which wastes surplus thrust and ends upright.
+///
+/// A law with two equal real poles flies this pitch history as a moving reference, so the guess is a flyable path from any
+/// start: under thrust the pitch is a double integrator of the gimbal angle.
+pub(super) fn bent(problem: &Problem, amplitude_rad: f64) -> Vec<f64> {
+    let params = &problem.model.params;
+    let pole = libm::exp(-GUESS_DECAY_RATE_PER_S * problem.step_s);
+    let pitch_gain_per_s2 = (1.0 - pole) * (1.0 - pole) / (problem.step_s * problem.step_s);
+    let rate_gain_per_s = (1.0 - pole) * (3.0 + pole) / (2.0 * problem.step_s);
+    let arm_per_inertia = params.thrust_arm_m / params.pitch_inertia_kg_m2;
+    let sine_limit = libm::sin(problem.gimbal_limit_rad);
+    let count = problem.intervals();
+    let half_waves = f64::from(problem.solver.guess_half_waves);
+    let reference = |k: usize| {
+        let phase = half_waves * PI * k as f64 / count as f64;
+        let rate = half_waves * PI / (count as f64 * problem.step_s);
+        (problem.target.theta_rad + amplitude_rad * libm::sin(phase), amplitude_rad * rate * libm::cos(phase))
+    };
+    let mut state = problem.initial;
+    let mut inputs_rad = Vec::with_capacity(count);
+    for (k, thrust_n) in problem.thrust_n.iter().enumerate() {
+        let (theta_rad, q_rad_s) = reference(k);
+        let wanted_rad_s2 =
+            -pitch_gain_per_s2 * (state.theta_rad - theta_rad) - rate_gain_per_s * (state.q_rad_s - q_rad_s);
+        // q' = -T sin(delta) arm / I; the sine's limit is the gimbal's.
+        let sine = -wanted_rad_s2 / (thrust_n * arm_per_inertia);
+        let gimbal_rad = if sine.is_finite() { libm::asin(sine.clamp(-sine_limit, sine_limit)) } else { 0.0 };
+        state = problem.model_at(k).rk4_step(&state, gimbal_rad, *thrust_n, problem.step_s);
+        inputs_rad.push(gimbal_rad);
+    }
+    inputs_rad
+}
+
+/// Fast enough to follow the reference within a few samples, slow enough to stay off the gimbal limit.
+const GUESS_DECAY_RATE_PER_S: f64 = 4.0;

@@ -1,27 +1,31 @@
 //! `onboard-sim campaign`: a mission flown many times.
 
+use std::fmt;
 use std::fs;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use campaign::order::{Manifest, Order, Shard};
+use campaign::map::{self, Question};
+use campaign::run::{self, Progress};
 use campaign::scenario::{Expected, Scenario};
-use campaign::store::{Store, merge};
+use campaign::store::{Manifest, Order, Shard, Store, merge};
 use campaign::summary::to_text;
-use campaign::{results, run, timing};
-use clap::{Args, Subcommand};
+use campaign::tally;
+use clap::{Args, Subcommand, ValueEnum};
 use flight::guidance::baseline::Controller;
 use flight::vehicle::profile::StartPoint;
 use protocol::log::build::build_info;
+use serde_json::json;
 use sha2::Digest as _;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
-use sim::recipe::{self, Recipe};
+use sim::recipe::Recipe;
 
-use super::cost::Stopwatch;
-use super::single;
+use super::{MapArguments, mission_text, on_threads, single, text_of};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -77,6 +81,10 @@ pub(crate) struct CampaignArguments {
 
 #[derive(Subcommand)]
 enum CampaignCommand {
+    /// Map where a mission lands, over two quantities: one simulated flight for each cell, or with `--ask attainable` what
+    /// perfect information could land.
+    #[command(after_help = "Example: onboard-sim campaign map --profile mk2 --svg mk2.svg")]
+    Map(MapOfMission),
     /// Merge the parts of a campaign that was flown in shards.
     #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
     Merge {
@@ -90,8 +98,10 @@ enum CampaignCommand {
 }
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
-    if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
-        return gather(parts, out);
+    match &arguments.command {
+        Some(CampaignCommand::Merge { parts, out }) => return gather(parts, out),
+        Some(CampaignCommand::Map(map)) => return map_mission(map),
+        None => {}
     }
     let (order, expected) = order(arguments)?;
     if let Some(number) = arguments.only {
@@ -99,11 +109,13 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
     let store = Store::open(out, &order, &order.manifest(&program()?, arguments.shard))?;
-    let jobs = arguments.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let stopwatch = Stopwatch::start();
-    let flown = run::run(&order, &store, jobs, &|progress| stopwatch.show(progress))?;
+    let flown = on_threads(arguments.jobs, || {
+        Ok((run::run(&order, &store, &|progress| stopwatch.show(progress))?, rayon::current_num_threads()))
+    });
+    let (flown, jobs) = flown?;
     let cost = stopwatch.cost(&flown, jobs);
-    let summary = results::publish(&order, &store)?;
+    let summary = run::publish(&order, &store)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{}", to_text(&summary))?;
     if let Some(cost) = cost {
@@ -118,7 +130,7 @@ fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
     let (store, order) = merge(parts, out, |manifest, mission_toml, dispersion_toml| {
         order_of(manifest, mission_toml, dispersion_toml).map_err(|error| format!("{error:#}"))
     })?;
-    let summary = results::publish(&order, &store)?;
+    let summary = run::publish(&order, &store)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{}", to_text(&summary))?;
     writeln!(stdout, "results {}", out.display())?;
@@ -148,7 +160,7 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
     let mut mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {
-        mission.ignition.fixed_height_m = timing::fixed_height_m(arguments.controller, &mission)?;
+        mission.ignition.fixed_height_m = tally::fixed_height_m(arguments.controller, &mission)?;
     }
     let mut dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
     if arguments.wire_resolution {
@@ -175,26 +187,6 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
     Ok((Order { recipe, flights: arguments.flights }, expected))
 }
 
-/// The text of a built-in mission or of a file, with the flights' start if one is given.
-pub(super) fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<String> {
-    let text = text_of(profile, vehicles::mission::BUILTIN, "mission")?;
-    Ok(match start {
-        Some(start) => recipe::toml_starting_at(&text, profile, start)?,
-        None => text,
-    })
-}
-
-/// The text of a built-in set, or of a file.
-pub(super) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
-    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
-        return Ok((*text).to_owned());
-    }
-    fs::read_to_string(name).with_context(|| {
-        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
-    })
-}
-
 /// The build and a digest of the running program, so that results of different programs are not mixed.
 fn program() -> anyhow::Result<String> {
     let path = std::env::current_exe().context("which program this is")?;
@@ -209,4 +201,149 @@ fn program() -> anyhow::Result<String> {
     let build = build_info();
     let commit = build.get("git_commit").map_or("unknown", String::as_str);
     Ok(format!("{} {commit} {short}", env!("CARGO_PKG_VERSION")))
+}
+
+#[derive(Args)]
+struct MapOfMission {
+    /// Built-in mission or TOML file.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    profile: String,
+    #[command(flatten)]
+    map: MapArguments,
+    /// What the map asks.
+    #[arg(long, default_value = "flown", value_name = "QUESTION")]
+    ask: Ask,
+    /// Built-in set of dispersions or TOML file, of which the cells all have the same draw; the quantities on the axes
+    /// replace what is drawn for them.
+    #[arg(long, default_value = "none", value_name = "NAME|FILE")]
+    dispersion: String,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Ask {
+    /// Does the mission's own guidance land, inside the limits of the legs? One simulated flight for each cell.
+    Flown,
+    /// Could it be landed with perfect information? An upper bound in vertical motion alone, some forty times cheaper.
+    Attainable,
+}
+
+fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
+    let MapOfMission { profile, map, ask, dispersion: set_name, .. } = arguments;
+    anyhow::ensure!(
+        map.y.is_some() || !matches!(ask, Ask::Attainable),
+        "--ask attainable needs --y, as in ignition-height=40:90:26: its bound knows no wind"
+    );
+    let set = text_of(set_name, dispersion::BUILTIN, "set of dispersions")?;
+    // A set that cannot be read is refused by its own name.
+    Dispersion::from_toml(&set, set_name)?;
+    let recipe = Recipe::from_texts((profile, &mission_text(profile, None)?), (set_name, &set))?;
+    let recipe = Recipe { seed: arguments.seed, ..recipe };
+    let (question, asked, how) = match ask {
+        Ask::Flown => {
+            (Question::Flown, "does its own guidance land on its legs?", "one simulated flight for each cell")
+        }
+        Ask::Attainable => (
+            Question::Attainable,
+            "could it be landed with perfect information?",
+            "an upper bound: vertical motion, no wind, no attitude",
+        ),
+    };
+    let title = format!("{}: {asked}", recipe.mission.name);
+    let default = ["thrust-scale=0.8:1.2:21", "wind=0:10:11"];
+    map.run(default, [&title, how], |axes, progress| map::map(&recipe, question, axes, progress))
+}
+
+/// Time between two lines of progress: on a terminal, and in a file.
+const SHOW_EVERY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
+
+/// Measures a run and shows how far it is.
+struct Stopwatch {
+    started: Instant,
+    shown: Mutex<Option<Instant>>,
+    on_terminal: bool,
+}
+
+/// Cost of a run.
+struct Cost {
+    flights: u64,
+    wall_s: f64,
+    flights_per_s: f64,
+    times_real_time_per_job: f64,
+    jobs: usize,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self { started: now(), shown: Mutex::new(None), on_terminal: std::io::stderr().is_terminal() }
+    }
+
+    /// Prints the progress, unless it was printed just before.
+    fn show(&self, progress: &Progress) {
+        let mut shown = self.shown.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let now = now();
+        let due = shown.is_none_or(|last| now - last >= SHOW_EVERY[usize::from(!self.on_terminal)]);
+        if !due && progress.flown < progress.of {
+            return;
+        }
+        *shown = Some(now);
+        let rate = progress.flown as f64 / (now - self.started).as_secs_f64().max(1e-3);
+        let left_s = (progress.of - progress.flown) as f64 / rate;
+        let (before, after) = if self.on_terminal { ("\r\x1b[K", "") } else { ("", "\n") };
+        let after = if progress.flown == progress.of { "\n" } else { after };
+        // Messages go to standard error, which may be closed.
+        let _ = write!(
+            std::io::stderr(),
+            "{before}{} of {} flights, {rate:.1} a second, landed: legs {}, strict {}; {left_s:.0} s to go{after}",
+            progress.flown,
+            progress.of,
+            progress.legs,
+            progress.strict
+        );
+    }
+
+    /// `None` if nothing was flown.
+    fn cost(&self, flown: &Progress, jobs: usize) -> Option<Cost> {
+        let wall_s = (now() - self.started).as_secs_f64();
+        let flight_s = flown.flight_time_ms as f64 * 1e-3;
+        (flown.flown > 0).then(|| Cost {
+            flights: flown.flown,
+            wall_s,
+            flights_per_s: flown.flown as f64 / wall_s,
+            times_real_time_per_job: flight_s / wall_s / jobs.max(1) as f64,
+            jobs,
+        })
+    }
+}
+
+impl Cost {
+    fn to_json(&self) -> String {
+        format!(
+            "{:#}\n",
+            json!({
+                "flights": self.flights,
+                "jobs": self.jobs,
+                "wall_s": self.wall_s,
+                "flights_per_s": self.flights_per_s,
+                "times_real_time_per_job": self.times_real_time_per_job,
+            })
+        )
+    }
+}
+
+impl fmt::Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} flights in {:.1} s on {} jobs: {:.1} a second, each job {:.0} times real time",
+            self.flights, self.wall_s, self.jobs, self.flights_per_s, self.times_real_time_per_job
+        )
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "the duration of a campaign is only reported")]
+fn now() -> Instant {
+    Instant::now()
 }

@@ -15,8 +15,8 @@ use protocol::transport::LinkAddress;
 use simulated_vehicle::hil::computer::{ComputerEnd, Event};
 use simulated_vehicle::hil::link::{Brought, HilLink};
 
-use super::campaign::mission_text;
 use super::fly::interrupted;
+use super::mission_text;
 
 #[derive(Args)]
 pub(crate) struct ComputerArguments {

@@ -23,7 +23,7 @@ use simulated_vehicle::fly::{
 use simulated_vehicle::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::campaign::text_of;
+use super::text_of;
 
 /// The strongest mean wind that can be requested, m/s.
 pub(super) const WIND_MAX_M_S: f64 = 30.0;

@@ -1,21 +1,19 @@
 //! `onboard-sim hazard`: how near people may stand.
 
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use campaign::figure::{Places, places_svg};
 use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, widest};
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
-use onboard_sim::figure::{Places, places_svg};
+
 use sim::dispersion::{self, Dispersion, may_be_kinder};
 use sim::recipe::Recipe;
 
-use super::campaign::{mission_text, text_of};
-use super::choices::show;
 use super::fly::{WIND_MAX_M_S, with_wind};
-use super::output::{refuse_loss, write_file};
+use super::{mission_text, on_threads, refuse_loss, show, text_of, write_file};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -70,20 +68,19 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
-    let jobs = arguments.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let flights = Flights { survey: arguments.survey, of_widest: arguments.flights };
     let winds = recipes.len() as u64;
     let mut impacts = Vec::with_capacity(recipes.len());
     for (before, recipe) in (0..winds).zip(&recipes) {
         let told = |done, of| show((before * of + done) as usize, (winds * of) as usize, "flights");
-        impacts.push(hazard::study(recipe, flights, jobs, &told)?);
+        impacts.push(on_threads(arguments.jobs, || Ok(hazard::study(recipe, flights, &told)?))?);
     }
     let rule = Rule::of(mission);
     let study =
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
-    std::io::stdout().lock().write_all(study.text(&rule, mission.gate.fence_radius_m).as_bytes())?;
+    study.write_text(&rule, mission.gate.fence_radius_m, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
-        write_file(path, arguments.force, |out| out.write_all(study.csv().as_bytes()))?;
+        write_file(path, arguments.force, |out| study.write_csv(out))?;
     }
     if let Some(path) = &arguments.svg {
         let svg = study.svg(&rule)?;
@@ -124,14 +121,7 @@ impl Study<'_> {
         self.impacts.iter().map(|impacts| Radius::of_way(impacts, way)).collect()
     }
 
-    fn text(&self, rule: &Rule, fence_m: f64) -> String {
-        let mut out = String::new();
-        // Writing to a String cannot fail.
-        let _ = self.write_text(rule, fence_m, &mut out);
-        out
-    }
-
-    fn write_text(&self, rule: &Rule, fence_m: f64, out: &mut String) -> std::fmt::Result {
+    fn write_text(&self, rule: &Rule, fence_m: f64, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let HazardArguments { dispersion, seed, winds, .. } = self.arguments;
         let start = match self.start {
             StartPoint::Apogee => "apogee; how it got there is not in it",
@@ -187,19 +177,17 @@ impl Study<'_> {
         Ok(())
     }
 
-    fn csv(&self) -> String {
-        let mut out = "wind_m_s,way,flight,x_m,y_m,landed\n".to_owned();
+    fn write_csv(&self, out: &mut impl std::io::Write) -> std::io::Result<()> {
+        let mut table = csv::Writer::from_writer(out);
+        table.write_record(["wind_m_s", "way", "flight", "x_m", "y_m", "landed"])?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
-            for impact in impacts {
-                let place =
-                    impact.place_m.map_or([String::new(), String::new()], |m| m.map(|m| format!("{m:.2}")));
-                let [x_m, y_m] = place;
-                let (way, number, landed) = (impact.way.name(), impact.number, impact.landed);
-                // Writing to a String cannot fail.
-                let _ = writeln!(out, "{wind_m_s},\"{way}\",{number},{x_m},{y_m},{landed}");
+            for Impact { way, number, place_m, landed } in impacts {
+                let [x, y] = place_m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
+                let (wind, number, landed) = (wind_m_s.to_string(), number.to_string(), landed.to_string());
+                table.write_record([&wind, way.name(), &number, &x, &y, &landed])?;
             }
         }
-        out
+        table.flush()
     }
 
     fn svg(&self, rule: &Rule) -> anyhow::Result<String> {

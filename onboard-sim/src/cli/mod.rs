@@ -1,16 +1,202 @@
-//! The subcommands of the program, one file each.
+//! The subcommands of the program, and what they have in common: the texts that they read, the threads that they use, and
+//! the files that they write: each is complete or absent, and replaces an existing one only on request.
 
 pub(crate) mod campaign;
-pub(crate) mod card;
-mod choices;
 pub(crate) mod computer;
-mod cost;
 pub(crate) mod fly;
 pub(crate) mod hazard;
-pub(crate) mod landability;
-pub(crate) mod manual;
 pub(crate) mod motors;
-pub(crate) mod output;
 pub(crate) mod paper;
 mod single;
 pub(crate) mod world;
+
+use std::fs::File;
+use std::io::{BufWriter, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use ::campaign::map::{self, Axis, Map, MapError};
+use ::campaign::run::threads;
+use anyhow::Context as _;
+use clap::Args;
+use flight::vehicle::profile::StartPoint;
+use sim::recipe;
+use tempfile::NamedTempFile;
+
+/// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
+fn on_threads<T: Send>(
+    jobs: Option<usize>,
+    work: impl FnOnce() -> anyhow::Result<T> + Send,
+) -> anyhow::Result<T> {
+    threads(jobs).context("a thread could not be started")?.install(work)
+}
+
+/// The text of a built-in mission or of a file, with the flights' start if one is given.
+fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<String> {
+    let text = text_of(profile, vehicles::mission::BUILTIN, "mission")?;
+    Ok(match start {
+        Some(start) => recipe::toml_starting_at(&text, profile, start)?,
+        None => text,
+    })
+}
+
+/// The text of a built-in set, or of a file.
+fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
+    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
+        return Ok((*text).to_owned());
+    }
+    std::fs::read_to_string(name).with_context(|| {
+        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
+    })
+}
+
+/// Shows on standard error how much of something is done: every per cent on a terminal, every tenth in a file.
+fn show(done: usize, of: usize, what: &str) {
+    let on_terminal = std::io::stderr().is_terminal();
+    let step = (of / if on_terminal { 100 } else { 10 }).max(1);
+    if !done.is_multiple_of(step) && done != of {
+        return;
+    }
+    let (before, after) = if on_terminal { ("\r\x1b[K", "") } else { ("", "\n") };
+    let after = if done == of { "\n" } else { after };
+    // Messages go to standard error, which may be closed.
+    let _ = write!(std::io::stderr(), "{before}{done} of {of} {what}{after}");
+}
+
+/// An existing file is replaced only on request; a pipe or a device has no content that could be lost.
+fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
+    let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
+    anyhow::ensure!(
+        force || is_device(path) || !there,
+        "{} exists already; --force replaces it",
+        path.display()
+    );
+    Ok(())
+}
+
+fn is_device(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// Writes under a hidden temporary name first, so that a file with the final name is always complete.
+fn write_file(
+    path: &Path,
+    force: bool,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> anyhow::Result<()> {
+    refuse_loss(path, force)?;
+    let cannot = || format!("cannot write {}", path.display());
+    if is_device(path) {
+        let mut out = BufWriter::new(File::options().write(true).open(path).with_context(cannot)?);
+        return write(&mut out).and_then(|()| out.flush()).with_context(cannot);
+    }
+    let unfinished = unfinished_beside(path).with_context(cannot)?;
+    fill(&unfinished, write).with_context(cannot)?;
+    keep(unfinished, path, force)
+}
+
+/// Writes texts as the files of a folder, which is made if it is not there: all of them or none.
+fn write_folder(folder: &Path, files: &[(&str, String)], force: bool) -> anyhow::Result<()> {
+    for (name, _) in files {
+        refuse_loss(&folder.join(name), force)?;
+    }
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let mut complete = Vec::with_capacity(files.len());
+    for (name, text) in files {
+        let path = folder.join(name);
+        let cannot = || format!("cannot write {}", path.display());
+        let unfinished = unfinished_beside(&path).with_context(cannot)?;
+        fill(&unfinished, |out| out.write_all(text.as_bytes())).with_context(cannot)?;
+        complete.push((unfinished, path));
+    }
+    complete.into_iter().try_for_each(|(unfinished, path)| keep(unfinished, &path, force))
+}
+
+fn fill(
+    unfinished: &NamedTempFile,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut out = BufWriter::new(unfinished.reopen()?);
+    write(&mut out)?;
+    out.flush()?;
+    out.get_ref().sync_all()
+}
+
+fn keep(unfinished: NamedTempFile, path: &Path, force: bool) -> anyhow::Result<()> {
+    let kept = if force { unfinished.persist(path) } else { unfinished.persist_noclobber(path) };
+    kept.map(drop).map_err(|error| error.error).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// A file that disappears unless it is kept.
+fn unfinished_beside(path: &Path) -> std::io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut unfinished = tempfile::Builder::new();
+    unfinished.prefix(".unfinished-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        // The user's umask applies as to any new file; a temporary file would be readable by its owner only.
+        unfinished.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    unfinished.tempfile_in(folder)
+}
+
+/// What is mapped over, and where it is written.
+#[derive(Args)]
+struct MapArguments {
+    /// Columns: QUANTITY=FROM:TO:COUNT [default: thrust-scale=0.8:1.2:21; of the paper's vehicle
+    /// thrust-to-weight=0.9:1.5:41].
+    ///
+    /// Quantities of a mission: ignition-height (m, of the feet where the thrust begins; without it the guidance chooses),
+    /// thrust-scale, wind (m/s), tilt (deg, at the start), height (m, of the start). Of the paper's vehicle:
+    /// thrust-to-weight, height (m), speed (m/s), tilt (deg), rate (deg/s), lateral-speed (m/s), thrust-scale.
+    #[arg(long, value_name = "AXIS")]
+    x: Option<Axis>,
+    /// Rows, in the same form [default: wind=0:10:11; of the paper's vehicle height=5:35:31].
+    #[arg(long, value_name = "AXIS")]
+    y: Option<Axis>,
+    /// Write the cells as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the map as a picture.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+    /// Cells computed at the same time; the map does not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+impl MapArguments {
+    /// Computes a map of cells and writes it; the title says whose it is and what it answers, `how` by what.
+    fn run(
+        &self,
+        default: [&str; 2],
+        [title, how]: [&str; 2],
+        compute: impl FnOnce([Axis; 2], &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> + Send,
+    ) -> anyhow::Result<ExitCode> {
+        let Self { force, jobs, .. } = *self;
+        for path in [&self.csv, &self.svg].into_iter().flatten() {
+            refuse_loss(path, force)?;
+        }
+        let axis = |given: Option<Axis>, default: &str| given.map_or_else(|| default.parse(), Ok);
+        let axes = [axis(self.x, default[0])?, axis(self.y, default[1])?];
+        let cells = axes[0].count * axes[1].count;
+        let map = on_threads(jobs, || Ok(compute(axes, &|done| show(done, cells, "cells"))?))?;
+        let mut stdout = std::io::stdout().lock();
+        writeln!(stdout, "{title} ({how})").context("standard output")?;
+        map.write_table(&mut stdout)?;
+        if let Some(path) = &self.csv {
+            write_file(path, force, |out| map.write_csv(out))?;
+        }
+        if let Some(path) = &self.svg {
+            let svg = map::svg(&map, title)?;
+            write_file(path, force, |out| out.write_all(svg.as_bytes()))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

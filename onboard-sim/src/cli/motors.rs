@@ -1,21 +1,31 @@
-//! `onboard-sim motors`: which motor an airframe lands on best.
+//! `onboard-sim motors` and `card`: which motor an airframe lands on best, and the page that a team takes to the field; with
+//! the choices of a team that both have.
 
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::str::FromStr;
 
+use anyhow::Context as _;
+use campaign::motors::card::{Card, Day, Order};
+use campaign::motors::choice::StartHeight;
+use campaign::motors::frame::start_height_m;
+use campaign::motors::ranking::{Progress, Ranked, Request, Weather, rank};
+use campaign::motors::source::{self, Candidate, Found};
+use campaign::motors::table;
 use clap::Args;
-use motor_choice::ranking::{Progress, Ranked, Request, rank};
-use motor_choice::{picture, table};
+use flight::vehicle::mission::Mission;
+use flight::vehicle::profile::StartPoint;
+use sim::dispersion::{self, Dispersion};
 
-use super::choices::{Choices, show};
-use super::output::{refuse_loss, write_file};
+use super::fly::{WIND_MAX_M_S, with_wind};
+use super::{on_threads, refuse_loss, show, text_of, write_file, write_folder};
 
 /// Most flights of a motor.
 const FLIGHTS_MAX: u64 = 100_000;
 
 /// For the help.
-pub(crate) const EXAMPLE: &str = "Example: onboard-sim motors --mission mini-f10 --from \
+pub(crate) const MOTORS_EXAMPLE: &str = "Example: onboard-sim motors --mission mini-f10 --from \
     thrustcurve-db.json --csv motors.csv";
 
 #[derive(Args)]
@@ -42,7 +52,7 @@ pub(crate) struct MotorsArguments {
     force: bool,
 }
 
-pub(crate) fn run(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     let choices = &arguments.choices;
     anyhow::ensure!(
         arguments.flights <= FLIGHTS_MAX,
@@ -65,22 +75,341 @@ pub(crate) fn run(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
         best: arguments.best,
         flights: arguments.flights,
         weather: &weather,
-        jobs: choices.jobs(),
     };
-    let ranking = rank(&request, choices.motors()?, &|progress| match progress {
+    let found = choices.motors()?;
+    let told = |progress| match progress {
         Progress::Motors(done, of) => show(done, of, "motors"),
         Progress::Flights(done, of) => show(done, of, "flights"),
-    })?;
+    };
+    let ranking = on_threads(choices.jobs, || Ok(rank(&request, found, &told)?))?;
     std::io::stdout().lock().write_all(table::text(&ranking, arguments.all).as_bytes())?;
     if let Some(path) = &arguments.csv {
         write_file(path, arguments.force, |out| table::write_csv(&ranking, out))?;
     }
     if let Some(path) = &arguments.picture {
-        write_file(path, arguments.force, |out| {
-            out.write_all(picture::svg(&ranking, &mission.name).as_bytes())
-        })?;
+        let svg = table::svg(&ranking, &mission.name)?;
+        write_file(path, arguments.force, |out| out.write_all(svg.as_bytes()))?;
     }
     let lands = ranking.iter().any(|ranked| matches!(ranked, Ranked::Lands(_)));
     anyhow::ensure!(lands, "{} lands on none of these motors", mission.name);
     Ok(ExitCode::SUCCESS)
+}
+
+/// More wind than that of the day, m/s.
+const WINDIER_M_S: f64 = 3.0;
+/// Steady winds in which the certified vehicle is flown, m/s.
+const STEADY_M_S: [f64; 6] = [0.0, 3.0, 6.0, 9.0, 12.0, 15.0];
+/// The files of a card.
+const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "day.toml"];
+/// Most flights of a card.
+const CARD_FLIGHTS_MAX: u64 = 10_000;
+
+/// For the help.
+pub(crate) const CARD_EXAMPLE: &str =
+    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --wind 3 --out card";
+
+#[derive(Args)]
+pub(crate) struct CardArguments {
+    #[command(flatten)]
+    choices: Choices,
+    /// The landing motor: an .eng or .rse file, or the name of one of the motors of --from (built in if not given). By default
+    /// the mission's own.
+    #[arg(long, value_name = "FILE|NAME")]
+    motor: Option<String>,
+    /// Mass with the motor full, kg. By default the best one within --ballast.
+    #[arg(long, value_name = "KG")]
+    mass: Option<f64>,
+    /// Mean wind of the day 10 m above the ground, m/s.
+    #[arg(long, default_value_t = 3.0, value_name = "M/S")]
+    wind: f64,
+    /// Flights in this wind. By default as many as a few seconds allow, 12 to 60.
+    #[arg(long, value_name = "N")]
+    flights: Option<u64>,
+    /// Flights of the way of ending that comes down farthest from the pad. Below 368 its interval has no upper end.
+    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    hazard_flights: u64,
+    /// Folder of the card.
+    #[arg(long, default_value = "card", value_name = "DIR")]
+    out: PathBuf,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
+    let choices = &arguments.choices;
+    let wind_m_s = arguments.wind;
+    let most_m_s = WIND_MAX_M_S - WINDIER_M_S;
+    anyhow::ensure!((0.0..=most_m_s).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {most_m_s} m/s");
+    if let Some(mass_kg) = arguments.mass {
+        anyhow::ensure!(
+            mass_kg.is_finite() && mass_kg > 0.0,
+            "--mass {mass_kg}: a mass in kg above 0 is accepted"
+        );
+    }
+    if let Some(flights) = arguments.flights {
+        anyhow::ensure!(
+            (1..=CARD_FLIGHTS_MAX).contains(&flights),
+            "--flights {flights}: must be 1 to {CARD_FLIGHTS_MAX}"
+        );
+    }
+    for name in FILES {
+        refuse_loss(&arguments.out.join(name), arguments.force)?;
+    }
+    let loaded = choices.load()?;
+    let mission = &loaded.mission;
+    let found = choices.motors()?;
+    let motor = if let Some(name) = &arguments.motor {
+        named(name, &found)?
+    } else {
+        let motor = mission.airframe.motor.clone();
+        let curve = mission.motor_curve.clone();
+        Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
+    };
+    let set = choices.weather()?;
+    let (today, windier) = (day(&set, wind_m_s)?, day(&set, wind_m_s + WINDIER_M_S)?);
+    let steady = STEADY_M_S.into_iter().map(|wind_m_s| Ok((wind_m_s, steady(wind_m_s)?)));
+    let order = Order {
+        mission,
+        mission_toml: &loaded.toml,
+        motor: &motor,
+        others: &found,
+        mass_kg: arguments.mass,
+        ballast_kg: choices.ballast_kg(mission),
+        ballast_station_m: choices.ballast_station_m(mission)?,
+        start: choices.start(mission)?,
+        tube_m: choices.tube_m(mission)?,
+        set: &set.dispersion_name,
+        today: &today,
+        windier: &windier,
+        steady: &steady.collect::<anyhow::Result<Vec<_>>>()?,
+        flights: arguments.flights,
+        hazard_flights: arguments.hazard_flights,
+    };
+    let told = |done, of| show(done, of, "flights");
+    let card = on_threads(choices.jobs, || Ok(Card::new(&order, &told)?))?;
+    let [html, text, mission_file, day_file] = FILES;
+    let page = card.text();
+    let files = [
+        (html, card.html()),
+        (text, page.clone()),
+        (mission_file, card.mission_toml),
+        (day_file, today.weather.dispersion_toml),
+    ];
+    write_folder(&arguments.out, &files, arguments.force)?;
+    let mut stdout = std::io::stdout().lock();
+    write!(stdout, "{page}")?;
+    writeln!(stdout, "card {}", arguments.out.join(html).display())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The motor of a file, or of this name among others.
+fn named(name: &str, found: &[Found]) -> anyhow::Result<Candidate> {
+    let path = Path::new(name);
+    let is_file = ["eng", "rse", "json"]
+        .iter()
+        .any(|ending| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending)));
+    let of_file = if is_file || path.exists() { source::read(path)? } else { Vec::new() };
+    if is_file || path.exists() {
+        anyhow::ensure!(
+            of_file.len() == 1,
+            "--motor {name}: it holds {} motors, and one is accepted; or --from {name} --motor with one of their names",
+            of_file.len()
+        );
+        let only = of_file.into_iter().next().context("no motor")?;
+        return only.map_err(|unusable| anyhow::anyhow!("--motor {}: {}", unusable.origin, unusable.reason));
+    }
+    let is_it =
+        |known: &str, alone: &str| known.eq_ignore_ascii_case(name) || alone.eq_ignore_ascii_case(name);
+    let matching: Vec<&Candidate> = found
+        .iter()
+        .filter_map(|found| found.as_ref().ok())
+        .filter(|motor| is_it(&motor.name(), motor.curve.name()) || motor.motor == name)
+        .collect();
+    match matching.as_slice() {
+        [motor] => Ok((*motor).clone()),
+        [] => {
+            let broken = found.iter().filter_map(|found| found.as_ref().err()).find(|broken| {
+                broken.name.eq_ignore_ascii_case(name)
+                    || broken.name.rsplit(' ').next().is_some_and(|own| own.eq_ignore_ascii_case(name))
+            });
+            if let Some(broken) = broken {
+                anyhow::bail!("--motor {name}: {}: {}", broken.origin, broken.reason);
+            }
+            let known: Vec<String> =
+                found.iter().filter_map(|found| Some(found.as_ref().ok()?.name())).take(12).collect();
+            anyhow::bail!(
+                "--motor {name}: neither a motor file nor one of the {} motors ({}{})",
+                found.len(),
+                known.join(", "),
+                if found.len() > known.len() { ", ..." } else { "" }
+            )
+        }
+        several => {
+            let names: Vec<String> =
+                several.iter().map(|motor| format!("{} ({})", motor.name(), motor.origin)).collect();
+            anyhow::bail!("--motor {name}: {} motors have this name: {}", several.len(), names.join(", "))
+        }
+    }
+}
+
+/// A set of dispersions in a mean wind.
+fn day(set: &Weather, wind_m_s: f64) -> anyhow::Result<Day> {
+    let name = format!("{} with {wind_m_s} m/s of wind", set.dispersion_name);
+    let toml = with_wind(&set.dispersion_toml, wind_m_s);
+    let dispersion = Dispersion::from_toml(&toml, &name)?;
+    Ok(Day {
+        wind_m_s,
+        weather: Weather { dispersion, dispersion_name: name, dispersion_toml: toml, seed: set.seed },
+    })
+}
+
+/// The certified vehicle in a steady wind.
+fn steady(wind_m_s: f64) -> anyhow::Result<Weather> {
+    let name = "none";
+    let toml = with_wind(Dispersion::builtin_toml(name)?, wind_m_s);
+    Ok(Weather {
+        dispersion: Dispersion::from_toml(&toml, name)?,
+        dispersion_name: name.to_owned(),
+        dispersion_toml: toml,
+        seed: 1,
+    })
+}
+
+/// The vehicle and its world.
+#[derive(Args)]
+struct Choices {
+    /// Built-in mission or TOML file: airframe, guidance and limits. Its motor is replaced.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    mission: String,
+    /// Motors: an .eng or .rse file, a folder of them, or the .json of the npm package thrustcurve-db; may be repeated. The
+    /// built-in motors if not given.
+    #[arg(long, value_name = "DIR|FILE")]
+    from: Vec<PathBuf>,
+    /// Ballast that can be added, kg; below zero it is taken out. By default up to 30 % of the mission's mass.
+    #[arg(long, value_name = "FROM:TO", allow_hyphen_values = true)]
+    ballast: Option<Range>,
+    /// Where the ballast is, m above the nozzle. By default at the centre of gravity of the airframe without its motor.
+    #[arg(long, value_name = "M")]
+    ballast_station: Option<f64>,
+    /// Widest motor that fits, mm. By default the diameter of the mission's own motor.
+    #[arg(long, value_name = "MM")]
+    tube: Option<f64>,
+    /// Height of the centre of gravity at which the flight begins, m. By default the best apogee up to --highest, or the
+    /// drop of the mission.
+    #[arg(long, value_name = "M")]
+    height: Option<f64>,
+    /// Highest start, m: the best one up to this. By default the apogee of the mission.
+    #[arg(long, value_name = "M", conflicts_with = "height")]
+    highest: Option<f64>,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
+    dispersion: String,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Motors or flights computed at the same time; the results do not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+/// Two numbers in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Range([f64; 2]);
+
+impl FromStr for Range {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let ends = text.split_once(':').and_then(|(from, to)| Some((from.parse().ok()?, to.parse().ok()?)));
+        ends.filter(|(from, to): &(f64, f64)| from.is_finite() && to.is_finite() && from <= to)
+            .map(|(from, to)| Self([from, to]))
+            .ok_or_else(|| format!("`{text}` is not FROM:TO, two numbers in order, as in 0:0.5"))
+    }
+}
+
+/// A mission with its text.
+struct Loaded {
+    mission: Mission,
+    toml: String,
+}
+
+impl Choices {
+    fn load(&self) -> anyhow::Result<Loaded> {
+        let toml = text_of(&self.mission, vehicles::mission::BUILTIN, "mission")?;
+        let mission = vehicles::mission::from_toml(&toml, &self.mission)?;
+        Ok(Loaded { mission, toml })
+    }
+
+    /// The motors to choose from.
+    fn motors(&self) -> anyhow::Result<Vec<Found>> {
+        if self.from.is_empty() {
+            return Ok(source::built_in());
+        }
+        let mut found = Vec::new();
+        for path in &self.from {
+            found.extend(source::read(path)?);
+        }
+        Ok(found)
+    }
+
+    fn weather(&self) -> anyhow::Result<Weather> {
+        let toml = text_of(&self.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+        Ok(Weather {
+            dispersion: Dispersion::from_toml(&toml, &self.dispersion)?,
+            dispersion_name: self.dispersion.clone(),
+            dispersion_toml: toml,
+            seed: self.seed,
+        })
+    }
+
+    fn ballast_kg(&self, mission: &Mission) -> [f64; 2] {
+        /// Of the loaded mass.
+        const MOST_SHARE: f64 = 0.3;
+        self.ballast.map_or([0.0, MOST_SHARE * mission.airframe.mass.loaded_kg], |Range(kg)| kg)
+    }
+
+    fn ballast_station_m(&self, mission: &Mission) -> anyhow::Result<Option<f64>> {
+        let length_m = mission.airframe.body.length_m;
+        if let Some(station_m) = self.ballast_station {
+            anyhow::ensure!(
+                (0.0..=length_m).contains(&station_m),
+                "--ballast-station {station_m}: must be 0 (the nozzle) to {length_m} m (the nose)"
+            );
+        }
+        Ok(self.ballast_station)
+    }
+
+    fn tube_m(&self, mission: &Mission) -> anyhow::Result<Option<f64>> {
+        let body_mm = 1e3 * mission.airframe.body.diameter_m;
+        if let Some(tube_mm) = self.tube {
+            anyhow::ensure!(
+                tube_mm > 0.0 && tube_mm <= body_mm,
+                "--tube {tube_mm}: must be above 0 and up to {body_mm:.0} mm, the diameter of the body"
+            );
+        }
+        Ok(self.tube.map(|tube_mm| 1e-3 * tube_mm))
+    }
+
+    fn start(&self, mission: &Mission) -> anyhow::Result<StartHeight> {
+        /// The highest start that is accepted, m.
+        const MOST_M: f64 = 3_000.0;
+        for (option, height_m) in [("--height", self.height), ("--highest", self.highest)] {
+            if let Some(height_m) = height_m {
+                anyhow::ensure!(
+                    height_m > 0.0 && height_m <= MOST_M,
+                    "{option} {height_m}: must be above 0 and up to {MOST_M} m"
+                );
+            }
+        }
+        let own_m = start_height_m(mission);
+        // A drone can hang anywhere, so a drop begins where the mission says.
+        let own =
+            if mission.start.at == StartPoint::Drone { StartHeight::Exactly } else { StartHeight::AtMost };
+        Ok(match (self.height, self.highest) {
+            (Some(height_m), _) => StartHeight::Exactly(height_m),
+            (None, Some(highest_m)) => StartHeight::AtMost(highest_m),
+            (None, None) => own(own_m),
+        })
+    }
 }

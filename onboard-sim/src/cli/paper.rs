@@ -4,29 +4,25 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use onboard_sim::paper;
+use onboard_sim::paper::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
 use onboard_sim::paper::figures::{figures, stability_figures};
-use onboard_sim::paper::passive::{CG_STATION_M, HEAVY_TAIL_STATION_M};
-use onboard_sim::paper::stability::Stability;
 
-use super::landability::{MapArguments, jobs};
-use super::output::write_folder;
+use super::{MapArguments, write_folder};
 
 #[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct PaperArguments {
+    #[command(subcommand)]
+    command: Option<PaperCommand>,
     /// As JSON.
-    #[arg(long, conflicts_with_all = ["stability", "landability"])]
+    #[arg(long, conflicts_with = "stability")]
     json: bool,
     /// Instead of the tables, map from which tilts the paper's vehicle settles in a passive fall, over the opening of its
     /// fins, with the static margin that explains it.
     #[arg(long)]
     stability: bool,
-    /// Instead of the tables, map where a plan exists that ends inside Table 2, over two quantities.
-    #[arg(long, conflicts_with_all = ["stability", "figures"])]
-    landability: bool,
-    #[command(flatten)]
-    map: MapArguments,
     /// Write the figures of what is printed as SVG into this folder: Figures 5 to 9, or the map.
     #[arg(long, value_name = "DIR")]
     figures: Option<PathBuf>,
@@ -35,22 +31,23 @@ pub(crate) struct PaperArguments {
     force: bool,
 }
 
+#[derive(Subcommand)]
+enum PaperCommand {
+    /// Map where a plan exists that ends inside the paper's Table 2, over two quantities: one solve for each cell.
+    #[command(after_help = "Example: onboard-sim paper map --x tilt=-30:30:61 --svg tilt.svg")]
+    Map(MapArguments),
+}
+
 pub(crate) fn run(arguments: &PaperArguments) -> anyhow::Result<ExitCode> {
-    if arguments.landability {
+    if let Some(PaperCommand::Map(map)) = &arguments.command {
         let title = "the landing paper's vehicle with 33.3 N: does a plan end inside the touchdown limits?";
         let default = ["thrust-to-weight=0.9:1.5:41", "height=5:35:31"];
-        return arguments.map.run(
-            default,
-            arguments.force,
-            [title, "one solve for each cell"],
-            |axes, progress| paper::map(axes, jobs(None), progress),
-        );
+        return map.run(default, [title, "one solve for each cell"], paper::map);
     }
     let mut out = std::io::stdout().lock();
     if arguments.stability {
-        let jobs = jobs(None);
-        let stability = Stability::new(CG_STATION_M, jobs)?;
-        let heavy_tail = Stability::new(HEAVY_TAIL_STATION_M, jobs)?;
+        let stability = Stability::new(CG_STATION_M)?;
+        let heavy_tail = Stability::new(HEAVY_TAIL_STATION_M)?;
         paper::write_stability(&mut out, &stability, &heavy_tail)?;
         return written(arguments, || stability_figures(&stability));
     }

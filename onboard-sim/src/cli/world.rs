@@ -17,8 +17,8 @@ use simulated_vehicle::hil::link::HilLink;
 use simulated_vehicle::hil::report::FlightReport;
 use simulated_vehicle::hil::world::{HilError, Manner, fly};
 
-use super::campaign::{mission_text, text_of};
 use super::fly::{WIND_MAX_M_S, with_wind};
+use super::{mission_text, text_of};
 
 /// A simulator's address (MAV_COMP_ID_ALL is not one): any but the vehicle's.
 const WORLD: Address = Address { system_id: 254, component_id: 1 };

@@ -3,13 +3,11 @@
 //! Every cell is one cold solve of its problem with a settled end, from both bent initial guesses. A cell lands if the plan
 //! converges and ends inside Table 2.
 
-use core::convert::Infallible;
-
+use campaign::map::{Axis, Cell, Finding, Map, MapError, Quantity, map_of};
 use nmpc::paper::{HORIZON, THRUST_N, model, settled, start};
 use nmpc::{Problem, SolveStatus};
 
 use super::cases::broken;
-use crate::landability::{Axis, Cell, Finding, Map, MapError, Quantity, check, map_of};
 
 /// What it can be mapped over.
 const POSSIBLE: &[Quantity] = &[
@@ -22,13 +20,12 @@ const POSSIBLE: &[Quantity] = &[
     Quantity::ThrustScale,
 ];
 
-/// Computes the map over `x` and `y` on `jobs` threads; `progress` is called with the cells done, from any of them.
+/// Computes the map over `x` and `y`; `progress` is called with the cells done, from any thread.
 ///
 /// # Errors
-/// The axes do not suit the paper's vehicle, or a thread could not be started.
-pub fn map(axes: [Axis; 2], jobs: usize, progress: &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> {
-    check("the paper's vehicle", axes, POSSIBLE)?;
-    map_of(axes, jobs, progress, |x, y| Ok::<_, Infallible>(cell(axes, [x, y])))
+/// The axes do not suit the paper's vehicle.
+pub fn map(axes: [Axis; 2], progress: &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> {
+    map_of(("the paper's vehicle", POSSIBLE), axes, progress, |x, y| Ok(cell(axes, [x, y])))
 }
 
 fn cell(axes: [Axis; 2], values: [f64; 2]) -> Cell {
@@ -70,12 +67,13 @@ fn cell(axes: [Axis; 2], values: [f64; 2]) -> Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::landability::svg;
+    use campaign::map::svg;
+    use campaign::run::threads;
 
     fn small_map(jobs: usize) -> Map {
         let x = Axis { quantity: Quantity::ThrustToWeight, from: 0.95, to: 1.2, count: 6 };
         let y = Axis { quantity: Quantity::Height, from: 11.0, to: 19.0, count: 5 };
-        map([x, y], jobs, &|_| ()).unwrap()
+        threads(Some(jobs)).unwrap().install(|| map([x, y], &|_| ())).unwrap()
     }
 
     #[test]
@@ -90,7 +88,7 @@ mod tests {
         let at = |thrust_n: f64| {
             let x = Axis { quantity: Quantity::ThrustToWeight, from: thrust_n / weight_n, to: 2.0, count: 1 };
             let y = Axis { quantity: Quantity::Height, from: 15.0, to: 15.0, count: 1 };
-            map([x, y], 1, &|_| ()).unwrap().cells[0]
+            map([x, y], &|_| ()).unwrap().cells[0]
         };
         assert_eq!(at(33.3).finding, Finding::Lands);
         assert_eq!(at(30.0).finding, Finding::NotLandable);

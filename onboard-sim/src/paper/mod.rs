@@ -9,16 +9,14 @@
 //! * [`Objective`]: Table 3's J under every definition that the paper leaves open.
 //! * [`map`]: where a landing exists.
 //! * [`figures`]: Figures 5 to 9 from these runs.
-//! * [`passive`]: the fall of its Fig. 5, in space; [`stability`]: from which tilts that vehicle settles.
+//! * [`fall`]: the fall of its Fig. 5, in space, and from which tilts that vehicle settles.
 
 mod cases;
+pub mod fall;
 pub mod figures;
 mod flown;
 mod map;
 mod objective;
-pub mod passive;
-mod printed;
-pub mod stability;
 mod text;
 
 use nmpc::SolveStatus;
@@ -27,11 +25,11 @@ use vehicles::airframe::AirframeError;
 use vehicles::motors::MotorError;
 use world::world::WorldError;
 
-use crate::figure::FigureError;
+use campaign::figure::FigureError;
 pub use cases::{Case, PaperRow, Table};
+pub use flown::{AsPrinted, as_printed};
 pub use map::map;
 pub use objective::{Definition, Objective};
-pub use printed::{AsPrinted, as_printed};
 pub use text::{to_json, write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.
@@ -110,9 +108,6 @@ pub enum PaperError {
     /// The vehicle's data are refused: a defect of the build.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// A thread could not be started.
-    #[error("a thread could not be started")]
-    Thread(#[from] std::io::Error),
     #[error(transparent)]
     Figure(#[from] FigureError),
 }

@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use nmpc::dynamics::PlanarState;
 use serde_json::{Value, json};
 
+use super::fall::HEIGHT_M;
+use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
 use super::objective::chord;
-use super::passive::HEIGHT_M;
-use super::stability::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
 use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
 
 /// Writes Tables 3 to 6 and the results of the printed equations.

@@ -1,0 +1,532 @@
+//! Figures as SVG, drawn with `plotters`: the best kept plotting crate that writes SVG without fonts, images or a browser
+//! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
+
+use plotters::backend::SVGBackend;
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::Shift;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::types::RangedCoordf64;
+use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
+use plotters::element::{Circle, Cross, PathElement, Rectangle, Text};
+use plotters::series::{DashedLineSeries, LineSeries};
+use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, WHITE};
+
+/// A figure cannot be drawn: its axes are not finite, or too small for their labels.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("cannot draw the figure '{title}': {reason}")]
+pub struct FigureError {
+    title: String,
+    reason: String,
+}
+
+/// Okabe and Ito's colours that differ for every kind of colour vision, and in grey.
+const COLOURS: [RGBColor; 5] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(0, 0, 0),
+];
+
+/// Font and size, px, of titles and of everything else.
+const TITLE_FONT: (&str, i32) = ("sans-serif", 18);
+const FONT: (&str, i32) = ("sans-serif", 13);
+
+/// Height of the title, px.
+const TITLE_PX: u32 = 34;
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Drawn<T = ()> = Result<T, Box<dyn std::error::Error>>;
+
+/// The SVG of what a function draws on a white ground of this size, px, below a title.
+fn drawn(
+    title: &str,
+    size_px: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Drawn,
+) -> Result<String, FigureError> {
+    let mut svg = String::new();
+    let (width_px, height_px) = size_px;
+    let all = || -> Drawn {
+        let root = SVGBackend::with_string(&mut svg, (width_px, TITLE_PX + height_px)).into_drawing_area();
+        root.fill(&WHITE)?;
+        draw(&root.titled(title, TITLE_FONT)?)?;
+        root.present()?;
+        Ok(())
+    };
+    all().map_err(|error| FigureError { title: title.to_owned(), reason: error.to_string() })?;
+    Ok(svg)
+}
+
+/// Room for margins, ticks and names: beside and below the axes, px.
+const ROOM_PX: (u32, u32) = (24 + 62, 24 + 42);
+
+/// Axes over two ranges, with ticks and names; without a name an axis has no ticks.
+fn axes<'a, 'b>(
+    area: &'a Area<'b>,
+    [x, y]: [(f64, f64); 2],
+    [x_label, y_label]: [&str; 2],
+) -> Drawn<Chart<'a, 'b>> {
+    if ![x.0, x.1, y.0, y.1].iter().all(|end| end.is_finite()) {
+        return Err("an axis is not finite".into());
+    }
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(62)
+        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+    chart
+        .configure_mesh()
+        .x_labels(7)
+        .y_labels(if y_label.is_empty() { 0 } else { 8 })
+        .x_label_formatter(&number(x))
+        .y_label_formatter(&number(y))
+        .label_style(FONT)
+        .axis_desc_style(FONT)
+        .x_desc(x_label)
+        .y_desc(y_label)
+        .light_line_style(RGBColor(245, 245, 245))
+        .bold_line_style(RGBColor(222, 222, 222))
+        .draw()?;
+    Ok(chart)
+}
+
+/// Writes a tick with the decimals that its axis needs.
+fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
+    let decimals = (1.0 - libm::floor(libm::log10((to - from) / 2.0))).clamp(0.0, 6.0) as usize;
+    move |value| {
+        let text = format!("{value:.decimals$}");
+        let short = if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        if short == "-0" { "0".to_owned() } else { short.to_owned() }
+    }
+}
+
+/// Width of a letter and of a sample with the room around it, px. SVG does not tell how wide a text is.
+const LETTER_PX: i32 = 7;
+const SAMPLE_PX: i32 = 26;
+const GAP_PX: i32 = 18;
+const LEFT_PX: i32 = 16;
+const ROW_PX: i32 = 24;
+/// Letters of a name that count.
+const LONGEST: i32 = 1000;
+
+/// Names at their places.
+struct Legend {
+    names: Vec<String>,
+    /// Left end and middle of each name's sample, px.
+    places: Vec<(i32, i32)>,
+}
+
+impl Legend {
+    /// Names in rows of a width, px.
+    fn new(names: Vec<String>, width_px: u32) -> Self {
+        let (mut left_px, mut row) = (LEFT_PX, 0);
+        let mut place = |name: &String| {
+            let letters = i32::try_from(name.chars().count()).unwrap_or(LONGEST).min(LONGEST);
+            let entry_px = SAMPLE_PX + LETTER_PX * letters + GAP_PX;
+            if left_px > LEFT_PX && left_px + entry_px > width_px.cast_signed() {
+                (left_px, row) = (LEFT_PX, row + 1);
+            }
+            let place = (left_px, row * ROW_PX + ROW_PX / 2);
+            left_px += entry_px;
+            place
+        };
+        let places = names.iter().map(&mut place).collect();
+        Self { names, places }
+    }
+
+    /// Height of all rows, px.
+    fn height_px(&self) -> u32 {
+        let last = self.places.last().map_or(0, |(_, middle)| middle + ROW_PX / 2);
+        last as u32 + ROW_PX as u32 / 2
+    }
+
+    /// Draws every name behind what `sample` draws for it from a place, px.
+    fn draw(&self, area: &Area<'_>, mut sample: impl FnMut(&Area<'_>, usize, (i32, i32)) -> Drawn) -> Drawn {
+        for (entry, (name, (left, middle))) in self.names.iter().zip(&self.places).enumerate() {
+            sample(area, entry, (*left, *middle))?;
+            area.draw(&Text::new(name.clone(), (left + SAMPLE_PX, middle - 7), FONT))?;
+        }
+        Ok(())
+    }
+}
+
+/// Size of a panel, px: one of several, and one alone.
+const PANEL_PX: (u32, u32) = (400, 340);
+const LONE_PANEL_PX: (u32, u32) = (720, 500);
+/// Length of the dashes and of the gaps, px.
+const DASH_PX: (i32, i32) = (8, 5);
+/// Room beside the outermost points, of the extent.
+const ROOM: f64 = 0.06;
+
+/// A curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// In the legend; curves of one name share their entry.
+    pub name: String,
+    /// Which colour, counted from 0.
+    pub colour: usize,
+    pub dashed: bool,
+    /// In the panel's own units.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// One pair of axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    pub x_label: String,
+    pub y_label: String,
+    pub lines: Vec<Line>,
+    /// Crosses, each with the colour of a curve.
+    pub crosses: Vec<(f64, f64, usize)>,
+}
+
+/// Panels in rows of `columns`, below a title. `cross_name` says what the crosses are.
+///
+/// # Errors
+/// A panel has no finite point.
+pub fn lines_svg(
+    title: &str,
+    panels: &[Panel],
+    columns: usize,
+    cross_name: Option<&str>,
+) -> Result<String, FigureError> {
+    let (panel_width_px, panel_height_px) = if panels.len() == 1 { LONE_PANEL_PX } else { PANEL_PX };
+    let rows = panels.len().div_ceil(columns.max(1));
+    let (width_px, panels_px) = (columns as u32 * panel_width_px, rows as u32 * panel_height_px);
+    let mut named: Vec<&Line> = Vec::new();
+    for line in panels.iter().flat_map(|panel| &panel.lines) {
+        if !named.iter().any(|known| known.name == line.name) {
+            named.push(line);
+        }
+    }
+    let names = named.iter().map(|line| line.name.clone()).chain(cross_name.map(str::to_owned));
+    let legend = Legend::new(names.collect(), width_px);
+    drawn(title, (width_px, panels_px + legend.height_px()), |root| {
+        let (upper, lower) = root.split_vertically(panels_px);
+        for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
+            draw_panel(area, panel)?;
+        }
+        legend.draw(&lower, |area, entry, place| draw_sample(area, named.get(entry).copied(), place))
+    })
+}
+
+fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
+    let points = || {
+        let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
+        of_lines.chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
+    };
+    let x = extent(points().map(|point| point.0)).ok_or("no finite point")?;
+    let y = extent(points().map(|point| point.1)).ok_or("no finite point")?;
+    let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
+    for line in &panel.lines {
+        let points = line.points.iter().copied();
+        if line.dashed {
+            let (dash_px, gap_px) = DASH_PX;
+            chart.draw_series(DashedLineSeries::new(points, dash_px, gap_px, style(line.colour)))?;
+        } else {
+            chart.draw_series(LineSeries::new(points, style(line.colour)))?;
+        }
+    }
+    let crosses = panel.crosses.iter().map(|(x, y, colour)| Cross::new((*x, *y), 5, style(*colour)));
+    chart.draw_series(crosses)?;
+    Ok(())
+}
+
+/// A piece of a curve, or a cross.
+fn draw_sample(area: &Area<'_>, line: Option<&Line>, (left, middle): (i32, i32)) -> Drawn {
+    let Some(line) = line else {
+        area.draw(&Cross::new((left + 10, middle), 5, BLACK.stroke_width(2)))?;
+        return Ok(());
+    };
+    let pieces = if line.dashed { vec![(0, 8), (12, 20)] } else { vec![(0, 20)] };
+    for (from, to) in pieces {
+        area.draw(&PathElement::new([(left + from, middle), (left + to, middle)], style(line.colour)))?;
+    }
+    Ok(())
+}
+
+fn style(colour: usize) -> ShapeStyle {
+    COLOURS[colour % COLOURS.len()].stroke_width(2)
+}
+
+/// Least and most with some room; `None` without a finite value.
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (least, most) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)));
+    let room = if most > least { ROOM * (most - least) } else { 0.5 };
+    (least <= most).then_some((least - room, most + room))
+}
+
+/// Size of the axes' area, px.
+const MAP_PX: (u32, u32) = (760, 520);
+
+/// An axis: evenly spaced values in the middles of the cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellAxis {
+    pub label: String,
+    pub first: f64,
+    pub last: f64,
+    pub count: usize,
+}
+
+/// What to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells<'a> {
+    pub x: CellAxis,
+    pub y: CellAxis,
+    /// Names and colours (red, green, blue) of the kinds of cells.
+    pub kinds: &'a [(&'a str, [u8; 3])],
+    /// The kind of each cell, row by row, the first row at the first value of `y`.
+    pub cells: &'a [usize],
+}
+
+impl CellAxis {
+    /// The two edges of a cell.
+    fn edges(&self, place: usize) -> (f64, f64) {
+        let step = self.step();
+        let middle = self.first + step * place as f64;
+        (middle - 0.5 * step, middle + 0.5 * step)
+    }
+
+    fn step(&self) -> f64 {
+        let steps = self.count.saturating_sub(1);
+        if steps == 0 { 1.0 } else { (self.last - self.first) / steps as f64 }
+    }
+
+    /// The outer edges, in ascending order.
+    fn ends(&self) -> (f64, f64) {
+        let (from, to) = (self.edges(0).0, self.edges(self.count.saturating_sub(1)).1);
+        (from.min(to), from.max(to))
+    }
+}
+
+/// The map as SVG.
+///
+/// # Errors
+/// An axis is not finite.
+pub fn cells_svg(title: &str, map: &Cells<'_>) -> Result<String, FigureError> {
+    let (width_px, height_px) = MAP_PX;
+    let colour = |kind: usize| {
+        let [red, green, blue] = map.kinds.get(kind).map_or([0; 3], |(_, colour)| *colour);
+        RGBColor(red, green, blue)
+    };
+    let legend = Legend::new(map.kinds.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
+    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(height_px);
+        let mut chart = axes(&upper, [map.x.ends(), map.y.ends()], [&map.x.label, &map.y.label])?;
+        chart.draw_series(map.cells.iter().enumerate().map(|(place, kind)| {
+            let (from, to) = map.x.edges(place % map.x.count);
+            let (below, above) = map.y.edges(place / map.x.count);
+            Rectangle::new([(from, below), (to, above)], colour(*kind).filled())
+        }))?;
+        legend.draw(&lower, |area, place, (left, middle)| {
+            let corners = [(left + 4, middle - 7), (left + 20, middle + 7)];
+            area.draw(&Rectangle::new(corners, colour(place).filled()))?;
+            Ok(())
+        })
+    })
+}
+
+/// Side of the square of the places, px.
+const SIDE_PX: u32 = 620;
+/// Corners of a circle.
+const CORNERS: u32 = 180;
+/// Colours of the circles, from the inner to the outer.
+const GREYS: [RGBColor; 4] =
+    [RGBColor(150, 150, 150), RGBColor(110, 110, 110), RGBColor(60, 60, 60), RGBColor(0, 0, 0)];
+
+/// What to draw, m from the pad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Places<'a> {
+    /// Names and places of the kinds.
+    pub kinds: &'a [(&'a str, Vec<[f64; 2]>)],
+    /// Names and radii of the circles.
+    pub circles: &'a [(String, f64)],
+}
+
+/// The places as SVG, both axes at one scale.
+///
+/// # Errors
+/// A radius is too small.
+pub fn places_svg(title: &str, places: &Places<'_>) -> Result<String, FigureError> {
+    let names = places.kinds.iter().map(|(name, _)| (*name).to_owned());
+    let names = names.chain(places.circles.iter().map(|(name, _)| name.clone()));
+    let (width_px, height_px) = (SIDE_PX + ROOM_PX.0, SIDE_PX + ROOM_PX.1);
+    let legend = Legend::new(names.collect(), width_px);
+    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(height_px);
+        let of_places = places.kinds.iter().flat_map(|(_, places)| places.iter().flatten().map(|m| m.abs()));
+        let of_circles = places.circles.iter().map(|(_, radius_m)| *radius_m);
+        let far_m = 1.05 * of_places.chain(of_circles).filter(|m| m.is_finite()).fold(1.0, f64::max);
+        let labels = ["world x, m from the pad", "world y, m from the pad"];
+        let mut chart = axes(&upper, [(-far_m, far_m); 2], labels)?;
+        for (kind, (_, places)) in places.kinds.iter().enumerate() {
+            let finite = places.iter().filter(|place| place.iter().all(|m| m.is_finite()));
+            chart.draw_series(finite.map(|[x, y]| Circle::new((*x, *y), 2, dot(kind))))?;
+        }
+        for (place, (_, radius_m)) in places.circles.iter().enumerate() {
+            let corner = |k: u32| {
+                let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(CORNERS));
+                (radius_m * cos, radius_m * sin)
+            };
+            chart.draw_series([PathElement::new(
+                (0..=CORNERS).map(corner).collect::<Vec<_>>(),
+                line(place),
+            )])?;
+        }
+        chart.draw_series([Cross::new((0.0, 0.0), 6, BLACK.stroke_width(2))])?;
+        legend.draw(&lower, |area, entry, (left, middle)| {
+            match entry.checked_sub(places.kinds.len()) {
+                None => area.draw(&Circle::new((left + 10, middle), 4, dot(entry)))?,
+                Some(circle) => {
+                    let ends = [(left, middle), (left + 20, middle)];
+                    area.draw(&PathElement::new(ends, line(circle)))?;
+                }
+            }
+            Ok(())
+        })
+    })
+}
+
+fn dot(kind: usize) -> ShapeStyle {
+    COLOURS[kind % COLOURS.len()].mix(0.7).filled()
+}
+
+/// The darker, the farther out; each second one is thin.
+fn line(circle: usize) -> ShapeStyle {
+    GREYS[circle % GREYS.len()].stroke_width(1 + u32::from(circle.is_multiple_of(2)))
+}
+
+/// A bar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bar {
+    /// From its left to its right end.
+    pub x: [f64; 2],
+    /// From its lower to its upper end.
+    pub y: [f64; 2],
+    /// Which of the kinds.
+    pub kind: usize,
+    /// Written into it.
+    pub text: String,
+}
+
+/// Bars of named kinds, and perhaps a value of `x` that is marked, with its name.
+///
+/// # Errors
+/// A bar is not finite.
+pub fn bars_svg(
+    title: &str,
+    labels: [&str; 2],
+    kinds: &[&str],
+    bars: &[Bar],
+    mark: Option<(&str, f64)>,
+) -> Result<String, FigureError> {
+    let (width_px, height_px) = LONE_PANEL_PX;
+    let names = kinds.iter().copied().chain(mark.map(|(name, _)| name)).map(str::to_owned);
+    let legend = Legend::new(names.collect(), width_px);
+    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(height_px);
+        let of_mark = mark.map(|(_, value)| value);
+        let x = extent(bars.iter().flat_map(|bar| bar.x).chain(of_mark)).unwrap_or((0.0, 1.0));
+        let of_bars = bars.iter().flat_map(|bar| bar.y);
+        let y = of_bars.fold((0.0, 0.0), |(least, most): (f64, f64), y| (least.min(y), most.max(y)));
+        let y = if y.0 < y.1 { y } else { (0.0, 1.0) };
+        let mut chart = axes(&upper, [x, y], labels)?;
+        chart.draw_series(bars.iter().map(|bar| {
+            let corners = [(bar.x[0], bar.y[0]), (bar.x[1], bar.y[1])];
+            Rectangle::new(corners, dot(bar.kind))
+        }))?;
+        let texts = bars.iter().filter(|bar| !bar.text.is_empty());
+        chart.draw_series(texts.map(|bar| {
+            let middle = 0.5 * (bar.y[0] + bar.y[1]);
+            Text::new(bar.text.clone(), (bar.x[0], middle), FONT)
+        }))?;
+        chart.draw_series(of_mark.map(|at| PathElement::new([(at, y.0), (at, y.1)], style(1))))?;
+        legend.draw(&lower, |area, entry, (left, middle)| {
+            if entry < kinds.len() {
+                area.draw(&Rectangle::new([(left + 4, middle - 7), (left + 20, middle + 7)], dot(entry)))?;
+            } else {
+                area.draw(&PathElement::new([(left, middle), (left + 20, middle)], style(1)))?;
+            }
+            Ok(())
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_have_the_decimals_of_their_axis() {
+        assert_eq!(number((0.0, 5.0))(&2.5), "2.5");
+        assert_eq!(number((0.0, 5.0))(&-0.0), "0");
+        assert_eq!(number((0.0, 300.0))(&120.0), "120");
+        assert_eq!(number((-0.02, 0.02))(&0.005), "0.005");
+    }
+
+    fn panel(points: Vec<(f64, f64)>) -> Panel {
+        let line = Line { name: "a < b".to_owned(), colour: 0, dashed: false, points };
+        let (x_label, y_label) = ("time, s".to_owned(), "height, m".to_owned());
+        Panel { x_label, y_label, lines: vec![line], crosses: vec![(0.5, 0.5, 0)] }
+    }
+
+    #[test]
+    fn a_figure_names_its_axes_and_curves_and_a_curve_without_points_is_refused() {
+        let panels = [panel(vec![(0.0, 0.0), (1.0, 2.0)]), panel(vec![(0.0, 1.0), (1.0, 1.0)])];
+        let svg = lines_svg("Fig. 0", &panels, 2, Some("paper")).unwrap();
+        for text in ["Fig. 0", "time, s", "height, m", "a &lt; b", "paper"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert_eq!(svg.matches("a &lt; b").count(), 1);
+        let empty = Panel { crosses: vec![], ..panel(vec![(f64::NAN, 1.0)]) };
+        let error = lines_svg("Fig. 0", &[empty], 1, None).unwrap_err();
+        assert_eq!(error.to_string(), "cannot draw the figure 'Fig. 0': no finite point");
+    }
+
+    #[test]
+    fn every_cell_is_drawn_and_every_kind_is_named() {
+        let axis = |label: &str, last| CellAxis { label: label.to_owned(), first: 0.0, last, count: 3 };
+        let map = Cells {
+            x: axis("tilt, deg", 10.0),
+            y: axis("wind, m/s", 4.0),
+            kinds: &[("lands", [1, 2, 3]), ("misses", [4, 5, 6])],
+            cells: &[0, 1, 1, 0, 0, 1, 1, 1, 1],
+        };
+        let svg = cells_svg("a & b", &map).unwrap();
+        for text in ["a &amp; b", "tilt, deg", "wind, m/s", "lands", "misses"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        // Each once more in the legend.
+        assert_eq!([svg.matches("#010203").count(), svg.matches("#040506").count()], [3 + 1, 6 + 1]);
+        let broken = Cells { x: axis("", f64::NAN), ..map };
+        assert!(cells_svg("", &broken).is_err());
+    }
+
+    #[test]
+    fn every_bar_is_drawn_with_its_text_and_the_mark_is_named() {
+        let bar = |x, text: &str| Bar { x, y: [0.0, 2.0], kind: 0, text: text.to_owned() };
+        let bars = [bar([0.0, 1.0], "a < b"), bar([1.0, 3.0], "")];
+        let svg = bars_svg("T", ["speed, m/s", "flights"], &["flown"], &bars, Some(("limit", 2.0))).unwrap();
+        for text in ["a &lt; b", "speed, m/s", "flown", "limit"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(bars_svg("", ["", ""], &[], &[bar([0.0, f64::INFINITY], "")], None).is_ok());
+        assert!(bars_svg("", ["", ""], &[], &[], None).is_ok());
+    }
+
+    #[test]
+    fn every_place_and_circle_is_drawn_and_named() {
+        let kinds = [("as planned", vec![[1.0, 2.0], [3.0, f64::NAN]]), ("a < b", vec![[-40.0, 5.0]])];
+        let circles = [("fence".to_owned(), 120.0), ("99 %".to_owned(), 400.0)];
+        let svg = places_svg("mk2", &Places { kinds: &kinds, circles: &circles }).unwrap();
+        for text in ["as planned", "a &lt; b", "fence", "99 %", "world x, m from the pad", "400"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        // Two places and two in the legend.
+        assert_eq!(svg.matches("<circle").count(), 4);
+        assert!(places_svg("", &Places { kinds: &[], circles: &[] }).is_ok());
+    }
+}

@@ -1,0 +1,450 @@
+//! The summary of a campaign, as data, plain text and Markdown.
+//!
+//! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
+
+use core::fmt::{self, Write};
+
+use serde::Serialize;
+
+use crate::attainable::{Window, best_height_m};
+use crate::row::{Row, column};
+use crate::statistics::{Share, quantile, rank_correlation, sorted};
+use crate::store::{Manifest, Shard};
+
+/// Columns whose percentiles are in the summary.
+const TOLD: [&str; 14] = [
+    "touchdown_vertical_m_s",
+    "touchdown_lateral_m_s",
+    "touchdown_tilt_deg",
+    "touchdown_rate_deg_s",
+    "leg_use",
+    "chosen_onset_height_m",
+    "onset_height_m",
+    "burn_time_at_contact_s",
+    "gimbal_saturation_share",
+    "error_vertical_m_s",
+    "error_lateral_m_s",
+    "error_height_m",
+    "error_nose_deg",
+    "flight_time_s",
+];
+
+/// A campaign's summary.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The manifest of the campaign.
+    pub manifest: Manifest,
+    /// Flights that landed within the limits of the legs.
+    pub legs: Share,
+    /// Flights that landed inside the landing paper's Table 2.
+    pub strict: Share,
+    /// What perfect information lands; `None` if it lands no flight.
+    pub attainable: Option<Attainable>,
+    /// Why the others did not land within the limits of the legs, the most frequent reason first.
+    pub failures: Vec<Failures>,
+    /// Ignitions while a check of the gate failed. This must be zero.
+    pub ignitions_outside_gate: u64,
+    /// Plans by control level, and the work of the solver.
+    pub plans: Plans,
+    pub distributions: Vec<Distribution>,
+    /// Drawn quantities, beginning with the one that costs most landings.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// What perfect information lands, with one command height for all flights (see [`crate::attainable`]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Attainable {
+    /// Height of the feet at the command from which it lands most flights, m.
+    pub command_height_m: f64,
+    /// Flights that it lands.
+    pub attainable: Share,
+    /// Of these, the flights that landed within the limits of the legs.
+    pub landed: Share,
+    /// Flights that landed although they are not attainable from that height. Their controller chose another height for
+    /// each flight.
+    pub landed_from_another_height: u64,
+    /// Flights that landed although they are not attainable from any height. The bound leaves out wind and place, so
+    /// there can be a few.
+    pub landed_beyond: u64,
+}
+
+impl Attainable {
+    fn of(rows: &[Row]) -> Option<Self> {
+        let windows: Vec<Window> = rows.iter().filter_map(Row::attainable).collect();
+        let (command_height_m, _) = best_height_m(&windows)?;
+        let is = |row: &Row| row.attainable().is_some_and(|window| window.contains(command_height_m));
+        let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let attainable = count(&is);
+        Some(Self {
+            command_height_m,
+            attainable: Share::new(attainable, rows.len() as u64),
+            landed: Share::new(count(&|row| row.legs && is(row)), attainable),
+            landed_from_another_height: count(&|row| row.legs && !is(row) && row.attainable().is_some()),
+            landed_beyond: count(&|row| row.legs && row.attainable().is_none()),
+        })
+    }
+}
+
+/// A reason and the number of flights with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failures {
+    pub reason: String,
+    /// The number of flights.
+    pub flights: u64,
+}
+
+/// All flights' plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Plans {
+    pub converged: u64,
+    pub best_feasible: u64,
+    /// The previous plan, shifted.
+    pub shifted: u64,
+    pub stabiliser: u64,
+    pub solver_iterations: u64,
+    /// Solves that did not converge.
+    pub solver_failures: u64,
+}
+
+/// Percentiles of a column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Distribution {
+    /// The column, with its unit.
+    pub column: &'static str,
+    /// Flights that have a value.
+    pub flights: u64,
+    pub least: f64,
+    /// 5th percentile.
+    pub p5: f64,
+    /// 25th percentile.
+    pub p25: f64,
+    /// Median.
+    pub p50: f64,
+    /// 75th percentile.
+    pub p75: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    pub greatest: f64,
+}
+
+/// How many landings a drawn quantity costs.
+///
+/// A flight's deviation is the distance of its draw from the nominal value, or the draw itself where more is worse
+/// (wind, distance and motion at apogee). The median deviation divides the flights into an inner and an outer half.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The quantity, with its unit.
+    pub column: &'static str,
+    pub median_deviation: f64,
+    /// Fraction of the inner half that landed within the limits of the legs.
+    pub inner: Share,
+    /// The same fraction of the outer half.
+    pub outer: Share,
+    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' limits used at contact.
+    pub rank_correlation: f64,
+}
+
+impl Sensitivity {
+    /// How much smaller the fraction of landings is in the outer half than in the inner half.
+    pub fn cost(&self) -> f64 {
+        self.inner.share - self.outer.share
+    }
+}
+
+impl Summary {
+    /// The summary of rows in any order.
+    pub fn new(manifest: &Manifest, rows: &[Row]) -> Self {
+        let of = rows.len() as u64;
+        let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let sum = |read: fn(&Row) -> u64| rows.iter().map(read).sum();
+        Self {
+            manifest: manifest.clone(),
+            legs: Share::new(count(|row| row.legs), of),
+            strict: Share::new(count(|row| row.strict), of),
+            attainable: Attainable::of(rows),
+            failures: failures(rows),
+            ignitions_outside_gate: count(|row| row.ignition_outside_gate),
+            plans: Plans {
+                converged: sum(|row| row.plans_converged),
+                best_feasible: sum(|row| row.plans_best_feasible),
+                shifted: sum(|row| row.plans_shifted),
+                stabiliser: sum(|row| row.plans_stabiliser),
+                solver_iterations: sum(|row| row.solver_iterations),
+                solver_failures: sum(|row| row.solver_failures),
+            },
+            distributions: TOLD.iter().filter_map(|name| distribution(rows, name)).collect(),
+            sensitivity: sensitivity(rows),
+        }
+    }
+}
+
+fn failures(rows: &[Row]) -> Vec<Failures> {
+    let mut found: Vec<Failures> = Vec::new();
+    for row in rows.iter().filter(|row| !row.failure.is_empty()) {
+        match found.iter_mut().find(|known| known.reason == row.failure) {
+            Some(known) => known.flights += 1,
+            None => found.push(Failures { reason: row.failure.clone(), flights: 1 }),
+        }
+    }
+    found.sort_by(|one, two| two.flights.cmp(&one.flights).then_with(|| one.reason.cmp(&two.reason)));
+    found
+}
+
+/// The numbers in a column.
+pub(crate) fn numbers<'a>(rows: &'a [Row], name: &str) -> impl Iterator<Item = f64> + use<'a> {
+    let column = column(name);
+    rows.iter().filter_map(move |row| (column?.value)(row).number())
+}
+
+fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
+    let values = sorted(numbers(rows, name));
+    let at = |share| quantile(&values, share);
+    Some(Distribution {
+        column: name,
+        flights: values.len() as u64,
+        least: at(0.0)?,
+        p5: at(0.05)?,
+        p25: at(0.25)?,
+        p50: at(0.5)?,
+        p75: at(0.75)?,
+        p95: at(0.95)?,
+        p99: at(0.99)?,
+        greatest: at(1.0)?,
+    })
+}
+
+fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
+    let mut found: Vec<Sensitivity> = Row::DRAWN
+        .iter()
+        .filter_map(|(name, nominal)| {
+            let drawn = numbers(rows, name);
+            let deviations: Vec<f64> =
+                drawn.map(|value| nominal.map_or(value, |nominal| (value - nominal).abs())).collect();
+            sensitivity_to(rows, name, &deviations)
+        })
+        .collect();
+    found.sort_by(|one, two| {
+        let cost = two.cost().total_cmp(&one.cost());
+        cost.then_with(|| two.rank_correlation.total_cmp(&one.rank_correlation))
+    });
+    found
+}
+
+/// `None` for a quantity that does not vary.
+fn sensitivity_to(rows: &[Row], name: &'static str, deviations: &[f64]) -> Option<Sensitivity> {
+    let order = sorted(deviations.iter().copied());
+    let median = quantile(&order, 0.5)?;
+    if order.first()?.to_bits() == order.last()?.to_bits() {
+        return None;
+    }
+    let half = |outer: bool| {
+        let mine =
+            || rows.iter().zip(deviations).filter(move |(_, deviation)| (**deviation > median) == outer);
+        Share::new(mine().filter(|(row, _)| row.legs).count() as u64, mine().count() as u64)
+    };
+    let pairs: Vec<(f64, f64)> = rows
+        .iter()
+        .zip(deviations)
+        .filter_map(|(row, deviation)| row.leg_use.map(|leg_use| (*deviation, leg_use)))
+        .collect();
+    Some(Sensitivity {
+        column: name,
+        median_deviation: median,
+        inner: half(false),
+        outer: half(true),
+        rank_correlation: rank_correlation(&pairs),
+    })
+}
+
+/// The summary as plain text.
+pub fn to_text(summary: &Summary) -> String {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = text(summary, &mut out);
+    out
+}
+
+/// The summary as Markdown, with links to the pictures in the same directory.
+pub fn to_markdown(summary: &Summary) -> String {
+    let mut out = String::new();
+    let _ = markdown(summary, &mut out);
+    out
+}
+
+fn percent(share: &Share) -> String {
+    format!(
+        "{} of {}: {:.1} % ({:.1} to {:.1} %)",
+        share.count,
+        share.of,
+        100.0 * share.share,
+        100.0 * share.low,
+        100.0 * share.high
+    )
+}
+
+/// What attainable means.
+const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height is the same for all \
+                          flights; once the thrust begins, motor, mass and drag are known, and fins and tilt are a \
+                          throttle. Motion is vertical: wind, place and attitude dynamics are left out";
+
+/// The landings beyond that.
+fn others(attainable: &Attainable) -> String {
+    match [attainable.landed_from_another_height, attainable.landed_beyond] {
+        [0, 0] => String::new(),
+        [chosen, beyond] => {
+            format!("; besides, {chosen} landed from another height, and {beyond} beyond what is attainable")
+        }
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let (first, rest) = text.split_at(1);
+    first.to_uppercase() + rest
+}
+
+fn what(manifest: &Manifest) -> String {
+    let mut what = format!(
+        "{}, dispersion {}, seed {}, controller {}",
+        manifest.mission, manifest.dispersion, manifest.seed, manifest.controller
+    );
+    if !manifest.steered {
+        what.push_str(", passive descent");
+    }
+    if manifest.shard != Shard::WHOLE {
+        what = format!("{what}, shard {}", manifest.shard);
+    }
+    if !manifest.faults.is_empty() {
+        what = format!("{what}, faults {}", manifest.faults.join(" "));
+    }
+    what
+}
+
+/// A heading and rows; the first column is text, the others are numbers.
+type Table = Vec<Vec<String>>;
+
+fn distributions(summary: &Summary) -> Table {
+    let heading = ["", "least", "5 %", "25 %", "50 %", "75 %", "95 %", "99 %", "greatest"];
+    let row = |found: &Distribution| {
+        let Distribution { least, p5, p25, p50, p75, p95, p99, greatest, .. } = found;
+        let values = [least, p5, p25, p50, p75, p95, p99, greatest].map(|value| format!("{value:.3}"));
+        core::iter::once(found.column.to_owned()).chain(values).collect()
+    };
+    let heading = heading.map(str::to_owned).to_vec();
+    core::iter::once(heading).chain(summary.distributions.iter().map(row)).collect()
+}
+
+fn sensitivities(summary: &Summary) -> Table {
+    let heading = ["", "deviation", "inner %", "outer %", "cost %", "rank corr."];
+    let row = |found: &Sensitivity| {
+        let [inner, outer, cost] =
+            [found.inner.share, found.outer.share, found.cost()].map(|share| format!("{:.1}", 100.0 * share));
+        let (deviation, rank) = (found.median_deviation, found.rank_correlation);
+        vec![found.column.to_owned(), format!("{deviation:.4}"), inner, outer, cost, format!("{rank:.3}")]
+    };
+    let heading = heading.map(str::to_owned).to_vec();
+    core::iter::once(heading).chain(summary.sensitivity.iter().map(row)).collect()
+}
+
+fn write_text(table: &Table, out: &mut String) -> fmt::Result {
+    for row in table {
+        for (place, cell) in row.iter().enumerate() {
+            if place == 0 { write!(out, "{cell:<32}") } else { write!(out, "{cell:>11}") }?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+fn write_markdown(table: &Table, out: &mut String) -> fmt::Result {
+    for (place, row) in table.iter().enumerate() {
+        writeln!(out, "| {} |", row.join(" | "))?;
+        if place == 0 {
+            writeln!(out, "|{}", "---|".repeat(row.len()))?;
+        }
+    }
+    Ok(())
+}
+
+fn text(summary: &Summary, out: &mut String) -> fmt::Result {
+    writeln!(out, "{}", what(&summary.manifest))?;
+    writeln!(out, "legs    {}", percent(&summary.legs))?;
+    writeln!(out, "strict  {}", percent(&summary.strict))?;
+    if let Some(attainable) = &summary.attainable {
+        let Attainable { command_height_m, .. } = attainable;
+        writeln!(
+            out,
+            "attainable, ignition command at {command_height_m:.1} m  {}",
+            percent(&attainable.attainable)
+        )?;
+        writeln!(out, "landed of attainable  {}{}", percent(&attainable.landed), others(attainable))?;
+        writeln!(out, "({ATTAINABLE})")?;
+    }
+    writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
+    if !summary.failures.is_empty() {
+        writeln!(out, "\nwhy not:")?;
+        for failure in &summary.failures {
+            writeln!(out, "{:>6}  {}", failure.flights, failure.reason)?;
+        }
+    }
+    let plans = &summary.plans;
+    writeln!(
+        out,
+        "\nplans: {} converged, {} best feasible, {} shifted, {} upright law; {} iterations, {} solves not converged",
+        plans.converged,
+        plans.best_feasible,
+        plans.shifted,
+        plans.stabiliser,
+        plans.solver_iterations,
+        plans.solver_failures
+    )?;
+    writeln!(out)?;
+    write_text(&distributions(summary), out)?;
+    writeln!(
+        out,
+        "\nwhat costs most: landings (legs) in the half nearest the nominal value and in the other half"
+    )?;
+    write_text(&sensitivities(summary), out)
+}
+
+fn markdown(summary: &Summary, out: &mut String) -> fmt::Result {
+    let manifest = &summary.manifest;
+    writeln!(out, "# {}\n", what(manifest))?;
+    writeln!(out, "Program `{}`. Intervals are Wilson's, 95 %.\n", manifest.build)?;
+    writeln!(out, "| verdict | landed |\n|---|---|")?;
+    writeln!(out, "| legs | {} |\n| strict | {} |\n", percent(&summary.legs), percent(&summary.strict))?;
+    if let Some(attainable) = &summary.attainable {
+        writeln!(out, "| one ignition height for all flights | flights |\n|---|---|")?;
+        let Attainable { command_height_m, .. } = attainable;
+        writeln!(
+            out,
+            "| attainable, command at {command_height_m:.1} m | {} |",
+            percent(&attainable.attainable)
+        )?;
+        writeln!(out, "| landed of attainable | {}{} |\n", percent(&attainable.landed), others(attainable))?;
+        writeln!(out, "{}.\n", capitalised(ATTAINABLE))?;
+    }
+    writeln!(out, "Ignitions outside the gate: {}.\n", summary.ignitions_outside_gate)?;
+    if !summary.failures.is_empty() {
+        writeln!(out, "| why not | flights |\n|---|---|")?;
+        for failure in &summary.failures {
+            writeln!(out, "| {} | {} |", failure.reason, failure.flights)?;
+        }
+        writeln!(out)?;
+    }
+    write_markdown(&distributions(summary), out)?;
+    writeln!(out, "\n## What costs most\n")?;
+    writeln!(
+        out,
+        "Flights are halved at the median deviation of a drawn quantity from its nominal value (for wind and the state \
+         at apogee: at the median value). `cost` is the share of landings (legs) that the outer half has less. The rank \
+         correlation is Spearman's, between deviation and the largest share of the legs' limits used at contact.\n"
+    )?;
+    write_markdown(&sensitivities(summary), out)?;
+    writeln!(out, "\n## Pictures\n")?;
+    for (name, title) in crate::picture::PICTURES {
+        writeln!(out, "![{title}]({name})")?;
+    }
+    Ok(())
+}
