@@ -15,6 +15,7 @@ use simulated_vehicle::fly::StartPoint;
 use crate::demo::Speed;
 use crate::exit;
 use crate::model::act::Bindings;
+use crate::model::alarm::Amount;
 use crate::model::place::Degrees;
 use crate::model::words;
 use crate::view::theme::Palette;
@@ -156,7 +157,7 @@ pub struct Cli {
 
     /// How much is called out. Default: normal.
     #[arg(long, value_name = "HOW_MUCH", global = true)]
-    pub talk: Option<TalkAmount>,
+    pub talk: Option<Amount>,
 
     /// The least time between two heights that are called out. Default: 1.5.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, global = true)]
@@ -382,21 +383,6 @@ impl FromStr for ReplayFrom {
             )),
         }
     }
-}
-
-/// How much is called out.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum TalkAmount {
-    /// Neither voice nor bells, except those of alarms
-    Nothing,
-    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO and a lost link
-    Few,
-    /// Also phases and every 50 m
-    #[default]
-    Normal,
-    /// Also every 10 m below 50 m
-    All,
 }
 
 /// A time.

@@ -8,69 +8,12 @@ use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
-use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, TalkAmount, ThemeChoice};
+use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, ThemeChoice};
 use crate::model::act::{Bindings, DEFINITIONS};
 use crate::model::alarm::{Amount, Talk};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
-pub const EXAMPLE: &str = r#"# Settings of `ground`. A flag of the same name overrides each of them.
-# Its path is $XDG_CONFIG_HOME/touchdown/ground.toml, or ~/.config/touchdown/ground.toml.
-
-# Links to the vehicle, as for --connect, for `ground daemon`. A bare `ground` flies its demonstration.
-#connect = ["udpin:0.0.0.0:14550"]
-
-# MAVLink system ids of this station and of its vehicle, as for --sysid and --vehicle-sysid.
-#sysid = 255
-#vehicle_sysid = 1
-
-# Signing key, as for --key. Default: nothing is signed.
-#key = "touchdown.key"
-
-# Who may command, and who sits here, as for --crew and --operator. Default: nobody is named.
-#crew = "crew.toml"
-#operator = "Ann"
-
-# The mission that the vehicle should fly, as for --mission. Default: any.
-#mission = "mission.toml"
-
-# Checklist, as for --checklist. Default: none.
-#checklist = "checklist.toml"
-
-# Log (MCAP), or "none". Default: touchdown-YYYYMMDD-HHMMSS.mcap in the current directory.
-#log = "flight.mcap"
-
-# Telemetry log (.tlog), or "none". Default with a link: the log's name with this ending.
-#tlog = "flight.tlog"
-
-# Socket between a station and its screens. Default: one socket per station.
-#socket = "/run/user/1000/touchdown/field.sock"
-
-# Ring the terminal's bell on an alarm.
-#bell = true
-
-# Run by `sh -c` when an alarm is raised, with its words in $TOUCHDOWN_ALARM; or "none", the default.
-#alarm_command = "notify-send \"$TOUCHDOWN_ALARM\""
-
-# Draw with "unicode", "ascii", or "auto": by LC_ALL, LC_CTYPE, LANG and TERM.
-#characters = "auto"
-
-# Colours: "dark", "light" (black on white, for sunlight), "16" (the terminal's own), "none", "contrast" (high
-# contrast), or "auto": by NO_COLOR, TERM, COLORTERM and COLORFGBG. The key c changes them too.
-#theme = "auto"
-
-# Calls out the flight: a command that speaks each line of its standard input. Its words are split at spaces, without
-# a shell. Linux: "espeak-ng -s 170" (words per minute; -a is the loudness) or "spd-say -e". macOS: "xargs -I{} say {}".
-# Or "none", the default: then bells ring, one to three of them.
-#voice = "espeak-ng -s 170"
-
-# How much is called out: "nothing", "few", "normal" or "all", and the least time between two heights, s.
-#talk = "normal"
-#talk_every_s = 1.5
-
-# Other keys for actions; the key : lists every action. The keys of the abort, Enter and Esc cannot be chosen.
-# Actions that open a ladder (arm, start, disarm) need a capital letter.
-#keys = { theme = "c", path = "p" }
-"#;
+pub const EXAMPLE: &str = include_str!("../config-example.toml");
 
 /// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
 /// same name.
@@ -99,7 +42,7 @@ pub struct Config {
     pub keys: Bindings,
     pub voice: Option<String>,
     #[serde(default)]
-    pub talk: TalkAmount,
+    pub talk: Amount,
     pub talk_every_s: Option<Seconds>,
 }
 
@@ -204,15 +147,9 @@ impl Config {
 
     /// What is called out.
     pub fn talk(&self) -> Talk {
-        let amount = match self.talk {
-            TalkAmount::Nothing => Amount::Nothing,
-            TalkAmount::Few => Amount::Few,
-            TalkAmount::Normal => Amount::Normal,
-            TalkAmount::All => Amount::All,
-        };
         let usual = Talk::default();
         let height_every = self.talk_every_s.map_or(usual.height_every, |Seconds(every)| every);
-        Talk { amount, height_every, has_voice: self.voice.is_some() }
+        Talk { amount: self.talk, height_every, has_voice: self.voice.is_some() }
     }
 
     /// The flags about the screen and its alarms override the file.

@@ -2,6 +2,7 @@
 
 /// The MAVLink address of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct Address {
     /// System id; 0 addresses every system.
     pub system_id: u8,

@@ -102,6 +102,7 @@ pub struct LinkStats {
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct LinkFigures {
     pub rx_bytes_s: f64,
     pub tx_bytes_s: f64,
@@ -111,6 +112,7 @@ pub struct LinkFigures {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct SourceFigures {
     pub source: Address,
     /// Time since its last frame.

@@ -7,6 +7,7 @@ use sha2::{Digest as _, Sha256};
 /// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it, also of a comment.
 /// 64 bits tell missions apart; they are no protection against somebody who searches for a text with the same hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct MissionHash(pub [u8; 8]);
 
 impl MissionHash {

@@ -4,9 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::identity::{GROUND, VEHICLE};
 use protocol::log::record::{EventLevel, Record};
-use protocol::mission::MissionHash;
 use tokio::io::{AsyncRead, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 use tokio::net::unix::OwnedWriteHalf;
@@ -14,7 +12,7 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
-use super::output::Output;
+use super::output::{Lines, Output};
 use super::replaying::Again;
 use super::server::read_one;
 use super::stations;
@@ -26,7 +24,7 @@ use crate::exit::Exit;
 use crate::model::act::Bindings;
 use crate::model::alarm::Talk;
 use crate::model::command::CommandKind;
-use crate::model::crew::{KeyOwner, Seat};
+use crate::model::crew::Seat;
 use crate::model::log::Speaker;
 use crate::model::{Action, Model, Request, Role, Settings};
 use crate::update::{Msg, update};
@@ -130,7 +128,8 @@ pub async fn session(
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
                     model.repeats_reported = output.reports_repeats();
-                    output.start_over();
+                    output.lines = Lines::default();
+                    output.mark_changed();
                     look_again_at = None;
                 }
                 Vec::new()
@@ -213,11 +212,8 @@ async fn act(
             Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
                 link.ask(&ToStation::Key(action.detail)).await;
             }
-            Action::Redraw => output.clear(),
-            Action::NextTheme => output.next_theme(),
-            Action::Bell => output.bell(),
-            Action::Say(text) => {
-                if let Some(ended) = output.say(&text) {
+            Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
+                if let Some(ended) = output.act(&action) {
                     model.warn(now, ended.to_string());
                 }
             }
@@ -322,25 +318,15 @@ fn stays_here(action: &Action) -> bool {
     matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_))
 }
 
+/// The station's settings with the screen's own.
 fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
-    let path = |path: &String| Some(path.clone()).filter(|path| !path.is_empty());
     Settings {
-        link_capacity_bytes_s: Some(hello.link_capacity_bytes_s).filter(|most| *most > 0),
-        log_path: path(&hello.log_path),
-        tlog_path: path(&hello.tlog_path),
-        us: GROUND.of_system(hello.system_ids[0]),
-        session: hello.session,
-        vehicle: VEHICLE.of_system(hello.system_ids[1]),
         role: if viewer.watch { Role::Watching } else { Role::Attached },
         seat: Seat::new(hello.screen, viewer.operator.clone()),
-        demonstration: hello.demonstration,
-        auto: hello.auto,
-        key_owner: (hello.key_number > 0)
-            .then(|| KeyOwner { number: hello.key_number, name: hello.key_owner.clone() }),
-        mission: hello.mission.map(MissionHash),
         keys: viewer.keys.clone(),
         talk: viewer.talk,
-        ..Settings::on_screen(&hello.link_name)
+        interactive: true,
+        ..hello.station.clone()
     }
 }
 

@@ -118,7 +118,7 @@ impl Downloading {
     /// Remembers what is there, so that the next download goes on with it.
     fn remember(&self) -> anyhow::Result<()> {
         if let (Some(part), Some(keeper)) = (self.download.part(), &self.keeper) {
-            keeper.remember(part)?;
+            keeper.order(Order::Remember(Box::new(part.clone())))?;
         }
         Ok(())
     }
@@ -146,14 +146,14 @@ impl Downloading {
         match self.download.ended() {
             Some(Ok(())) => {
                 if !std::mem::replace(&mut self.finishing, true) {
-                    keeper.finish()?;
+                    keeper.order(Order::Finish)?;
                 }
                 Ok(None)
             }
             Some(Err(failure)) => anyhow::bail!(failure),
             None => {
                 if self.download.is_whole() && !std::mem::replace(&mut self.summing, true) {
-                    keeper.sum()?;
+                    keeper.order(Order::Sum)?;
                 }
                 Ok(self.next_tenth().map(Word::Goes))
             }
@@ -178,8 +178,8 @@ impl Downloading {
     fn write(&self, news: Option<News>) -> anyhow::Result<()> {
         let Some(keeper) = &self.keeper else { return Ok(()) };
         match news {
-            Some(News::Begins { fresh: true }) => keeper.begin_again()?,
-            Some(News::Piece { offset, data }) => keeper.write(offset, data)?,
+            Some(News::Begins { fresh: true }) => keeper.order(Order::BeginAgain)?,
+            Some(News::Piece { offset, data }) => keeper.order(Order::Write { offset, piece: data })?,
             Some(News::Begins { fresh: false }) | None => {}
         }
         Ok(())
@@ -365,28 +365,6 @@ impl Keeper {
         Ok(Self { orders, told, thread })
     }
 
-    pub(super) fn begin_again(&self) -> Result<(), Behind> {
-        self.order(Order::BeginAgain)
-    }
-
-    pub(super) fn write(&self, offset: u32, piece: Vec<u8>) -> Result<(), Behind> {
-        self.order(Order::Write { offset, piece })
-    }
-
-    pub(super) fn remember(&self, part: Part) -> Result<(), Behind> {
-        self.order(Order::Remember(Box::new(part)))
-    }
-
-    /// Asks for the checksum of everything that was written.
-    pub(super) fn sum(&self) -> Result<(), Behind> {
-        self.order(Order::Sum)
-    }
-
-    /// The log is whole: it gets its name.
-    pub(super) fn finish(&self) -> Result<(), Behind> {
-        self.order(Order::Finish)
-    }
-
     /// What the thread has said since.
     pub(super) fn told(&self) -> Option<Told> {
         self.told.try_recv().ok()
@@ -399,6 +377,7 @@ impl Keeper {
         let _ = self.thread.join();
     }
 
+    /// Gives an order; it never waits.
     fn order(&self, order: Order) -> Result<(), Behind> {
         match self.orders.try_send(order) {
             // A thread that has ended has said why.
@@ -551,8 +530,9 @@ mod keeper_tests {
         let (_tell, told) = sync_channel(1);
         let thread = std::thread::Builder::new().name("idle".to_owned()).spawn(|| {}).unwrap();
         let keeper = Keeper { orders, told, thread };
-        assert!(keeper.write(0, vec![1]).is_ok() && keeper.write(1, vec![2]).is_ok());
-        assert!(keeper.write(2, vec![3]).unwrap_err().to_string().contains("does not keep up"));
+        let write = |offset| keeper.order(Order::Write { offset, piece: vec![1] });
+        assert!(write(0).is_ok() && write(1).is_ok());
+        assert!(write(2).unwrap_err().to_string().contains("does not keep up"));
     }
 }
 

@@ -14,15 +14,15 @@ use crate::config::Config;
 use crate::model::Model;
 use crate::model::safety::Ending;
 use crate::model::vehicle::Verdict;
-use crate::update::Msg;
+use crate::update::{Action, Msg};
 use crate::view::headline;
 use crate::view::panels::limit_rows;
 use crate::view::widgets::fixed;
 
-/// The output of a run.
-pub(super) enum Output {
-    Screen(Box<Screen>),
-    Lines(Lines),
+/// The output of a run: a full screen, or lines without one.
+pub(super) struct Output {
+    pub(super) screen: Option<Box<Screen>>,
+    pub(super) lines: Lines,
 }
 
 impl Output {
@@ -31,88 +31,59 @@ impl Output {
     /// # Errors
     /// The terminal cannot be prepared.
     pub(super) fn open(interactive: bool, config: &Config) -> anyhow::Result<Self> {
-        if interactive {
-            Screen::open(config).map(|screen| Self::Screen(Box::new(screen)))
-        } else {
-            Ok(Self::Lines(Lines::new()))
-        }
+        let screen = interactive.then(|| Screen::open(config).map(Box::new)).transpose()?;
+        Ok(Self { screen, lines: Lines::default() })
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.
     pub(super) fn reports_repeats(&self) -> bool {
-        matches!(self, Self::Screen(screen) if screen.reports_repeats())
+        self.screen.as_ref().is_some_and(|screen| screen.reports_repeats())
     }
 
     pub(super) fn redraw_at(&self) -> Option<Duration> {
-        match self {
-            Self::Screen(screen) => Some(screen.redraw_at()),
-            Self::Lines(_) => None,
-        }
+        self.screen.as_ref().map(|screen| screen.redraw_at())
     }
 
     /// The next input of the person at the terminal; waits for ever without one.
     pub(super) async fn input(&mut self) -> Msg {
-        match self {
-            Self::Screen(screen) => screen.input().await,
-            Self::Lines(_) => std::future::pending().await,
+        match &mut self.screen {
+            Some(screen) => screen.input().await,
+            None => std::future::pending().await,
         }
     }
 
     pub(super) fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        if let Self::Screen(screen) = self {
+        if let Some(screen) = &mut self.screen {
             screen.mark_message(msg, model);
         }
     }
 
     pub(super) fn mark_changed(&mut self) {
-        if let Self::Screen(screen) = self {
+        if let Some(screen) = &mut self.screen {
             screen.mark_changed();
         }
     }
 
-    pub(super) fn bell(&mut self) {
-        if let Self::Screen(screen) = self {
-            screen.bell();
+    /// Does an action that is a screen's own. Returns why nothing can be called out any more, once.
+    pub(super) fn act(&mut self, action: &Action) -> Option<VoiceEnded> {
+        let screen = self.screen.as_mut()?;
+        match action {
+            Action::Redraw => screen.clear(),
+            Action::NextTheme => screen.next_theme(),
+            Action::Bell => screen.bell(),
+            Action::Say(text) => return screen.say(text),
+            _ => {}
         }
-    }
-
-    /// Calls a text out. Returns why nothing can be called out any more, once.
-    pub(super) fn say(&mut self, text: &str) -> Option<VoiceEnded> {
-        match self {
-            Self::Screen(screen) => screen.say(text),
-            Self::Lines(_) => None,
-        }
-    }
-
-    pub(super) fn next_theme(&mut self) {
-        if let Self::Screen(screen) = self {
-            screen.next_theme();
-        }
-    }
-
-    pub(super) fn clear(&mut self) {
-        if let Self::Screen(screen) = self {
-            screen.clear();
-        }
-    }
-
-    /// Starts over with a new model.
-    pub(super) fn start_over(&mut self) {
-        match self {
-            Self::Screen(screen) => screen.mark_changed(),
-            Self::Lines(lines) => lines.start_over(),
-        }
+        None
     }
 
     /// Shows the present state; `model_now` is the same moment on the model's clock.
     pub(super) fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> anyhow::Result<()> {
-        match self {
-            Self::Screen(screen) => screen.show(model, now, model_now).context("drawing on the terminal"),
-            Self::Lines(lines) => {
-                lines.show(model);
-                Ok(())
-            }
+        match &mut self.screen {
+            Some(screen) => screen.show(model, now, model_now).context("drawing on the terminal")?,
+            None => self.lines.show(model),
         }
+        Ok(())
     }
 }
 
@@ -126,11 +97,6 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Prints every event from the first on.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Prints only new events; the earlier ones were shown on a screen.
     pub fn new_events_only(model: &Model) -> Self {
         Self { seen: model.events.total(), closed: false }
@@ -139,11 +105,6 @@ impl Lines {
     /// Prints nothing: nobody reads the output.
     pub fn closed() -> Self {
         Self { seen: 0, closed: true }
-    }
-
-    /// Starts at the first event again, because a new model has a new list of events.
-    pub fn start_over(&mut self) {
-        self.seen = 0;
     }
 
     /// Prints the new events. If nobody reads the output any more, printing stops and the flight continues.

@@ -86,7 +86,7 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
         watch(&mut player, config).await?;
     } else {
         player.seek(player.recording().length());
-        Lines::new().show(&player.model);
+        Lines::default().show(&player.model);
     }
     output::closing(&player.model, interactive, Ok(&None), player.position());
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))

@@ -462,7 +462,7 @@ impl Urgent {
         let abort = model.commands.of(CommandKind::Abort);
         Self {
             page: model.page(),
-            phase: model.vehicle.phase().map(|phase| phase.value),
+            phase: model.vehicle.phase_now(),
             armed: model.vehicle.armed().map(|armed| armed.value),
             alarms: (model.alarms.unacknowledged(), newest),
             abort: abort.map(|track| (track.acknowledged, track.observed_at.is_some())),

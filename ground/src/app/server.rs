@@ -8,7 +8,6 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::mission::MissionHash;
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
@@ -17,8 +16,8 @@ use tokio::sync::{Semaphore, broadcast, mpsc, oneshot};
 
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
 use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
-use crate::model::Model;
 use crate::model::crew::Seat;
+use crate::model::{Model, Settings};
 use crate::update::Msg;
 
 /// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood. It is most of what a station
@@ -186,22 +185,8 @@ impl Drop for Server {
 
 /// The first message to a screen.
 pub(super) fn hello(model: &Model) -> Hello {
-    let settings = &model.settings;
-    Hello {
-        version: VERSION,
-        screen: 0,
-        auto: settings.auto,
-        demonstration: settings.demonstration,
-        link_capacity_bytes_s: settings.link_capacity_bytes_s.unwrap_or(0),
-        session: settings.session,
-        system_ids: [settings.us.system_id, settings.vehicle.system_id],
-        link_name: settings.link_name.clone(),
-        log_path: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
-        tlog_path: settings.tlog_path.clone().unwrap_or_default(),
-        key_number: settings.key_owner.as_ref().map_or(0, |owner| owner.number),
-        key_owner: settings.key_owner.as_ref().map(|owner| owner.name.clone()).unwrap_or_default(),
-        mission: settings.mission.map(|MissionHash(hash)| hash),
-    }
+    let log_path = model.settings.log_path.as_deref().map(absolute);
+    Hello { version: VERSION, screen: 0, station: Settings { log_path, ..model.settings.clone() } }
 }
 
 /// An attached screen may run in another folder.
@@ -236,7 +221,7 @@ impl Shared {
     /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
-        let hello = ToScreen::Hello(Hello { screen, ..history.hello.clone() });
+        let hello = ToScreen::Hello(Box::new(Hello { screen, ..history.hello.clone() }));
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
         let past = hello.iter().chain(&history.checklist).cloned().chain(history.kept()).collect();
         (past, self.news.subscribe())
@@ -269,7 +254,7 @@ async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<Serv
         Ok(_) => {}
         // Perhaps a screen of another version, so send it our version.
         Err(_) => {
-            let ours = ToScreen::Hello(Hello { version: VERSION, ..Hello::default() });
+            let ours = ToScreen::Hello(Box::new(Hello { version: VERSION, ..Hello::default() }));
             let _ = write.write_all(&encode_to_screen(&ours, Duration::ZERO).unwrap_or_default()).await;
         }
     }
@@ -501,7 +486,7 @@ mod watchers_tests {
         let path = folder.path().join("s.sock");
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
-            let hello = Hello { version: VERSION, link_name: "a".to_owned(), ..Hello::default() };
+            let hello = Hello { version: VERSION, station: Settings::on_screen("a"), ..Hello::default() };
             let mut server = Server::open(Some(&path), hello, 1).await.unwrap();
             server.publish(&Msg::LinkUp("before".to_owned()), Duration::from_secs(1));
             let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -523,7 +508,7 @@ mod watchers_tests {
                 watcher.read_exact(&mut bytes).await.unwrap();
                 told.push(decode_to_screen(&bytes).unwrap().0);
             }
-            assert!(matches!(&told[0], ToScreen::Hello(hello) if hello.link_name == "a"));
+            assert!(matches!(&told[0], ToScreen::Hello(hello) if hello.station.link_name == "a"));
             assert_eq!(told[1], ToScreen::Msg(Msg::LinkUp("before".to_owned())));
             assert_eq!(told[2], ToScreen::Live);
             server.publish(&Msg::LinkUp("after".to_owned()), Duration::from_secs(2));

@@ -25,7 +25,7 @@ use crate::model::checklist::ChecklistEntry;
 use crate::model::crew::{Seat, role_name};
 use crate::model::place::LastPlace;
 use crate::model::{BookLine, LogHealth, Model, Settings};
-use crate::update::{Action, Msg, Request, update};
+use crate::update::{Action, Msg, update};
 
 /// How often the vehicle is told the end of the closed book, because a frame may be lost.
 const TOLD_AT_THE_END: usize = 3;
@@ -142,7 +142,7 @@ impl Station {
 
     /// Reports who can command, if that has changed.
     fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
-        let own = matches!(self.output, Output::Screen(_)).then(|| model.settings.seat.clone());
+        let own = self.output.screen.is_some().then(|| model.settings.seat.clone());
         let attached = self.screens.iter().filter(|(_, watch)| !watch).map(|(seat, _)| seat.clone());
         let seats: Vec<Seat> = own.into_iter().chain(attached).collect();
         if seats != model.crew.seats() {
@@ -167,12 +167,12 @@ impl Station {
     /// Whether the station keeps running without its screen: yes with a real vehicle, no for a demonstration on a
     /// terminal.
     fn outlives_its_screen(&self) -> bool {
-        self.demo.is_none() || (self.server.is_some() && matches!(self.output, Output::Lines(_)))
+        self.demo.is_none() || (self.server.is_some() && self.output.screen.is_none())
     }
 
     /// Continues without the full screen, and serves attached screens from now on.
     async fn lose_screen(&mut self, lines: Lines, model: &Model) {
-        self.output = Output::Lines(lines);
+        self.output = Output { screen: None, lines };
         if self.quiet_input.is_none() {
             self.quiet_input = screen::quiet_input();
         }
@@ -194,22 +194,7 @@ impl Station {
                 self.screens.retain(|(seat, _)| seat.screen != number);
                 Vec::new()
             }
-            ServerEvent::FromScreen(by, ToStation::Request(Request::Command(kind))) => {
-                vec![Msg::Requested { kind, by }]
-            }
-            ServerEvent::FromScreen(_, ToStation::Request(Request::Acknowledge(kind))) => {
-                vec![Msg::AlarmAcknowledged(kind)]
-            }
-            ServerEvent::FromScreen(by, ToStation::Request(Request::Sign { step, void })) => {
-                vec![Msg::SignAsked { step: step.into(), void, by }]
-            }
-            ServerEvent::FromScreen(_, ToStation::Request(Request::Report)) => vec![Msg::ReportWanted],
-            ServerEvent::FromScreen(_, ToStation::Request(Request::Download)) => vec![Msg::DownloadWanted],
-            ServerEvent::FromScreen(by, ToStation::Request(Request::RangeTest)) => vec![Msg::RangeTest(by)],
-            ServerEvent::FromScreen(by, ToStation::Request(Request::WithoutLog)) => vec![Msg::WithoutLog(by)],
-            ServerEvent::FromScreen(_, ToStation::Request(Request::Parameters)) => {
-                vec![Msg::ParametersWanted]
-            }
+            ServerEvent::FromScreen(by, ToStation::Request(request)) => vec![Msg::Asked { request, by }],
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
                 Vec::new()
@@ -308,11 +293,8 @@ impl Station {
                         recorder.sync_soon();
                     }
                 }
-                Action::Redraw => self.output.clear(),
-                Action::NextTheme => self.output.next_theme(),
-                Action::Bell => self.output.bell(),
-                Action::Say(text) => {
-                    if let Some(ended) = self.output.say(&text) {
+                Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
+                    if let Some(ended) = self.output.act(&action) {
                         model.warn(now, ended.to_string());
                     }
                 }
@@ -326,15 +308,8 @@ impl Station {
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(request) => {
-                    let by = model.settings.seat.clone();
-                    let msg = match request {
-                        Request::Command(kind) => Some(Msg::Requested { kind, by }),
-                        Request::RangeTest => Some(Msg::RangeTest(by)),
-                        Request::WithoutLog => Some(Msg::WithoutLog(by)),
-                        _ => None,
-                    };
-                    if let Some((server, msg)) = self.server.as_mut().zip(msg) {
-                        server.publish(&msg, now);
+                    if let Some(server) = &mut self.server {
+                        server.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
                     }
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),
@@ -352,11 +327,7 @@ impl Station {
             self.output.mark_changed();
         }
         for action in actions {
-            match action {
-                Action::Redraw => self.output.clear(),
-                Action::NextTheme => self.output.next_theme(),
-                _ => {}
-            }
+            self.output.act(&action);
         }
         rest.into_iter().collect()
     }
@@ -531,12 +502,11 @@ impl Station {
     }
 
     /// Restores the terminal first, because the rest may take a while.
-    pub(super) async fn close(self, model: &Model) {
+    pub(super) async fn close(mut self, model: &Model) {
         // Lets the socket send its last answers.
         tokio::task::yield_now().await;
-        match self.output {
-            Output::Screen(screen) => drop(screen),
-            Output::Lines(mut lines) => lines.show(model),
+        if self.output.screen.take().is_none() {
+            self.output.lines.show(model);
         }
         if let Some(download) = self.download {
             download.stop();

@@ -36,7 +36,7 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
     };
     let heard = vehicle.heartbeat.is_some();
     let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
-    let armed = vehicle.armed().is_some_and(|armed| armed.value);
+    let armed = vehicle.is_armed();
     let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
     let own = model.crew.seats().iter().find(|seat| **seat == settings.seat).map(Seat::to_string);
     let attached =

@@ -283,11 +283,12 @@ impl Wire {
 
     fn hand_over(&mut self, number: usize, frame: &Frame, bytes: Vec<u8>, to: Option<Origin>) {
         let count = bytes.len();
-        self.record(Direction::Tx, &self.open[number].name, frame);
+        // What finds no room in the queue has not been sent.
         if self.open[number].sender.send_to(bytes, to) {
+            self.record(Direction::Tx, &self.open[number].name, frame);
             self.hub.on_sent(number, count, self.clock.now());
+            self.sent_bytes += count;
         }
-        self.sent_bytes += count;
     }
 
     /// Reports the state of each link. Also saves signing timestamps now and then.
@@ -354,5 +355,47 @@ fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
         capacity_bytes_s: open.transport.address().capacity_bytes_s(),
         copies: link.copies(),
         trouble: link.trouble().map(str::to_owned),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::dialect::HEARTBEAT_DATA;
+    use protocol::identity::{GROUND, VEHICLE};
+    use protocol::log::reader::{LogItem, LogReader};
+    use protocol::log::writer::LogHeader;
+
+    /// More frames than the queue has room for, before anything can leave it.
+    #[test]
+    fn a_frame_that_the_queue_does_not_take_is_not_recorded_as_sent() {
+        const FRAMES: u64 = 3_000;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sent.mcap");
+        let recorder = Recorder::create(&path, &LogHeader::default()).unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let (mut told_drops, mut told_bytes) = (0, 0);
+        runtime.block_on(async {
+            let clock = Clock::start();
+            let link = vec![LinkAddress::UdpOut("127.0.0.1:9".to_owned())];
+            let (log, time) = (Some(recorder.clone()), LogTime::Run(clock));
+            let mut wire = Wire::open((GROUND, VEHICLE), link, None, clock, log, time).await.unwrap();
+            for _ in 0..FRAMES {
+                let sent = wire.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()), 0);
+                let Msg::Sent { bytes, drops } = sent else { panic!("{sent:?}") };
+                (told_drops, told_bytes) = (drops, told_bytes + bytes);
+            }
+        });
+        assert_eq!(recorder.dropped(), 0);
+        recorder.finish().unwrap();
+        let mut reader = LogReader::new(std::fs::File::open(&path).unwrap());
+        let (mut recorded, mut bytes) = (0, 0);
+        while let Some(item) = reader.next_item().unwrap() {
+            if let LogItem::Message { data, .. } = item {
+                (recorded, bytes) = (recorded + 1, bytes + data.len());
+            }
+        }
+        assert!(told_drops > 0 && recorded > 0, "{told_drops} dropped, {recorded} recorded");
+        assert_eq!((recorded + told_drops, bytes), (FRAMES, told_bytes));
     }
 }

@@ -7,48 +7,33 @@
 pub mod codec;
 pub mod socket;
 
-use crate::model::Request;
+use serde::{Deserialize, Serialize};
+
+use crate::model::{Request, Settings};
 use crate::update::Msg;
 
 // What a station and its screens say to each other.
 
 /// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 9;
+pub const VERSION: u32 = 10;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
 /// What the station is; the first message to a screen.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
+    /// It stands before the rest: a program of another version reads it too.
+    #[serde(skip)]
     pub version: u32,
     /// The number that the station has given to this screen.
     pub screen: u32,
-    /// Whether the automatic mode is on.
-    pub auto: bool,
-    /// Whether the vehicle is simulated in the station's process.
-    pub demonstration: bool,
-    /// The capacity of the link, bytes per second; 0 if no bound is known.
-    pub link_capacity_bytes_s: u32,
-    /// System ids of the station and of its vehicle.
-    pub system_ids: [u8; 2],
-    /// The session of the station.
-    pub session: u32,
-    pub link_name: String,
-    /// Empty without a log.
-    pub log_path: String,
-    /// Empty without a telemetry log.
-    pub tlog_path: String,
-    /// The number and the owner of the operator's key that the station signs with; 0 without one.
-    pub key_number: u8,
-    pub key_owner: String,
-    /// The hash of the mission that the station knows.
-    pub mission: Option<[u8; 8]>,
+    /// The settings of the station, without what is its own screen's.
+    pub station: Settings,
 }
 
 /// What a station sends to its screens.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ToScreen {
-    Hello(Hello),
     /// The end of the history; everything after it is live.
     Live,
     /// A message that the station has taken into its model.
@@ -61,10 +46,13 @@ pub enum ToScreen {
         /// The reason, or where the log is.
         words: String,
     },
+    // Encoded apart, with its version before it. Last, because the others are numbered without it.
+    #[serde(skip)]
+    Hello(Box<Hello>),
 }
 
 /// The status of a station, for `ground status` and for finding it.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StationStatus {
     pub pid: u32,
     pub link: String,
@@ -82,7 +70,7 @@ pub struct StationStatus {
 }
 
 /// What a screen, or a command without a screen, sends to a station.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToStation {
     /// The first message of a screen; with `watch` it is the only one.
     Hello { watch: bool, operator: String },

@@ -164,7 +164,7 @@ fn flown_here(model: &Model) -> bool {
 
 /// Whether the vehicle is down and nothing is at risk: it may have a log to offer.
 fn is_down(model: &Model) -> bool {
-    let phase = model.vehicle.phase().map(|phase| phase.value);
+    let phase = model.vehicle.phase_now();
     !model.is_at_risk() && matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED))
 }
 
@@ -176,7 +176,7 @@ impl Act {
         match self {
             Self::Arm => acts && command::why_not_arm(model, now).is_none(),
             Self::Start => acts && command::why_not_start(model, now).is_none(),
-            Self::Disarm => acts && model.vehicle.armed().is_some_and(|armed| armed.value),
+            Self::Disarm => acts && model.vehicle.is_armed(),
             Self::HoldCountdown => {
                 commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
             }

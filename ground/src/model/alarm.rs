@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
+use clap::ValueEnum;
 use protocol::dialect::TdPhase;
+use serde::{Deserialize, Serialize};
 
 use super::command::CommandKind;
 use super::safety::Ending;
@@ -11,7 +13,7 @@ use super::safety::Ending;
 pub const RING_EVERY: Duration = Duration::from_secs(4);
 
 /// What an alarm is about. There is at most one alarm of each kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlarmKind {
     LinkLost,
     /// The vehicle does not hear this station.
@@ -63,37 +65,6 @@ pub enum AlarmKind {
 }
 
 impl AlarmKind {
-    /// The alarms that a station tells its screens about.
-    pub fn all() -> impl Iterator<Item = Self> {
-        let of_commands = [Self::Disagreement, Self::Unanswered, Self::Refused]
-            .into_iter()
-            .flat_map(|kind| CommandKind::ALL.map(kind));
-        let others = [
-            Self::LinkLost,
-            Self::UplinkLost,
-            Self::LinkDown,
-            Self::Aborted,
-            Self::NoLight,
-            Self::Degraded,
-            Self::DeadlineMissed,
-            Self::PlanOutside,
-            Self::NotLanded,
-            Self::Rebooted,
-            Self::Log,
-            Self::LiveMotor,
-            Self::Held,
-            Self::Battery,
-            Self::VehicleLog,
-            Self::CheckFailed,
-            Self::TwoVehicles,
-            Self::SameId,
-            Self::Foreign,
-            Self::MayBeFlying,
-            Self::Signatures,
-        ];
-        others.into_iter().chain(of_commands)
-    }
-
     /// What hides what: an abort that does not work, then whether this screen and its vehicle are what they seem, then
     /// the vehicle, then everything else.
     fn urgency(self) -> u8 {
@@ -274,15 +245,17 @@ impl Alarms {
 // What has been called out to the crew so far, how much is called out, and the bells that are still to ring.
 
 /// How much is called out.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum Amount {
+    /// Neither voice nor bells, except those of alarms
     Nothing,
-    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, whether people may approach, NO-GO, link lost.
+    /// Liftoff, apogee, ignition, touchdown, verdict, parachute, NO-GO and a lost link
     Few,
-    /// Also every phase and every 50 m.
+    /// Also phases and every 50 m
     #[default]
     Normal,
-    /// Also every 10 m below 50 m.
+    /// Also every 10 m below 50 m
     All,
 }
 

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use protocol::dialect::TdRole;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::quantity::Quantity;
@@ -20,7 +20,7 @@ pub const STEPS_MAX: usize = 40;
 pub const WORDS_MAX: usize = 60;
 
 /// The steps of one mission and how far they are done.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checklist {
     pub name: String,
     /// The name of the only mission that it is for, as the vehicle tells it; `None` for any.
@@ -30,11 +30,12 @@ pub struct Checklist {
     pub steps: Vec<Step>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// What is to be done or seen.
     pub words: String,
     /// The role that signs; `None` for anybody who may command.
+    #[serde(with = "role_words")]
     pub role: Option<TdRole>,
     /// A value of the vehicle that must keep its limits, when the step is signed and as long as it counts.
     pub value: Option<Limits>,
@@ -42,8 +43,9 @@ pub struct Step {
 }
 
 /// A value that the vehicle sends, and what it must keep.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
+    #[serde(with = "quantity_name")]
     pub quantity: &'static Quantity,
     pub least: Option<f64>,
     pub most: Option<f64>,
@@ -67,7 +69,7 @@ impl Limits {
 }
 
 /// What has become of a step.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub enum Mark {
     #[default]
     Open,
@@ -77,10 +79,11 @@ pub enum Mark {
 }
 
 /// Who signed or voided a step, and when.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Signature {
     pub by: String,
     /// The signer's role in the crew; `None` without a crew.
+    #[serde(with = "role_words")]
     pub role: Option<TdRole>,
     /// Seconds since 1970, UTC.
     pub unix_s: u64,
@@ -98,6 +101,41 @@ pub enum StepState {
     Outside,
     /// Signed, but the value is no longer received.
     Unknown,
+}
+
+/// A quantity for a screen: its name.
+mod quantity_name {
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    use super::Quantity;
+
+    pub(super) fn serialize<S: Serializer>(quantity: &Quantity, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(quantity.name)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<&'static Quantity, D::Error> {
+        let name = <&str>::deserialize(from)?;
+        Quantity::named(name).ok_or_else(|| de::Error::custom("an unknown value"))
+    }
+}
+
+/// A role for a screen: its word in the crew file; empty without one.
+mod role_words {
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    use super::{TdRole, role_of, role_word};
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives the field itself")]
+    pub(super) fn serialize<S: Serializer>(role: &Option<TdRole>, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(role.map_or("", role_word))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<TdRole>, D::Error> {
+        match <&str>::deserialize(from)? {
+            "" => Ok(None),
+            word => role_of(word).map(Some).ok_or_else(|| de::Error::custom("an unknown role")),
+        }
+    }
 }
 
 /// A change of a checklist, for the file that keeps it.
@@ -214,10 +252,10 @@ impl Model {
     /// # Errors
     /// The reason.
     pub fn may_sign(&self, by: &str) -> Result<Option<TdRole>, String> {
-        if self.vehicle.armed().is_some_and(|armed| armed.value) {
+        if self.vehicle.is_armed() {
             return Err("the vehicle is armed: disarm first".to_owned());
         }
-        if self.vehicle.phase().is_some_and(|phase| is_flight(phase.value)) {
+        if self.vehicle.phase_now().is_some_and(is_flight) {
             return Err("the vehicle is in flight".to_owned());
         }
         if self.settings.crew_roles.is_empty() {

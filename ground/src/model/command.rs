@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::command::{CommandSender, Resend, Ticket};
 use protocol::dialect::{MavCmd, MavResult, TdAct, TdInterlock, TdPhase};
 use protocol::identity::Address;
+use serde::{Deserialize, Serialize};
 
 use super::crew::{Ask, Seat};
 use super::identity::GONE_AFTER;
@@ -16,7 +17,7 @@ use super::{Model, Settings, words};
 pub const OBSERVE_WITHIN: Duration = Duration::from_millis(2_500);
 
 /// A command that the crew can give.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CommandKind {
     Arm,
     Disarm,
@@ -278,6 +279,12 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         .then(|| format!("{same} {system_id}/{component_id}: give one another --sysid"))
 }
 
+/// Why no command reaches the vehicle that is meant.
+fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
+    let unheard = (!model.link.state(now).carries()).then(|| "the vehicle is not heard".to_owned());
+    unheard.or_else(|| why_nothing_moves(model, now))
+}
+
 /// Why this seat does not act with the station's key. A hold and an abort are anybody's.
 pub fn why_not_seat(model: &Model, by: &Seat) -> Option<String> {
     let owner = model.settings.key_owner.as_ref()?;
@@ -296,13 +303,10 @@ pub fn why_not_here(model: &Model) -> Option<String> {
 
 /// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if let Some(why) = why_nothing_moves(model, now) {
+    if let Some(why) = why_not_reached(model, now) {
         return Some(why);
     }
-    if model.vehicle.armed().is_some_and(|armed| armed.value) {
+    if model.vehicle.is_armed() {
         return Some("armed already".to_owned());
     }
     if !model.link.uplink.is_proven(now) {
@@ -313,7 +317,7 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     if why.is_some() {
         return why;
     }
-    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
+    let Some(phase) = model.vehicle.phase_now() else {
         return Some("the phase is unknown".to_owned());
     };
     // Last: it is the only reason that the crew can overrule.
@@ -327,19 +331,16 @@ pub fn is_only_the_log(model: &Model, why: &str, now: Duration) -> bool {
 
 /// Why the ground does not command to start the countdown.
 pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if let Some(why) = why_nothing_moves(model, now) {
+    if let Some(why) = why_not_reached(model, now) {
         return Some(why);
     }
-    if !model.vehicle.armed().is_some_and(|armed| armed.value) {
+    if !model.vehicle.is_armed() {
         return Some("not armed".to_owned());
     }
     if let Some(why) = why_no_key(model) {
         return Some(why);
     }
-    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else {
+    let Some(phase) = model.vehicle.phase_now() else {
         return Some("the phase is unknown".to_owned());
     };
     if phase != TdPhase::TD_PHASE_PAD_ARMED {
@@ -362,19 +363,16 @@ pub fn why_not_confirm(model: &Model, ask: &Ask, now: Duration) -> Option<String
 
 /// Why the ground asks for no check of the vehicle, and tests no radio.
 pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if let Some(why) = why_nothing_moves(model, now) {
+    if let Some(why) = why_not_reached(model, now) {
         return Some(why);
     }
-    if model.vehicle.armed().is_some_and(|armed| armed.value) {
+    if model.vehicle.is_armed() {
         return Some("armed: disarm first".to_owned());
     }
     if let Some(why) = why_no_key(model) {
         return Some(why);
     }
-    let phase = model.vehicle.phase().map(|phase| phase.value);
+    let phase = model.vehicle.phase_now();
     match phase {
         None => Some("the phase is unknown".to_owned()),
         Some(phase) => (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase))),
@@ -383,13 +381,10 @@ pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
 
 /// Why the ground does not take command.
 pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
-    if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
-    }
-    if let Some(why) = why_nothing_moves(model, now) {
+    if let Some(why) = why_not_reached(model, now) {
         return Some(why);
     }
-    if !model.vehicle.armed().is_some_and(|armed| armed.value) {
+    if !model.vehicle.is_armed() {
         return Some("not armed".to_owned());
     }
     if model.link.uplink.armed_by_us {

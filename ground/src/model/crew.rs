@@ -4,6 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdRole};
+use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::command::why_not_seat;
@@ -65,7 +66,7 @@ impl Crew {
 // A seat: a screen of the station and the operator who sits at it.
 
 /// An operator at a screen. The station numbers its screens from 1.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seat {
     /// The screen's number; 0 for none.
     pub screen: u32,
@@ -106,7 +107,7 @@ impl fmt::Display for Seat {
 const TOLD_FOR: Duration = Duration::from_secs(3);
 
 /// The operator whose key signs what a station sends.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyOwner {
     /// The number of the key, 1 to 15.
     pub number: u8,

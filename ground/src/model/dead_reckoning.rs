@@ -25,7 +25,7 @@ const STEERED_ERROR_M_S2: f64 = 2.0;
 const OPENING_ERROR_M_S2: f64 = 5.0;
 /// The same while a boost motor of unknown thrust burns.
 const LIFTED_ERROR_M_S2: f64 = 20.0;
-/// In space, surplus thrust of a burn is directed sideways, in an unknown direction: at most this acceleration, m/s2,
+/// Surplus thrust of a burn is directed sideways, in an unknown direction: at most this acceleration, m/s2,
 /// for this time, s. The resulting speed is kept.
 const SWERVE_M_S2: f64 = 6.0;
 const SWERVE_S: f64 = 1.0;
@@ -70,7 +70,7 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     let down_after_s = expected.landed_after_s.map(|landed_s| (1.0 + LATE_SHARE) * landed_s + LATE_S);
     let growing_s = down_after_s.map_or(seconds, |down_s| seconds.min(down_s));
     let wrong_m_s2 = acceleration_error_m_s2(vehicle, phase, expected.basis);
-    let swerved_m = if vehicle.in_space { swerve_m(expected.burning_s) } else { 0.0 };
+    let swerved_m = swerve_m(expected.burning_s);
     let grown_m = SPEED_ERROR_M_S * growing_s + 0.5 * wrong_m_s2 * growing_s * growing_s + swerved_m;
     Some(PredictedPosition {
         x_m: expected.x_m,

@@ -132,7 +132,7 @@ impl Trace {
 
 /// Adds a row with the present values, if one is due.
 pub(crate) fn note_trace(model: &mut Model, now: Duration) {
-    let in_flight = model.vehicle.phase().is_some_and(|phase| is_flight(phase.value));
+    let in_flight = model.vehicle.phase_now().is_some_and(is_flight);
     if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
         return;
     }

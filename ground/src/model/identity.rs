@@ -357,76 +357,18 @@ fn turns_rotors(mavtype: MavType) -> bool {
 /// <https://ardupilot.org/copter/docs/parameters.html#fltmode1>, and the same pages for plane and rover. Only what people
 /// fly: other modes are shown by number.
 fn ardupilot_mode(mavtype: MavType, number: u32) -> Option<&'static str> {
-    let copter = [
-        "STABILIZE",
-        "ACRO",
-        "ALT_HOLD",
-        "AUTO",
-        "GUIDED",
-        "LOITER",
-        "RTL",
-        "CIRCLE",
-        "",
-        "LAND",
-        "",
-        "DRIFT",
-        "",
-        "SPORT",
-        "FLIP",
-        "AUTOTUNE",
-        "POSHOLD",
-        "BRAKE",
-        "THROW",
-        "AVOID_ADSB",
-        "GUIDED_NOGPS",
-        "SMART_RTL",
-    ];
-    let plane = [
-        "MANUAL",
-        "CIRCLE",
-        "STABILIZE",
-        "TRAINING",
-        "ACRO",
-        "FBWA",
-        "FBWB",
-        "CRUISE",
-        "AUTOTUNE",
-        "",
-        "AUTO",
-        "RTL",
-        "LOITER",
-        "TAKEOFF",
-        "AVOID_ADSB",
-        "GUIDED",
-        "",
-        "QSTABILIZE",
-        "QHOVER",
-        "QLOITER",
-        "QLAND",
-        "QRTL",
-    ];
-    let rover = [
-        "MANUAL",
-        "ACRO",
-        "",
-        "STEERING",
-        "HOLD",
-        "LOITER",
-        "FOLLOW",
-        "SIMPLE",
-        "",
-        "",
-        "AUTO",
-        "RTL",
-        "SMART_RTL",
-    ];
-    let table: &[&str] = match mavtype {
-        MavType::MAV_TYPE_FIXED_WING => &plane,
-        MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => &rover,
-        _ if turns_rotors(mavtype) => &copter,
-        _ => &[],
+    let copter = "STABILIZE ACRO ALT_HOLD AUTO GUIDED LOITER RTL CIRCLE - LAND - DRIFT - SPORT FLIP \
+        AUTOTUNE POSHOLD BRAKE THROW AVOID_ADSB GUIDED_NOGPS SMART_RTL";
+    let plane = "MANUAL CIRCLE STABILIZE TRAINING ACRO FBWA FBWB CRUISE AUTOTUNE - AUTO RTL LOITER TAKEOFF \
+        AVOID_ADSB GUIDED - QSTABILIZE QHOVER QLOITER QLAND QRTL";
+    let rover = "MANUAL ACRO - STEERING HOLD LOITER FOLLOW SIMPLE - - AUTO RTL SMART_RTL";
+    let table = match mavtype {
+        MavType::MAV_TYPE_FIXED_WING => plane,
+        MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => rover,
+        _ if turns_rotors(mavtype) => copter,
+        _ => return None,
     };
-    table.get(usize::try_from(number).ok()?).copied().filter(|name| !name.is_empty())
+    table.split_whitespace().nth(usize::try_from(number).ok()?).filter(|name| *name != "-")
 }
 
 /// PX4 packs a main mode into the third byte and a sub-mode into the fourth (`px4_custom_mode.h`).

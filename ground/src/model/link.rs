@@ -8,6 +8,7 @@ use protocol::frame::FramerCounters;
 use protocol::identity::Address;
 use protocol::link_stats::{ContentAge, LinkFigures, LinkStats, SourceFigures};
 use protocol::signing::SigningCounters;
+use serde::{Deserialize, Serialize};
 
 use super::identity::time_boot_ms;
 use super::{Model, Role};
@@ -23,7 +24,7 @@ const SAME_ID_FOR: Duration = Duration::from_secs(10);
 const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
 
 /// The state of one of several links.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkReport {
     /// The name, as in `udpin:0.0.0.0:14550`.
     pub name: String,

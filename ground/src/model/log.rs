@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use protocol::book::{SignedHead, shown};
 use protocol::log::record::EventLevel;
+use serde::{Deserialize, Serialize};
 
 use super::Model;
 
@@ -20,7 +21,7 @@ const WARNED_TIMES: u32 = 4;
 const LOSES_FOR: Duration = Duration::from_secs(30);
 
 /// The state of the log writer.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogHealth {
     /// Records dropped because the queue was full.
     pub dropped: u64,
@@ -30,7 +31,7 @@ pub struct LogHealth {
 }
 
 /// The space for the log.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogSpace {
     pub free_bytes: u64,
     /// How fast the log grows at present, bytes per second.

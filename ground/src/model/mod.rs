@@ -33,6 +33,7 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1::OperatorAction;
 use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
+use serde::{Deserialize, Serialize};
 
 use act::Bindings;
 use alarm::{Alarm, AlarmKind, Alarms, Called, Talk};
@@ -52,13 +53,16 @@ use safety::Danger;
 use vehicle::{Parameters, Vehicle};
 
 /// The settings of a run, which do not change during it.
-#[derive(Debug, Clone)]
+///
+/// An attached screen is told those of its station, except for those that are a screen's own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The name of the link, as in `udpin:0.0.0.0:14550`.
     pub link_name: String,
     /// The capacity of the link, bytes per second; `None` if no bound is known.
     pub link_capacity_bytes_s: Option<u32>,
     /// The name of the profile that flies, if it is known beforehand.
+    #[serde(skip)]
     pub vehicle_name: Option<String>,
     /// `None` without a log.
     pub log_path: Option<String>,
@@ -71,39 +75,48 @@ pub struct Settings {
     pub session: u32,
     /// The vehicle's MAVLink address. No other system on the link is shown or commanded.
     pub vehicle: Address,
+    #[serde(skip)]
     pub role: Role,
     /// This screen and its operator.
+    #[serde(skip)]
     pub seat: Seat,
     /// The operator whose key signs what the station sends; `None` without a crew, and for an observer.
     pub key_owner: Option<KeyOwner>,
     /// The mission that the vehicle should fly, if the station knows it.
     pub mission: Option<MissionHash>,
     /// The people of the crew file by name, with their roles; empty without one.
+    #[serde(skip)]
     pub crew_roles: Vec<(String, TdRole)>,
     /// Where the pad is on the Earth, and where the station is; `None` if nobody has said it.
+    #[serde(skip)]
     pub pad: Option<Degrees>,
+    #[serde(skip)]
     pub here: Option<Degrees>,
     /// When the run started: seconds since 1970, UTC.
+    #[serde(skip)]
     pub start_unix_s: u64,
     /// Whether the vehicle is simulated in the station's own process.
     pub demonstration: bool,
     /// Whether the automatic mode arms and starts.
     pub auto: bool,
     /// Whether a person watches a screen; then the end of the flight does not end the program.
+    #[serde(skip)]
     pub interactive: bool,
     /// Which key does what.
+    #[serde(skip)]
     pub keys: Bindings,
     /// What is called out, and how.
+    #[serde(skip)]
     pub talk: Talk,
     /// Without a screen: give up if the flight has not ended after this time.
+    #[serde(skip)]
     pub time_limit: Option<Duration>,
 }
 
-impl Settings {
-    /// A station with a person at its screen, without a log or a time limit, on a link of unknown capacity.
-    pub fn on_screen(link_name: impl Into<String>) -> Self {
+impl Default for Settings {
+    fn default() -> Self {
         Self {
-            link_name: link_name.into(),
+            link_name: String::new(),
             link_capacity_bytes_s: None,
             vehicle_name: None,
             log_path: None,
@@ -126,6 +139,13 @@ impl Settings {
             talk: Talk::default(),
             time_limit: None,
         }
+    }
+}
+
+impl Settings {
+    /// A station with a person at its screen, without a log or a time limit, on a link of unknown capacity.
+    pub fn on_screen(link_name: impl Into<String>) -> Self {
+        Self { link_name: link_name.into(), ..Self::default() }
     }
 }
 
@@ -177,14 +197,15 @@ pub(crate) struct Due {
 }
 
 /// Everything that the ground knows.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Model {
     pub settings: Settings,
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
     pub link: Link,
     pub commands: Commands,
-    pub dialog: Dialog,
+    /// The open dialog, if any.
+    pub dialog: Option<Dialog>,
     /// What is left of a typed word that is no longer wanted.
     pub rest_of_word: Option<RestOfWord>,
     pub abort_chord: AbortChord,
@@ -246,46 +267,7 @@ impl Model {
     pub fn new(settings: Settings) -> Self {
         let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
         let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
-        Self {
-            settings,
-            vehicle: Vehicle::default(),
-            link: Link::default(),
-            commands: Commands::default(),
-            dialog: Dialog::Closed,
-            rest_of_word: None,
-            abort_chord: AbortChord::default(),
-            key_timing: KeyTiming::default(),
-            crew: Crew::default(),
-            repeats_reported: false,
-            events: Events::default(),
-            outcome: FlightSoFar::default(),
-            log: LogHealth::default(),
-            log_loses_at: None,
-            without_log: None,
-            alarms,
-            pages: Pages::default(),
-            history: History::default(),
-            parameters: Parameters::default(),
-            recall: Recall::default(),
-            look_back: None,
-            checklist: None,
-            sign_refused: None,
-            place: None,
-            place_due: None,
-            range_test: None,
-            check_entered: None,
-            book: BookState::default(),
-            approach_told: (None, None),
-            called: Called::default(),
-            playing: None,
-            rebooted_at: None,
-            texts: Reassembler::new(),
-            due: Due::default(),
-            auto_step: AutoStep::default(),
-            asked_to_confirm: false,
-            quit_at: None,
-            outbox: Vec::new(),
-        }
+        Self { settings, alarms, ..Self::default() }
     }
 
     /// The history has been received. Alarms that still hold ring from now on; ended ones do not.
@@ -295,7 +277,7 @@ impl Model {
 
     /// Whether the vehicle is armed, in flight or being aborted, so that quitting must be confirmed.
     pub fn is_at_risk(&self) -> bool {
-        let armed = self.vehicle.armed().is_some_and(|armed| armed.value);
+        let armed = self.vehicle.is_armed();
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
     }
 
@@ -307,7 +289,7 @@ impl Model {
 
     /// The page to show.
     pub fn page(&self) -> Page {
-        self.pages.shown(self.vehicle.phase().map(|phase| phase.value))
+        self.pages.shown(self.vehicle.phase_now())
     }
 
     /// The model as the pages show it while the crew looks back, and its time; `None` while the screen is live. It has
@@ -393,7 +375,7 @@ impl Model {
 // What the model asks of the run loop: messages to send, records to write, requests to the station.
 
 /// What a screen in another process asks its station to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
     /// The crew has completed every step of this command: send it.
     Command(CommandKind),

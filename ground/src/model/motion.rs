@@ -1,8 +1,5 @@
 //! Position, velocity and attitude of the vehicle, converted from north-east-down on the wire to north, east and up;
 //! their trend and the path flown.
-//!
-//! A planar vehicle flies in the plane of north and up and has no east component. Whether a vehicle [has left the
-//! plane](Motion::leaves_the_plane) decides how a screen labels the values, never how they are computed.
 
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
@@ -28,8 +25,6 @@ pub struct Attitude {
     pub yaw_rate_rad_s: f64,
     /// The body axes: x towards the nose, y, z.
     pub axes: [NorthEastUp; 3],
-    /// Whether it leans or turns out of the plane of north and up.
-    leaves_the_plane: bool,
 }
 
 /// Position and velocity.
@@ -54,7 +49,7 @@ pub struct Motion {
 pub struct BodySpeed {
     /// Axial, towards the nose.
     pub u_m_s: f64,
-    /// Lateral, along the body y axis; zero for a planar vehicle.
+    /// Lateral, along the body y axis.
     pub v_m_s: f64,
     /// Lateral, along the body z axis.
     pub w_m_s: f64,
@@ -82,9 +77,6 @@ impl Attitude {
             pitch_rate_rad_s: f64::from(data.pitchspeed),
             yaw_rate_rad_s: f64::from(data.yawspeed),
             axes: [nose, body_y, body_z],
-            leaves_the_plane: [data.q2, data.q4, data.rollspeed, data.yawspeed]
-                .iter()
-                .any(|part| *part != 0.0),
         })
     }
 
@@ -96,11 +88,6 @@ impl Attitude {
     /// Elevation of the nose above the horizontal, rad; pi/2 is upright.
     pub fn elevation_rad(&self) -> f64 {
         FRAC_PI_2 - self.tilt_rad
-    }
-
-    /// Whether it leans or turns out of the plane of north and up.
-    pub fn leaves_the_plane(&self) -> bool {
-        self.leaves_the_plane
     }
 }
 
@@ -134,11 +121,6 @@ impl Motion {
 
     pub fn speed_m_s(&self) -> f64 {
         libm::hypot(self.horizontal_m_s(), self.climb_m_s)
-    }
-
-    /// Whether it is outside the plane of north and up, or moves out of it.
-    pub fn leaves_the_plane(&self) -> bool {
-        self.y_m != 0.0 || self.vy_m_s != 0.0
     }
 }
 
@@ -301,7 +283,6 @@ mod motion_tests {
         close(north, 0.0);
         close(east, libm::sin(10.0_f64.to_radians()));
         close(up, libm::cos(10.0_f64.to_radians()));
-        assert!(leaning.leaves_the_plane());
         // Falling straight down, it moves along its axis and, across it, along its y axis.
         let falling = Motion { vx_m_s: 0.0, vy_m_s: 0.0, climb_m_s: -10.0, ..Motion::vertical(0.0, 0.0) };
         let speed = BodySpeed::of(&leaning, &falling);
@@ -325,8 +306,6 @@ mod motion_tests {
         close(motion.distance_m(), 5.0);
         close(motion.speed_m_s(), 3.0);
         close(motion.horizontal_m_s(), 2.236_068);
-        assert!(motion.leaves_the_plane());
-        assert!(!Motion { y_m: 0.0, vy_m_s: 0.0, ..motion }.leaves_the_plane());
     }
 
     proptest! {

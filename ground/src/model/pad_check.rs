@@ -55,39 +55,23 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
     }
 }
 
-/// One value, in the unit of its item; no limit is NaN.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CheckedValue {
-    pub item: TdPadCheckItem,
-    pub value: f64,
-    pub least: f64,
-    pub most: f64,
-    pub verdict: TdPadCheckVerdict,
-}
-
+/// A check, as far as its messages have arrived.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PadCheck {
-    /// Its number since the vehicle's power-up.
-    pub run: u16,
-    pub state: TdPadCheckState,
-    /// How much is done, percent.
-    pub progress: u8,
-    /// How many values the vehicle has found; not all of them may have arrived.
-    pub found: u8,
-    /// The key of whoever asked for it; 0 without operators.
-    pub asked_by: u8,
+    /// What the vehicle last told of it. Its own value may be one that is in [`Self::values`] too.
+    pub told: TD_PAD_CHECK_DATA,
     /// When the vehicle last told of it.
     pub told_at: Duration,
     /// When the vehicle was first heard to say that it is over, after it was heard to run.
     pub ended_at: Option<Duration>,
-    /// Those that have arrived, by their place.
-    values: BTreeMap<u8, CheckedValue>,
+    /// The values that have arrived, by their place. No limit is NaN.
+    values: BTreeMap<u8, TD_PAD_CHECK_DATA>,
 }
 
 impl PadCheck {
     /// This check with what the vehicle tells now. Another number is another check.
     pub(crate) fn with(before: Option<Self>, told: &TD_PAD_CHECK_DATA, now: Duration) -> Self {
-        let before = before.filter(|before| before.run == told.run);
+        let before = before.filter(|before| before.told.run == told.run);
         let runs = told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING;
         let ended_at = match &before {
             Some(before) if before.is_running() && !runs => Some(now),
@@ -96,95 +80,78 @@ impl PadCheck {
         };
         let mut values = before.map_or_else(BTreeMap::new, |before| before.values);
         if told.place < told.found {
-            let value = CheckedValue {
-                item: told.item,
-                value: told.value.into(),
-                least: told.least.into(),
-                most: told.most.into(),
-                verdict: told.verdict,
-            };
-            values.insert(told.place, value);
+            values.insert(told.place, told.clone());
         }
-        Self {
-            run: told.run,
-            state: told.state,
-            progress: told.progress,
-            found: told.found,
-            asked_by: told.asked_by,
-            told_at: now,
-            ended_at,
-            values,
-        }
+        Self { told: told.clone(), told_at: now, ended_at, values }
     }
 
     pub fn is_running(&self) -> bool {
-        self.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
+        self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
     }
 
     /// Whether it is over, and every value that it found has arrived.
     pub fn is_whole(&self) -> bool {
-        !self.is_running() && self.values.len() == usize::from(self.found)
+        !self.is_running() && self.values.len() == usize::from(self.told.found)
     }
 
     /// Whether it has seen everything, and every value has arrived.
     pub fn is_judged(&self) -> bool {
-        let stopped = self.state == TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED;
-        self.found > 0 && !stopped && self.is_whole()
+        let stopped = self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED;
+        self.told.found > 0 && !stopped && self.is_whole()
     }
 
     /// What has arrived, in the order in which it was found.
-    pub fn values(&self) -> impl Iterator<Item = &CheckedValue> {
+    pub fn values(&self) -> impl Iterator<Item = &TD_PAD_CHECK_DATA> {
         self.values.values()
     }
 
     /// The value of an item, if it has arrived.
-    pub fn of(&self, item: TdPadCheckItem) -> Option<&CheckedValue> {
+    pub fn of(&self, item: TdPadCheckItem) -> Option<&TD_PAD_CHECK_DATA> {
         self.values().find(|value| value.item == item)
     }
 
     /// That the check has failed, and what is outside, if it has.
     pub fn failure(&self) -> Option<String> {
-        let names: Vec<String> = self.failing().map(|value| value.shown().0).collect();
+        let names: Vec<String> = self.failing().map(|value| shown(value).0).collect();
         let outside = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
-        (self.state == TdPadCheckState::TD_PAD_CHECK_STATE_FAILED).then(|| format!("CHECK FAILED{outside}"))
+        (self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_FAILED)
+            .then(|| format!("CHECK FAILED{outside}"))
     }
 
     /// The values outside their limits.
-    pub fn failing(&self) -> impl Iterator<Item = &CheckedValue> {
+    pub fn failing(&self) -> impl Iterator<Item = &TD_PAD_CHECK_DATA> {
         self.values().filter(|value| value.verdict == TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_OK)
     }
 }
 
-impl CheckedValue {
-    /// Name, unit, factor from the wire's unit, and decimals, for the screen.
-    pub fn shown(&self) -> (String, &'static str, f64, usize) {
-        use TdPadCheckItem as I;
-        const DEG: f64 = 180.0 / std::f64::consts::PI;
-        const MIB: f64 = 1.0 / (1024.0 * 1024.0);
-        let (unit, factor, decimals) = match self.item {
-            item if (item as u32) < 18 && item as u32 % 3 == 2 => ("ms", 1e3, 0),
-            item if (item as u32) < 18 => ("deg", DEG, 1),
-            I::TD_PAD_CHECK_ITEM_GYRO_BIAS | I::TD_PAD_CHECK_ITEM_GYRO_NOISE => ("deg/s", DEG, 2),
-            I::TD_PAD_CHECK_ITEM_GRAVITY => ("m/s2", 1.0, 2),
-            I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => ("m/s2", 1.0, 3),
-            I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE | I::TD_PAD_CHECK_ITEM_LIDAR_RANGE => ("m", 1.0, 2),
-            I::TD_PAD_CHECK_ITEM_GNSS_SPEED => ("m/s", 1.0, 2),
-            I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => ("V", 1.0, 2),
-            I::TD_PAD_CHECK_ITEM_LOG_SPACE => ("MiB", MIB, 0),
-            _ => ("", 1.0, 0),
-        };
-        // Short enough for a column of the smallest screen.
-        let name = match self.item {
-            I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => "accel noise".to_owned(),
-            I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE => "baro noise".to_owned(),
-            I::TD_PAD_CHECK_ITEM_IGNITER_CONTINUITY => "igniter wire".to_owned(),
-            I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => "battery".to_owned(),
-            I::TD_PAD_CHECK_ITEM_GNSS_FIXES => "GNSS fixes".to_owned(),
-            I::TD_PAD_CHECK_ITEM_GNSS_SPEED => "GNSS speed".to_owned(),
-            item => crate::model::words::lower_case(&item, "TD_PAD_CHECK_ITEM_"),
-        };
-        (name, unit, factor, decimals)
-    }
+/// Name, unit, factor from the wire's unit, and decimals, for the screen.
+pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, f64, usize) {
+    use TdPadCheckItem as I;
+    const DEG: f64 = 180.0 / std::f64::consts::PI;
+    const MIB: f64 = 1.0 / (1024.0 * 1024.0);
+    let (unit, factor, decimals) = match value.item {
+        item if (item as u32) < 18 && item as u32 % 3 == 2 => ("ms", 1e3, 0),
+        item if (item as u32) < 18 => ("deg", DEG, 1),
+        I::TD_PAD_CHECK_ITEM_GYRO_BIAS | I::TD_PAD_CHECK_ITEM_GYRO_NOISE => ("deg/s", DEG, 2),
+        I::TD_PAD_CHECK_ITEM_GRAVITY => ("m/s2", 1.0, 2),
+        I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => ("m/s2", 1.0, 3),
+        I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE | I::TD_PAD_CHECK_ITEM_LIDAR_RANGE => ("m", 1.0, 2),
+        I::TD_PAD_CHECK_ITEM_GNSS_SPEED => ("m/s", 1.0, 2),
+        I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => ("V", 1.0, 2),
+        I::TD_PAD_CHECK_ITEM_LOG_SPACE => ("MiB", MIB, 0),
+        _ => ("", 1.0, 0),
+    };
+    // Short enough for a column of the smallest screen.
+    let name = match value.item {
+        I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => "accel noise".to_owned(),
+        I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE => "baro noise".to_owned(),
+        I::TD_PAD_CHECK_ITEM_IGNITER_CONTINUITY => "igniter wire".to_owned(),
+        I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => "battery".to_owned(),
+        I::TD_PAD_CHECK_ITEM_GNSS_FIXES => "GNSS fixes".to_owned(),
+        I::TD_PAD_CHECK_ITEM_GNSS_SPEED => "GNSS speed".to_owned(),
+        item => crate::model::words::lower_case(&item, "TD_PAD_CHECK_ITEM_"),
+    };
+    (name, unit, factor, decimals)
 }
 
 // The radio range test: how much is lost both ways, and how far the signal is above the noise.

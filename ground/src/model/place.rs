@@ -3,6 +3,8 @@
 use std::str::FromStr;
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use serde_json::{Value, json};
 
 use super::Model;
@@ -18,7 +20,7 @@ const LATITUDE_MAX_DEG: f64 = 85.0;
 const HEARD_ERROR_M: f64 = 1.5;
 
 /// A point on the Earth, degrees, north and east positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Degrees {
     pub latitude: f64,
     pub longitude: f64,
@@ -76,7 +78,7 @@ fn wrapped(degrees: f64) -> f64 {
 }
 
 /// A place over the ground, from the pad, and how wrong it may be.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spot {
     pub north_m: f64,
     pub east_m: f64,
@@ -85,7 +87,7 @@ pub struct Spot {
 }
 
 /// The last that is known of a vehicle that has left the pad.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LastPlace {
     /// The vehicle's boot number.
     pub boot: u32,

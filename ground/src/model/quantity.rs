@@ -49,165 +49,65 @@ impl Quantity {
 /// How many quantities there are.
 pub const COUNT: usize = 36;
 
+const fn quantity(
+    name: &'static str,
+    unit: &'static str,
+    decimals: usize,
+    read: fn(&Model, Duration) -> Option<Sample<f64>>,
+) -> Quantity {
+    Quantity { name, unit, decimals, read }
+}
+
 pub static ALL: [Quantity; COUNT] = [
-    Quantity { name: "height", unit: "m", decimals: 1, read: |model, _| model.vehicle.height_m() },
-    Quantity {
-        name: "vertical speed",
-        unit: "m/s",
-        decimals: 1,
-        read: |model, _| model.vehicle.vertical_m_s(),
-    },
-    Quantity {
-        name: "horizontal speed",
-        unit: "m/s",
-        decimals: 1,
-        read: |m, _| motion(m, Motion::horizontal_m_s),
-    },
-    Quantity { name: "distance", unit: "m", decimals: 1, read: |m, _| motion(m, Motion::distance_m) },
-    Quantity { name: "north", unit: "m", decimals: 1, read: |m, _| motion(m, |motion| motion.x_m) },
-    Quantity { name: "east", unit: "m", decimals: 1, read: |m, _| motion(m, |motion| motion.y_m) },
-    Quantity { name: "axial speed", unit: "m/s", decimals: 2, read: |m, _| body(m, |body| body.u_m_s) },
-    Quantity {
-        name: "lateral speed",
-        unit: "m/s",
-        decimals: 2,
-        read: |m, _| body(m, BodySpeed::lateral_m_s),
-    },
-    Quantity {
-        name: "tilt",
-        unit: "deg",
-        decimals: 1,
-        read: |m, _| attitude(m, |a| a.tilt_rad.to_degrees()),
-    },
-    Quantity {
-        name: "pitch",
-        unit: "deg",
-        decimals: 1,
-        read: |m, _| attitude(m, |a| a.pitch_rad.to_degrees()),
-    },
-    Quantity {
-        name: "turn rate",
-        unit: "deg/s",
-        decimals: 1,
-        read: |m, _| attitude(m, |a| a.turn_rate_rad_s().to_degrees()),
-    },
-    Quantity {
-        name: "gimbal pitch",
-        unit: "deg",
-        decimals: 2,
-        read: |m, _| m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees())),
-    },
-    Quantity {
-        name: "gimbal yaw",
-        unit: "deg",
-        decimals: 2,
-        read: |m, _| m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.yaw.measured_rad.to_degrees())),
-    },
-    Quantity { name: "fin 1", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 0) },
-    Quantity { name: "fin 2", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 1) },
-    Quantity { name: "fin 3", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 2) },
-    Quantity { name: "fin 4", unit: "deg", decimals: 1, read: |m, _| fin(&m.vehicle, 3) },
-    Quantity { name: "apogee", unit: "m", decimals: 0, read: |m, _| descent(m, |d| d.apogee_m) },
-    Quantity {
-        name: "ignition height",
-        unit: "m",
-        decimals: 1,
-        read: |m, _| descent(m, |d| d.chosen_height_m),
-    },
-    Quantity {
-        name: "commit height",
-        unit: "m",
-        decimals: 1,
-        read: |m, _| descent(m, |d| d.commit_height_m),
-    },
-    Quantity {
-        name: "time to ignition",
-        unit: "s",
-        decimals: 1,
-        read: |m, now| m.vehicle.ignition_in_s(now),
-    },
-    Quantity {
-        name: "wind",
-        unit: "m/s",
-        decimals: 1,
-        read: |m, _| descent(m, |d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s)),
-    },
-    Quantity {
-        name: "touchdown north",
-        unit: "m",
-        decimals: 1,
-        read: |m, _| descent(m, |d| d.touchdown_x_m),
-    },
-    Quantity { name: "touchdown east", unit: "m", decimals: 1, read: |m, _| descent(m, |d| d.touchdown_y_m) },
-    Quantity { name: "drag", unit: "x", decimals: 3, read: |m, _| descent(m, |d| d.drag_scale) },
-    Quantity {
-        name: "time to touchdown",
-        unit: "s",
-        decimals: 1,
-        read: |m, now| m.vehicle.touchdown_in_s(now),
-    },
-    Quantity {
-        name: "predicted speed",
-        unit: "m/s",
-        decimals: 2,
-        read: |m, _| m.vehicle.predicted_speed_m_s(),
-    },
-    Quantity {
-        name: "thrust",
-        unit: "x",
-        decimals: 3,
-        read: |m, _| solver(m, |c| f64::from(c.thrust_scale)),
-    },
-    Quantity {
-        name: "solve time",
-        unit: "ms",
-        decimals: 2,
-        read: |m, _| solver(m, |c| f64::from(c.solve_time_us) / 1_000.0),
-    },
-    Quantity {
-        name: "solver margin",
-        unit: "ms",
-        decimals: 1,
-        read: |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0),
-    },
-    Quantity { name: "cost", unit: "", decimals: 1, read: |m, _| solver(m, |c| f64::from(c.cost)) },
-    Quantity {
-        name: "battery",
-        unit: "V",
-        decimals: 2,
-        read: |m, _| m.vehicle.battery.map(|battery| battery.map(|battery| battery.volts)),
-    },
-    Quantity {
-        name: "battery left",
-        unit: "%",
-        decimals: 0,
-        read: |m, _| {
-            let battery = m.vehicle.battery?;
-            battery.value.percent.map(|percent| Sample::new(percent.into(), battery.received_at))
-        },
-    },
+    quantity("height", "m", 1, |model, _| model.vehicle.height_m()),
+    quantity("vertical speed", "m/s", 1, |model, _| model.vehicle.vertical_m_s()),
+    quantity("horizontal speed", "m/s", 1, |m, _| motion(m, Motion::horizontal_m_s)),
+    quantity("distance", "m", 1, |m, _| motion(m, Motion::distance_m)),
+    quantity("north", "m", 1, |m, _| motion(m, |motion| motion.x_m)),
+    quantity("east", "m", 1, |m, _| motion(m, |motion| motion.y_m)),
+    quantity("axial speed", "m/s", 2, |m, _| body(m, |body| body.u_m_s)),
+    quantity("lateral speed", "m/s", 2, |m, _| body(m, BodySpeed::lateral_m_s)),
+    quantity("tilt", "deg", 1, |m, _| attitude(m, |a| a.tilt_rad.to_degrees())),
+    quantity("pitch", "deg", 1, |m, _| attitude(m, |a| a.pitch_rad.to_degrees())),
+    quantity("turn rate", "deg/s", 1, |m, _| attitude(m, |a| a.turn_rate_rad_s().to_degrees())),
+    quantity("gimbal pitch", "deg", 2, |m, _| {
+        m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees()))
+    }),
+    quantity("gimbal yaw", "deg", 2, |m, _| {
+        m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.yaw.measured_rad.to_degrees()))
+    }),
+    quantity("fin 1", "deg", 1, |m, _| fin(&m.vehicle, 0)),
+    quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
+    quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
+    quantity("fin 4", "deg", 1, |m, _| fin(&m.vehicle, 3)),
+    quantity("apogee", "m", 0, |m, _| descent(m, |d| d.apogee_m)),
+    quantity("ignition height", "m", 1, |m, _| descent(m, |d| d.chosen_height_m)),
+    quantity("commit height", "m", 1, |m, _| descent(m, |d| d.commit_height_m)),
+    quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
+    quantity("wind", "m/s", 1, |m, _| descent(m, |d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s))),
+    quantity("touchdown north", "m", 1, |m, _| descent(m, |d| d.touchdown_x_m)),
+    quantity("touchdown east", "m", 1, |m, _| descent(m, |d| d.touchdown_y_m)),
+    quantity("drag", "x", 3, |m, _| descent(m, |d| d.drag_scale)),
+    quantity("time to touchdown", "s", 1, |m, now| m.vehicle.touchdown_in_s(now)),
+    quantity("predicted speed", "m/s", 2, |m, _| m.vehicle.predicted_speed_m_s()),
+    quantity("thrust", "x", 3, |m, _| solver(m, |c| f64::from(c.thrust_scale))),
+    quantity("solve time", "ms", 2, |m, _| solver(m, |c| f64::from(c.solve_time_us) / 1_000.0)),
+    quantity("solver margin", "ms", 1, |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0)),
+    quantity("cost", "", 1, |m, _| solver(m, |c| f64::from(c.cost))),
+    quantity("battery", "V", 2, |m, _| m.vehicle.battery.map(|battery| battery.map(|battery| battery.volts))),
+    quantity("battery left", "%", 0, |m, _| {
+        let battery = m.vehicle.battery?;
+        battery.value.percent.map(|percent| Sample::new(percent.into(), battery.received_at))
+    }),
     // Known only of a check that has seen everything.
-    Quantity {
-        name: "check failures",
-        unit: "",
-        decimals: 0,
-        read: |m, _| {
-            let check = m.vehicle.pad_check.as_ref().filter(|check| check.is_judged())?;
-            Some(Sample::new(check.failing().count() as f64, check.told_at))
-        },
-    },
-    Quantity {
-        name: "link rate",
-        unit: "B/s",
-        decimals: 0,
-        read: |m, now| m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now)),
-    },
-    Quantity {
-        name: "link loss",
-        unit: "%",
-        decimals: 1,
-        read: |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now)),
-    },
+    quantity("check failures", "", 0, |m, _| {
+        let check = m.vehicle.pad_check.as_ref().filter(|check| check.is_judged())?;
+        Some(Sample::new(check.failing().count() as f64, check.told_at))
+    }),
+    quantity("link rate", "B/s", 0, |m, now| {
+        m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now))
+    }),
+    quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
 
 fn motion(model: &Model, pick: fn(&Motion) -> f64) -> Option<Sample<f64>> {

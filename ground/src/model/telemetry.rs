@@ -38,15 +38,13 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {
-                vehicle.in_space |= attitude.leaves_the_plane();
                 vehicle.attitude = Some(Sample::new(attitude, now));
             }
         }
         MavMessage::LOCAL_POSITION_NED(data) => {
             let motion = Motion::of(data);
-            vehicle.in_space |= motion.leaves_the_plane();
             vehicle.motion = Some(Sample::new(motion, now));
-            let phase = vehicle.phase().map(|phase| phase.value);
+            let phase = vehicle.phase_now();
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
                 vehicle.flown.extend(&motion, now);

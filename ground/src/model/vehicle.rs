@@ -140,9 +140,6 @@ pub struct Vehicle {
     pub flown: FlownPath,
     /// The path since the landing motor was commanded to light.
     pub burn: FlownPath,
-    /// Whether it has ever been outside the plane of north and up, or leaned out of it. A planar vehicle never does.
-    pub in_space: bool,
-    /// When the ground first received a phase of flight, or of what follows it, or the verdict.
     pub left_pad_at: Option<Duration>,
     /// The present boot of the vehicle.
     pub boot: Boot,
@@ -162,6 +159,16 @@ impl Vehicle {
             (Some(status), _) => Some(status),
             (None, heartbeat) => heartbeat,
         }
+    }
+
+    /// The phase without its age.
+    pub fn phase_now(&self) -> Option<TdPhase> {
+        self.phase().map(|phase| phase.value)
+    }
+
+    /// Whether it says that it is armed; no before it has said anything.
+    pub fn is_armed(&self) -> bool {
+        self.armed().is_some_and(|armed| armed.value)
     }
 
     /// Whether it is armed, from its heartbeat; `None` before the first.
@@ -200,13 +207,13 @@ impl Vehicle {
         let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
             | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
             | TdInterlock::TD_INTERLOCK_NO_LIGHT;
-        let chute = self.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+        let chute = self.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
         !chute && self.interlocks().is_some_and(|locks| !locks.intersects(never))
     }
 
     /// Whether it has left the pad and is not yet at rest.
     pub fn in_flight(&self) -> bool {
-        self.phase().is_some_and(|phase| is_flight(phase.value))
+        self.phase_now().is_some_and(is_flight)
     }
 
     /// Time to release, s (negative after it), if a countdown is known.

@@ -1,4 +1,4 @@
-//! Turns values of the dialect into words for the crew.
+//! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width, whatever arrives.
 
 use std::fmt::Debug;
 
@@ -67,6 +67,33 @@ pub fn failed_checks(checks: TdCheck) -> Vec<String> {
     checks.iter_names().map(|(name, _)| check(name)).collect()
 }
 
+/// A number with fixed decimals; `--` for NaN and infinity.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        "--".to_owned()
+    } else if value.abs() >= 1e6 {
+        format!("{value:.1e}")
+    } else {
+        // A value that rounds to zero has no minus sign.
+        let text = format!("{value:.decimals$}");
+        match text.strip_prefix('-') {
+            Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
+            _ => text,
+        }
+    }
+}
+
+/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the error of an `f32`.
+pub fn shortest(value: f64) -> String {
+    let text = fixed(value, 3);
+    match text.split_once('.') {
+        Some((_, decimals)) if decimals.bytes().all(|digit| digit.is_ascii_digit()) => {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        }
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,5 +132,29 @@ mod tests {
         let failing = TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_LOG_SPACE;
         assert_eq!(failed_checks(failing), ["pin", "vehicle log space"]);
         assert!(failed_checks(TdCheck::empty()).is_empty());
+    }
+}
+
+#[cfg(test)]
+mod number_tests {
+    use super::*;
+
+    #[test]
+    fn numbers_never_grow_wide() {
+        let wild = [0.0, -0.0, -0.001, 1.0, f64::MAX, f64::MIN, f64::NAN, f64::INFINITY, -999_999.99];
+        for value in wild {
+            assert!(fixed(value, 2).len() <= 10, "{value} became {}", fixed(value, 2));
+        }
+        assert_eq!(fixed(-0.001, 2), "0.00");
+        assert_eq!(fixed(-0.01, 2), "-0.01");
+    }
+
+    #[test]
+    fn numbers_have_no_unneeded_digits() {
+        let cases = [(20.0, "20"), (f64::from(0.1_f32), "0.1"), (82.5, "82.5"), (0.0, "0"), (f64::NAN, "--")];
+        for (value, expected) in cases {
+            assert_eq!(shortest(value), expected);
+        }
+        assert_eq!(shortest(1e9), "1.0e9");
     }
 }

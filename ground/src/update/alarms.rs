@@ -185,7 +185,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Landed) {
         found.push((AlarmKind::NotLanded, ending.sentence(vehicle)));
     }
-    let powered = vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_POWERED);
+    let powered = vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED);
     if !powered || vehicle.verdict.is_some() {
         return;
     }
@@ -217,7 +217,7 @@ fn battery(model: &Model) -> Option<String> {
 
 /// The arming checks do not see everything that a check on the pad sees.
 fn failed_check(model: &Model) -> Option<String> {
-    let phase = model.vehicle.phase().map(|phase| phase.value);
+    let phase = model.vehicle.phase_now();
     if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
         return None;
     }
@@ -226,7 +226,7 @@ fn failed_check(model: &Model) -> Option<String> {
 
 /// Before the self-test is over a log may still be about to begin.
 fn vehicle_log(model: &Model) -> Option<String> {
-    let phase = model.vehicle.phase().map(|phase| phase.value);
+    let phase = model.vehicle.phase_now();
     if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
         return None;
     }
@@ -311,7 +311,7 @@ fn call_approach(model: &mut Model, now: Duration) {
 }
 
 fn call_phase(model: &mut Model) {
-    let Some(phase) = model.vehicle.phase().map(|phase| phase.value) else { return };
+    let Some(phase) = model.vehicle.phase_now() else { return };
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
     let climbed = matches!(before, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
     match phase {

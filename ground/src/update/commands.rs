@@ -275,8 +275,8 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     if model.auto_step != AutoStep::Done && is_live(model) {
         return refuse_auto(model, now);
     }
-    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
-    let phase = model.vehicle.phase().map(|phase| phase.value);
+    let armed = model.vehicle.is_armed();
+    let phase = model.vehicle.phase_now();
     match model.auto_step {
         AutoStep::WaitForReady { not_before } => match phase {
             Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && is_simulated(model) => start_auto(model, now),
@@ -406,7 +406,7 @@ pub(super) fn hold_if_unattended(model: &mut Model, now: Duration) {
 }
 
 fn counts_down(model: &Model) -> bool {
-    let on_pad = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_PAD_ARMED);
+    let on_pad = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
     on_pad && model.vehicle.countdown_s().is_some()
 }
 

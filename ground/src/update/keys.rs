@@ -11,7 +11,7 @@ use std::time::Duration;
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, commands, pad};
+use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
 use crate::model::act::{Act, Does};
 use crate::model::alarm::AlarmKind;
@@ -21,8 +21,7 @@ use crate::model::command::{
 };
 use crate::model::crew::Seat;
 use crate::model::dialog::{
-    AGAIN_AFTER, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, FINGERS_APART, KeyOrigin, RestOfWord, START_WORD,
-    TAKE_WORD,
+    AGAIN_AFTER, AGAIN_KEY, CONFIRM_WORD, Dialog, FINGERS_APART, KeyOrigin, Prompt, RestOfWord,
 };
 use crate::model::history::{LOOKS_FOR, LookBack};
 use crate::model::log::{LogStanding, Speaker};
@@ -74,24 +73,24 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     if touch == KeyOrigin::Dropped {
         return;
     }
-    let is_free = model.pages.entry.is_none() && model.dialog == Dialog::Closed;
+    let is_free = model.pages.entry.is_none() && model.dialog.is_none();
     if key == Key::CtrlL && !is_free {
         model.outbox.push(Action::Redraw);
     }
-    if model.pages.entry.is_some() && model.dialog == Dialog::Closed {
+    if model.pages.entry.is_some() && model.dialog.is_none() {
         if touch != KeyOrigin::Repeat {
             model.key_timing.hurried = touch != KeyOrigin::Typed;
             on_entry_key(model, key, now);
         }
         return;
     }
-    match std::mem::replace(&mut model.dialog, Dialog::Closed) {
-        Dialog::Closed if key == Key::Escape && std::mem::take(&mut model.link.abort_unsent) => {
+    match model.dialog.take() {
+        None if key == Key::Escape && std::mem::take(&mut model.link.abort_unsent) => {
             model.warn(now, "the abort that was not sent is cancelled");
         }
-        Dialog::Closed if on_rest_of_word(model, key, now) || touch == KeyOrigin::Repeat => {}
-        Dialog::Closed => on_free_key(model, key, touch, now),
-        dialog => on_dialog_key(model, dialog, key, touch, now),
+        None if on_rest_of_word(model, key, now) || touch == KeyOrigin::Repeat => {}
+        None => on_free_key(model, key, touch, now),
+        Some(dialog) => on_dialog_key(model, dialog, key, touch, now),
     }
 }
 
@@ -129,7 +128,7 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
             return true;
         }
         // An Enter that comes too late for the abort must not confirm a dialog that was open before.
-        model.dialog = Dialog::Closed;
+        model.dialog = None;
         model.pages.entry = None;
         // If the terminal reports repeats, a second Ctrl-X was really pressed, however soon it came.
         if model.repeats_reported && model.abort_chord.confirm(now) {
@@ -153,24 +152,24 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
 fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrigin, now: Duration) {
     let by_hand = touch == KeyOrigin::Typed;
     match key {
-        key if key == AGAIN_KEY && matches!(dialog, Dialog::Again { .. }) => {
+        AGAIN_KEY if dialog.again_from.is_some() => {
             on_again(model, dialog, by_hand, now);
         }
         Key::Enter if dialog.is_complete() && touch != KeyOrigin::Repeat => {
             model.key_timing.hurried |= !by_hand;
-            if model.key_timing.hurried && dialog.needs_a_hand() {
-                model.dialog = dialog.again(now);
+            if model.key_timing.hurried && dialog.prompt.needs_a_hand() {
+                model.dialog = Some(dialog.again(now));
             } else {
-                confirmed(model, &dialog, now);
+                confirmed(model, dialog.prompt, now);
             }
         }
         Key::Char(letter) if dialog.take(letter) => {
             model.key_timing.hurried |= !by_hand;
-            model.dialog = dialog;
+            model.dialog = Some(dialog);
         }
-        _ if touch == KeyOrigin::Repeat => model.dialog = dialog,
+        _ if touch == KeyOrigin::Repeat => model.dialog = Some(dialog),
         _ => {
-            let (name, word) = (dialog.name(), dialog.word());
+            let (name, word) = (dialog.prompt.name(), dialog.word());
             let wanted = word.filter(|_| matches!(key, Key::Enter | Key::Char(_)));
             let wanted = wanted.map_or_else(String::new, |word| format!("; the word is {word}"));
             let why = format!("{name}: cancelled, nothing was done{wanted}");
@@ -187,37 +186,34 @@ fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrig
 
 /// The key that confirms a dialog that was completed too fast for a hand.
 fn on_again(model: &mut Model, dialog: Dialog, by_hand: bool, now: Duration) {
-    match dialog {
-        Dialog::Again { of, from, .. } if by_hand && now >= from => confirmed(model, &of, now),
-        Dialog::Again { of, until, .. } => {
-            model.info(now, format!("{}: press {} again, after a pause", of.name(), AGAIN_KEY.name()));
-            model.dialog = Dialog::Again { of, from: now + AGAIN_AFTER, until };
-        }
-        _ => {}
+    if by_hand && dialog.again_from.is_some_and(|from| now >= from) {
+        return confirmed(model, dialog.prompt, now);
     }
+    let (name, key) = (dialog.prompt.name(), AGAIN_KEY.name());
+    model.info(now, format!("{name}: press {key} again, after a pause"));
+    model.dialog = Some(Dialog { again_from: Some(now + AGAIN_AFTER), ..dialog });
 }
 
-/// The crew has completed every step of this dialog.
-fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
-    match dialog {
-        Dialog::Closed | Dialog::Again { .. } => {}
-        Dialog::Arm { .. } => ask(model, CommandKind::Arm, now),
-        Dialog::Start { .. } => ask(model, CommandKind::Start, now),
-        Dialog::Confirm { ask: waits, .. } => match why_not_confirm(model, waits, now) {
+/// The crew has completed every step of a dialog.
+fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
+    match prompt {
+        Prompt::Arm => ask(model, CommandKind::Arm, now),
+        Prompt::Start => ask(model, CommandKind::Start, now),
+        Prompt::Confirm(waits) => match why_not_confirm(model, &waits, now) {
             None if waits.act == TdAct::TD_ACT_START => ask(model, CommandKind::ConfirmStart, now),
             None => ask(model, CommandKind::ConfirmArm, now),
             Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
         },
-        Dialog::WithoutLog { .. } => ask_without_log(model, now),
-        Dialog::TakeCommand { .. } => ask(model, CommandKind::TakeCommand, now),
-        Dialog::Hold { .. } => ask(model, CommandKind::Hold, now),
-        Dialog::Disarm { .. } => ask(model, CommandKind::Disarm, now),
-        Dialog::AbortForeign { .. } => ask(model, CommandKind::Abort, now),
-        Dialog::Check { moves: true, .. } => ask(model, CommandKind::Check, now),
-        Dialog::Check { moves: false, .. } => ask(model, CommandKind::CheckStill, now),
-        Dialog::Sign { step, void, .. } => pad::ask_to_sign(model, (*step, *void), now),
+        Prompt::WithoutLog => request(model, Request::WithoutLog, now),
+        Prompt::TakeCommand => ask(model, CommandKind::TakeCommand, now),
+        Prompt::Hold => ask(model, CommandKind::Hold, now),
+        Prompt::Disarm => ask(model, CommandKind::Disarm, now),
+        Prompt::AbortForeign => ask(model, CommandKind::Abort, now),
+        Prompt::Check { moves: true } => ask(model, CommandKind::Check, now),
+        Prompt::Check { moves: false } => ask(model, CommandKind::CheckStill, now),
+        Prompt::Sign { step, void } => pad::ask_to_sign(model, (step, void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        Dialog::Quit { .. } => {
+        Prompt::Quit => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
             let leave = if stays && model.is_at_risk() { Action::LeaveScreen } else { Action::Quit };
             model.outbox.push(leave);
@@ -228,17 +224,15 @@ fn confirmed(model: &mut Model, dialog: &Dialog, now: Duration) {
 /// Closes the open dialog because something else came in between.
 fn cancel(model: &mut Model, now: Duration) {
     model.pages.entry = None;
-    match std::mem::replace(&mut model.dialog, Dialog::Closed) {
-        Dialog::Closed => {}
-        dialog => model.info(now, format!("{}: cancelled, nothing was done", dialog.name())),
+    if let Some(dialog) = model.dialog.take() {
+        model.info(now, format!("{}: cancelled, nothing was done", dialog.prompt.name()));
     }
 }
 
 /// Closes a dialog whose time limit has passed.
 fn expire(model: &mut Model, now: Duration) {
-    if model.dialog.until().is_some_and(|until| now > until) {
-        let dialog = std::mem::replace(&mut model.dialog, Dialog::Closed);
-        let why = format!("{}: time is up, nothing was done", dialog.name());
+    if let Some(dialog) = model.dialog.take_if(|dialog| now > dialog.until) {
+        let why = format!("{}: time is up, nothing was done", dialog.prompt.name());
         model.rest_of_word = RestOfWord::of(&dialog, None, why.clone(), now);
         model.info(now, why);
     }
@@ -307,28 +301,30 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
         Act::Arm => match why_not_arm(model, now) {
-            None => model.dialog = Dialog::arm(now),
-            Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
-            Some(why) => refuse(model, &words(model, ARM_WORD), format!("cannot arm: {why}"), now),
+            None => open(model, Prompt::Arm, now),
+            Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
+            Some(why) => refuse(model, &words(model, Prompt::Arm), format!("cannot arm: {why}"), now),
         },
         Act::Start => match why_not_start(model, now) {
-            None => model.dialog = Dialog::start(now),
-            Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
-            Some(why) => refuse(model, &words(model, START_WORD), format!("cannot start: {why}"), now),
+            None => open(model, Prompt::Start, now),
+            Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
+            Some(why) => refuse(model, &words(model, Prompt::Start), format!("cannot start: {why}"), now),
         },
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
-            None => model.dialog = Dialog::disarm(now),
+            None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
         },
         Act::HoldCountdown if model.vehicle.is_past_hold(now) && act.works(model, now) => {
             model.warn(now, "too late for a hold: Ctrl-X, then Enter, aborts");
         }
-        Act::HoldCountdown if act.works(model, now) => model.dialog = Dialog::hold(now),
+        Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
         Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => match why_not_take(model, now) {
-            None => model.dialog = Dialog::take_command(now),
-            Some(why) => refuse(model, &[TAKE_WORD], format!("cannot take command: {why}"), now),
+            None => open(model, Prompt::TakeCommand, now),
+            Some(why) => {
+                refuse(model, &words(model, Prompt::TakeCommand), format!("cannot take command: {why}"), now)
+            }
         },
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
@@ -338,14 +334,14 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             Standing::Rests => match why_not_here(model).or_else(|| why_not_check(model, now)) {
                 None => {
                     model.pages.hold(Some(Page::Checks));
-                    model.dialog = Dialog::check(act == Act::Check, now);
+                    open(model, Prompt::Check { moves: act == Act::Check }, now);
                 }
                 Some(why) => model.warn(now, format!("cannot check: {why}")),
             },
         },
         Act::RangeTest => {
             model.pages.hold(Some(Page::Checks));
-            test_range(model, now);
+            request(model, Request::RangeTest, now);
         }
         Act::Acknowledge => see_alarm(model, now),
         Act::Checklist if model.checklist.is_none() => model.info(now, "there is no checklist (--checklist)"),
@@ -385,10 +381,14 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
+fn open(model: &mut Model, prompt: Prompt, now: Duration) {
+    model.dialog = Some(prompt.open(now));
+}
+
 /// The words that the crew may type after a key: its own, or the one that confirms what a second person asks.
-fn words(model: &Model, word: &'static str) -> Vec<&'static str> {
-    let confirms = (model.people() == Some(2)).then_some(CONFIRM_WORD);
-    std::iter::once(word).chain(confirms).collect()
+fn words(model: &Model, prompt: Prompt) -> Vec<&'static str> {
+    let confirmed = model.people() == Some(2) && prompt != Prompt::TakeCommand;
+    prompt.word().into_iter().chain(confirmed.then_some(CONFIRM_WORD)).collect()
 }
 
 /// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
@@ -396,8 +396,8 @@ fn words(model: &Model, word: &'static str) -> Vec<&'static str> {
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     match why_not_confirm(model, &ask, now) {
-        None => model.dialog = Dialog::confirm(ask, now),
-        Some(why) if is_only_the_log(model, &why, now) => model.dialog = Dialog::without_log(now),
+        None => open(model, Prompt::Confirm(ask), now),
+        Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
         Some(why) => refuse(model, &[CONFIRM_WORD], format!("cannot confirm: {why}"), now),
     }
     true
@@ -450,26 +450,21 @@ pub(super) fn ask_parameters(model: &mut Model) {
     })));
 }
 
-/// Every step is complete: sends the command, or asks the station to send it.
+/// Every step of a command is complete.
 fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
+    request(model, Request::Command(kind), now);
+}
+
+/// Does what the crew has asked for and tells the other screens, or asks the station to.
+fn request(model: &mut Model, request: Request, now: Duration) {
     match model.settings.role {
-        Role::Attached => model.outbox.push(Action::Request(Request::Command(kind))),
+        Role::Attached => model.outbox.push(Action::Request(request)),
         Role::Station => {
-            let by = model.settings.seat.clone();
-            model.outbox.push(Action::Tell(Request::Command(kind)));
-            command(model, kind, &by, now);
+            model.outbox.push(Action::Tell(request));
+            on_request(model, request, model.settings.seat.clone(), now);
         }
         Role::Watching | Role::Replaying => {}
     }
-}
-
-/// Goes on without the station's log, or asks the station to.
-fn ask_without_log(model: &mut Model, now: Duration) {
-    if model.settings.role == Role::Attached {
-        return model.outbox.push(Action::Request(Request::WithoutLog));
-    }
-    model.outbox.push(Action::Tell(Request::WithoutLog));
-    without_log(model, &model.settings.seat.clone(), now);
 }
 
 /// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
@@ -486,15 +481,6 @@ pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
         format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
     model.record_operator(now, "without log", by, &text);
     model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-}
-
-/// Begins the radio range test, or asks the station to.
-fn test_range(model: &mut Model, now: Duration) {
-    if model.settings.role == Role::Attached {
-        return model.outbox.push(Action::Request(Request::RangeTest));
-    }
-    model.outbox.push(Action::Tell(Request::RangeTest));
-    pad::begin_range_test(model, model.settings.seat.clone(), now);
 }
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
@@ -592,17 +578,17 @@ fn pass_abort_chord(model: &mut Model, now: Duration) {
 fn abort(model: &mut Model, now: Duration) {
     // What it does to somebody else's vehicle has to be read first.
     if model.vehicle.as_foreign().is_some() {
-        model.dialog = Dialog::abort_foreign(now);
+        open(model, Prompt::AbortForeign, now);
         return;
     }
-    model.dialog = Dialog::Closed;
+    model.dialog = None;
     ask(model, CommandKind::Abort, now);
 }
 
 fn quit(model: &mut Model, now: Duration) {
     let commands = model.settings.role.why_not_command().is_none();
     if commands && model.is_at_risk() {
-        model.dialog = Dialog::quit(now);
+        open(model, Prompt::Quit, now);
     } else {
         model.quit_at = Some(now + FINGERS_APART);
     }

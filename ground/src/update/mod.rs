@@ -12,13 +12,13 @@ pub mod vehicle_changes;
 
 use std::time::Duration;
 
-use protocol::book::SignedHead;
-use protocol::frame::{Frame, FramerCounters};
+use protocol::book::{Head, SignedHead};
+use protocol::frame::{Frame, Framer, FramerCounters};
 use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::key::Key;
-use crate::model::alarm::AlarmKind;
 use crate::model::checklist::Checklist;
 use crate::model::command::CommandKind;
 use crate::model::crew::Seat;
@@ -28,24 +28,19 @@ use crate::model::place::LastPlace;
 pub use crate::model::{Action, Request};
 use crate::model::{LogHealth, Model, Role};
 
+/// The name of a signal, or of another reason to end.
+pub type SignalName = &'static str;
+
 /// A message for the model: an input of the crew, a frame, a state of the links, or a tick.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// A station tells its screens what it takes, but for its own keys and its own end, and what only a replay or an attached
+/// screen uses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Msg {
-    Key(Key),
-    /// One read of the terminal brought several keys.
-    Keys(Vec<Key>),
-    /// The terminal reports that text was pasted.
-    Pasted,
-    Frame(Frame),
-    /// In a replay: the crew gave this command at this time.
-    Commanded(CommandKind),
-    /// The operator on this screen has asked for the radio range test.
-    RangeTest(Seat),
-    /// The crew goes on without the station's log.
-    WithoutLog(Seat),
-    /// The crew has completed every step of this command on a screen of the station.
-    Requested {
-        kind: CommandKind,
+    Frame(#[serde(with = "frame_bytes")] Frame),
+    /// The crew has completed every step of this request on a screen of the station.
+    Asked {
+        request: Request,
         /// The operator and the screen.
         by: Seat,
     },
@@ -54,39 +49,23 @@ pub enum Msg {
     /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station keeps
     /// running.
     ScreenQuit,
-    /// The crew has acknowledged this alarm on an attached screen.
-    AlarmAcknowledged(AlarmKind),
     /// The station has this checklist, in this state.
     Checklist(Box<Checklist>),
-    /// An attached screen asks for the report of the flight.
-    ReportWanted,
     /// The report of the flight is here, or is not because of this.
     Report(Result<String, String>),
-    /// An attached screen asks for the vehicle's own log.
-    DownloadWanted,
     /// How far the vehicle's own log is, or why it is not fetched.
     Download(Result<String, String>),
     /// The last place of the vehicle, kept from before this run of the station.
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
     Book {
+        #[serde(with = "head_bytes")]
         head: SignedHead,
         /// False without a key: then the signature is empty.
         is_signed: bool,
     },
-    /// The crew has signed or voided a step of the checklist on an attached screen.
-    SignAsked {
-        /// Counted from zero.
-        step: usize,
-        void: bool,
-        by: Seat,
-    },
-    /// An attached screen asks for the parameters.
-    ParametersWanted,
     /// The station has not signed or voided a step of the checklist; the reason.
     SignRefused(String),
-    /// Time passes on an attached screen: its dialogs and its abort chord may expire.
-    ScreenTick,
     /// The terminal is gone; the station keeps running without it.
     ScreenGone,
     /// The next frame came over this link; sent only if there are several links.
@@ -120,10 +99,66 @@ pub enum Msg {
     Log(LogHealth),
     /// The embedded simulator has ended; the reason, if it failed.
     SimulatorEnded(Option<String>),
-    /// The system asks the program to end; the name of the signal.
-    Terminate(&'static str),
     /// Time passes; sent ten times a second.
     Tick,
+    // Skipped ones come last: the others are numbered without them.
+    #[serde(skip)]
+    Key(Key),
+    /// One read of the terminal brought several keys.
+    #[serde(skip)]
+    Keys(Vec<Key>),
+    /// The terminal reports that text was pasted.
+    #[serde(skip)]
+    Pasted,
+    /// In a replay: the crew gave this command at this time.
+    #[serde(skip)]
+    Commanded(CommandKind),
+    /// Time passes on an attached screen: its dialogs and its abort chord may expire.
+    #[serde(skip)]
+    ScreenTick,
+    /// The system asks the program to end; the name of the signal.
+    #[serde(skip)]
+    Terminate(SignalName),
+}
+
+impl Msg {
+    /// The crew has completed every step of this command.
+    pub fn command(kind: CommandKind, by: Seat) -> Self {
+        Self::Asked { request: Request::Command(kind), by }
+    }
+}
+
+/// A frame for a screen: its bytes.
+mod frame_bytes {
+    use super::{Deserialize, Deserializer, Frame, Framer, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(frame: &Frame, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_bytes(frame.as_bytes())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Frame, D::Error> {
+        let mut framer = Framer::new();
+        framer.push_datagram(<&[u8]>::deserialize(from)?);
+        framer.next_frame().ok_or_else(|| de::Error::custom("not a frame"))
+    }
+}
+
+/// The end of the book for a screen, with its signature in two halves.
+mod head_bytes {
+    use super::{Deserialize, Deserializer, Head, Serialize, Serializer, SignedHead, de};
+
+    pub(super) fn serialize<S: Serializer>(signed: &SignedHead, to: S) -> Result<S::Ok, S::Error> {
+        let (first, second) = signed.signature.split_at(32);
+        (signed.head, first, second).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<SignedHead, D::Error> {
+        let (head, first, second): (Head, &[u8], &[u8]) = Deserialize::deserialize(from)?;
+        let signature = [first, second].concat().try_into();
+        signature
+            .map(|signature| SignedHead { head, signature })
+            .map_err(|_bytes| de::Error::custom("no signature"))
+    }
 }
 
 /// Takes a message into the model and returns what the run loop is to do.
@@ -133,24 +168,17 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
-        Msg::WithoutLog(by) => keys::without_log(model, &by, now),
-        Msg::RangeTest(by) => pad::begin_range_test(model, by, now),
-        Msg::Requested { kind, by } => keys::command(model, kind, &by, now),
+        Msg::Asked { request, by } => on_request(model, request, by, now),
         Msg::Crew(seats) => {
             model.crew.set_seats(seats, now);
             model.info(now, model.crew.words());
         }
-        Msg::AlarmAcknowledged(kind) => keys::acknowledge(model, kind, now),
         Msg::Checklist(list) => model.checklist = Some(*list),
-        Msg::ReportWanted => write_report(model, now),
         Msg::Report(written) => on_report(model, written, now),
-        Msg::DownloadWanted => fetch_log(model, now),
         Msg::Download(told) => on_download(model, told, now),
         Msg::Place(place) => model.place = Some(*place),
         Msg::Book { head, is_signed } => vehicle_changes::on_head(model, head, is_signed),
-        Msg::SignAsked { step, void, by } => pad::sign(model, (step, void), &by, now),
         Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
-        Msg::ParametersWanted => keys::ask_parameters(model),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
             let goes_on = "armed or in flight, so the station continues";
@@ -207,6 +235,19 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     alarms::watch(model, now);
     alarms::call_out(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
+    match request {
+        Request::Command(kind) => keys::command(model, kind, &by, now),
+        Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
+        Request::Parameters => keys::ask_parameters(model),
+        Request::Report => write_report(model, now),
+        Request::Download => fetch_log(model, now),
+        Request::RangeTest => pad::begin_range_test(model, by, now),
+        Request::WithoutLog => keys::without_log(model, &by, now),
+        Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
+    }
 }
 
 /// Notes on an attached screen that its station runs.

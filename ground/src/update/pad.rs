@@ -2,16 +2,16 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, TIMESYNC_DATA, TdPadCheckState};
+use protocol::dialect::{MavMessage, TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdPadCheckState};
 use protocol::log::record::EventLevel;
 
 use super::{Action, Request};
 use crate::model::checklist::{ChecklistEntry, Mark, Signature};
 use crate::model::command::why_not_check;
 use crate::model::crew::{Seat, role_name};
-use crate::model::dialog::Dialog;
+use crate::model::dialog::Prompt;
 use crate::model::log::Speaker;
-use crate::model::pad_check::{CheckedValue, PadCheck, RangeTest};
+use crate::model::pad_check::{PadCheck, RangeTest, shown};
 use crate::model::{Model, Role, words};
 
 /// Opens the dialog that signs or voids the chosen step.
@@ -26,7 +26,7 @@ pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
     {
         return refuse_signature(model, (step, void), &seat, &why, now);
     }
-    model.dialog = Dialog::sign(step, void, now);
+    model.dialog = Some(Prompt::Sign { step, void }.open(now));
 }
 
 /// The dialog is complete: signs here, or asks the station to.
@@ -170,7 +170,7 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
 
 /// Lets time pass: questions are sent, and the test ends.
 pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
-    let armed = model.vehicle.armed().is_some_and(|armed| armed.value) || model.vehicle.in_flight();
+    let armed = model.vehicle.is_armed() || model.vehicle.in_flight();
     let counts = model.link.stats.counts(model.settings.vehicle);
     let Some(test) = model.range_test.as_mut().filter(|test| test.is_running()) else { return };
     if armed {
@@ -196,12 +196,12 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
 /// Enters a check that is over, once every value of it has arrived, with the first values outside their limits.
 pub(super) fn enter_check(model: &mut Model, now: Duration) {
     let Some(check) = model.vehicle.pad_check.as_ref().filter(|check| check.is_whole()) else { return };
-    let which = (model.vehicle.boot.number().unwrap_or(0), check.run);
+    let which = (model.vehicle.boot.number().unwrap_or(0), check.told.run);
     if model.check_entered == Some(which) {
         return;
     }
-    let (text, passed) = (check_words(check), check.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
-    let who = if check.asked_by > 0 { model.operator(check.asked_by) } else { String::new() };
+    let (text, passed) = (check_words(check), check.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
+    let who = if check.told.asked_by > 0 { model.operator(check.told.asked_by) } else { String::new() };
     model.check_entered = Some(which);
     model.enter("check of the vehicle", &who, &text);
     let level = if passed { EventLevel::Info } else { EventLevel::Warning };
@@ -209,8 +209,8 @@ pub(super) fn enter_check(model: &mut Model, now: Duration) {
 }
 
 fn check_words(check: &PadCheck) -> String {
-    let state = words::lower_case(&check.state, "TD_PAD_CHECK_STATE_").to_uppercase();
-    let mut text = format!("check {} {state}: {} values", check.run, check.found);
+    let state = words::lower_case(&check.told.state, "TD_PAD_CHECK_STATE_").to_uppercase();
+    let mut text = format!("check {} {state}: {} values", check.told.run, check.told.found);
     let failing: Vec<String> = check.failing().map(value_words).collect();
     if !failing.is_empty() {
         text = format!("{text}, outside: {}", failing.join("; "));
@@ -219,9 +219,9 @@ fn check_words(check: &PadCheck) -> String {
 }
 
 /// A value with its limit, as in `fin 2 range 0.0 deg (least 87.7)`.
-fn value_words(value: &CheckedValue) -> String {
-    let (name, unit, factor, decimals) = value.shown();
-    let number = |number: f64| crate::view::widgets::fixed(factor * number, decimals);
+fn value_words(value: &TD_PAD_CHECK_DATA) -> String {
+    let (name, unit, factor, decimals) = shown(value);
+    let number = |number: f32| words::fixed(factor * f64::from(number), decimals);
     let mut text = format!("{name} {} {unit}", number(value.value));
     for (word, limit) in [("least", value.least), ("most", value.most)] {
         if limit.is_finite() {

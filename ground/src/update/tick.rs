@@ -9,7 +9,6 @@ use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
-use crate::model::dialog::Dialog;
 use crate::model::link::LinkState;
 use crate::model::log::Speaker;
 use crate::model::vehicle::{Deflection, is_on_pad};
@@ -97,9 +96,9 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
 
 /// Whether the vehicle must hear this station frequently: it is armed on the pad, or is about to be.
 fn must_be_heard(model: &Model, now: Duration) -> bool {
-    let armed = model.vehicle.armed().is_some_and(|armed| armed.value);
-    let on_pad = model.vehicle.phase().is_some_and(|phase| is_on_pad(phase.value));
-    let asks = model.dialog != Dialog::Closed;
+    let armed = model.vehicle.is_armed();
+    let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
+    let asks = model.dialog.is_some();
     model.link.state(now).carries() && on_pad && (armed || asks)
 }
 

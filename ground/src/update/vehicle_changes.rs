@@ -10,7 +10,7 @@ use protocol::mission::MissionHash;
 
 use super::{Action, commands, pad};
 use crate::model::command::is_aborted;
-use crate::model::dialog::{Dialog, RestOfWord};
+use crate::model::dialog::RestOfWord;
 use crate::model::history::{History, Maxima};
 use crate::model::link::Uplink;
 use crate::model::log::Speaker;
@@ -32,9 +32,9 @@ pub(super) struct Announced {
 
 impl Announced {
     pub(super) fn of(vehicle: &Vehicle) -> Self {
-        let on_pad = vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_PAD_ARMED);
+        let on_pad = vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
         Self {
-            phase: vehicle.phase().map(|phase| phase.value),
+            phase: vehicle.phase_now(),
             armed: vehicle.armed().map(|armed| armed.value),
             counting: on_pad && vehicle.countdown_s().is_some(),
             aborted: vehicle.interlocks().is_some_and(is_aborted)
@@ -60,9 +60,10 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.alarms.vehicle_rebooted(now);
     model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
     // An open dialog was opened for the former boot.
-    let why = format!("{}: cancelled by the reboot", model.dialog.name());
-    model.rest_of_word = RestOfWord::of(&model.dialog, None, why, now);
-    model.dialog = Dialog::Closed;
+    model.rest_of_word = model.dialog.take().and_then(|dialog| {
+        let why = format!("{}: cancelled by the reboot", dialog.prompt.name());
+        RestOfWord::of(&dialog, None, why, now)
+    });
     let void = commands::restart_after_reboot(model, now);
     if !void.is_empty() {
         let void = void.join(", ");

@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TdAct, TdRole};
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
@@ -13,16 +13,13 @@ use super::theme::{TextRole, Theme};
 use crate::model::act::{Act, palette_entries};
 use crate::model::command::why_not_here;
 use crate::model::crew::role_name;
-use crate::model::dialog::{
-    ABORT_WORD, AGAIN_KEY, ARM_WORD, CONFIRM_WORD, Dialog, QUIT_WORD, START_WORD, TAKE_WORD, WITHOUT_LOG_WORD,
-};
+use crate::model::dialog::{AGAIN_KEY, CONFIRM_WORD, Prompt};
 use crate::model::identity::Foreign;
 use crate::model::pad_check::PadCheck;
 use crate::model::page::TextEntry;
 use crate::model::{Model, Role, words};
 
 const BOX_COLUMNS: u16 = 68;
-const ANY_OTHER_KEY: &str = "Any other key cancels. Nothing is sent before Enter.";
 
 /// Title and lines of the open dialog; `None` if none is open.
 pub fn dialog_lines(
@@ -30,162 +27,94 @@ pub fn dialog_lines(
     theme: Theme,
     now: Duration,
 ) -> Option<(&'static str, Vec<Line<'static>>)> {
-    let left = model.dialog.until().map_or(0.0, |until| until.saturating_sub(now).as_secs_f64());
-    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
-    let strong = |text: String| Line::styled(text, theme.style(TextRole::Caution));
-    let dialog = match &model.dialog {
-        Dialog::Closed => return notice(model, theme, now),
-        Dialog::Arm { typed, .. } => {
-            let mut lines = vec![
-                strong(format!("Type {ARM_WORD} and Enter within {left:.0} s:  [{typed:<3}]")),
-                plain(ANY_OTHER_KEY.to_owned()),
-            ];
-            lines.extend(checks(model, theme));
-            if let Some(words) = next_person(model) {
-                lines.insert(1, plain(words));
-            }
-            ("ARM, step 2 of 2", lines)
+    let Some(dialog) = &model.dialog else { return notice(model, theme, now) };
+    let left = format!("within {:.0} s", dialog.until.saturating_sub(now).as_secs_f64());
+    let plain = |text: String| theme.line(text, TextRole::Plain);
+    let strong = |text: String| theme.line(text, TextRole::Caution);
+    if dialog.again_from.is_some() {
+        let (name, key) = (dialog.prompt.name(), AGAIN_KEY.name());
+        let lines = vec![
+            plain(format!("The keys for the {name} came faster than a hand types:")),
+            plain("a paste, or a connection that delivers them in bunches.".to_owned()),
+            strong(format!("{key} {left}: yes, do it.")),
+            plain("Any other key cancels. Nothing has been sent.".to_owned()),
+        ];
+        return Some(("DID YOU TYPE THIS?", lines));
+    }
+    let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
+    // What stands above and below the line of the word.
+    let (title, above, below) = match dialog.prompt {
+        Prompt::Arm => {
+            let next = next_person(model).map(plain).into_iter().chain([any_other_key()]);
+            ("ARM, step 2 of 2", Vec::new(), next.chain(checks(model, theme)).collect())
         }
-        Dialog::Start { typed, .. } => {
-            let typing = format!("Type {START_WORD} and Enter within {left:.0} s:  [{typed:<5}]");
-            let mut lines = vec![strong(typing), plain(ANY_OTHER_KEY.to_owned())];
-            if let Some(words) = next_person(model) {
-                lines.insert(1, plain(words));
-            }
-            ("START the countdown", lines)
+        Prompt::Start => {
+            let next = next_person(model).map(plain).into_iter().chain([any_other_key()]);
+            ("START the countdown", Vec::new(), next.collect())
         }
-        Dialog::Confirm { ask, typed, .. } => (
-            "CONFIRM what another operator asks",
-            vec![
-                plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name())),
-                strong(format!("Type {CONFIRM_WORD} and Enter within {left:.0} s:  [{typed:<7}]")),
-                plain(ANY_OTHER_KEY.to_owned()),
-            ],
-        ),
-        Dialog::TakeCommand { typed, .. } => (
-            "TAKE COMMAND of an armed vehicle",
-            vec![
-                plain(format!("{} is in command, if the vehicle hears them.", commander(model))),
-                strong(format!("Type {TAKE_WORD} and Enter within {left:.0} s:  [{typed:<4}]")),
-                plain(ANY_OTHER_KEY.to_owned()),
-            ],
-        ),
-        Dialog::AbortForeign { typed, .. } => {
+        Prompt::Confirm(ask) => {
+            let asks = plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name()));
+            ("CONFIRM what another operator asks", vec![asks], vec![any_other_key()])
+        }
+        Prompt::TakeCommand => {
+            let who = plain(format!("{} is in command, if the vehicle hears them.", commander(model)));
+            ("TAKE COMMAND of an armed vehicle", vec![who], vec![any_other_key()])
+        }
+        Prompt::AbortForeign => {
             let foreign = model.vehicle.as_foreign();
             let name = foreign.map_or_else(|| "The vehicle".to_owned(), Foreign::name);
             let does = foreign.map_or("does not say what it does", Foreign::termination);
-            (
-                "ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE",
-                vec![
-                    strong(format!("{name}: flight termination {does}.")),
-                    strong(format!("Type {ABORT_WORD} and Enter within {left:.0} s:  [{typed:<5}]")),
-                    plain(ANY_OTHER_KEY.to_owned()),
-                ],
-            )
+            let does = strong(format!("{name}: flight termination {does}."));
+            ("ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE", vec![does], vec![any_other_key()])
         }
-        Dialog::WithoutLog { typed, .. } => without_log(model, typed, left, theme, now),
-        Dialog::Hold { .. } => (
-            "HOLD the countdown",
-            vec![
-                strong(format!("Enter within {left:.0} s holds.")),
-                plain("Then only a new start counts down again. Any other key cancels.".to_owned()),
-            ],
-        ),
-        Dialog::Check { moves, .. } => (
-            "CHECK the vehicle",
-            vec![
-                if *moves {
-                    strong(format!("Gimbal and fins MOVE for 8 s: hands off. Enter within {left:.0} s."))
-                } else {
-                    strong(format!("Nothing moves. Enter within {left:.0} s begins."))
-                },
-                plain("Then the sensors are watched for 5 s: touch nothing.".to_owned()),
-                plain("Any other key cancels.".to_owned()),
-            ],
-        ),
-        Dialog::Sign { step, void, .. } => sign(model, (*step, *void), left, theme),
-        Dialog::Disarm { .. } => (
-            "DISARM",
-            vec![
-                strong(format!("Enter within {left:.0} s disarms.")),
-                plain("Any other key cancels.".to_owned()),
-            ],
-        ),
-        Dialog::Quit { typed, .. } => quit(model, typed, left, theme),
-        Dialog::Again { of, .. } => again(of.name(), left, theme),
+        Prompt::WithoutLog => {
+            let why = model.why_no_log(now).unwrap_or_else(|| "It is fit again.".to_owned());
+            let goes_on = plain("Then arm and start go on without a record, a book and a place.".to_owned());
+            let above = vec![theme.line(why, TextRole::Alarm)];
+            ("THE STATION'S LOG IS UNFIT", above, vec![goes_on, any_other_key()])
+        }
+        Prompt::Quit => {
+            let goes_on = match model.settings.role {
+                Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
+                Role::Station => "The station continues without a screen: `ground attach` shows it.",
+                _ => "The station continues; a countdown is held once nobody can command.",
+            };
+            let leaves = "Quitting neither disarms nor aborts. Any other key cancels.";
+            let below = [goes_on, leaves].map(|words| plain(words.to_owned()));
+            ("QUIT although armed or in flight", Vec::new(), below.to_vec())
+        }
+        Prompt::Hold => {
+            let anew = "Then only a new start counts down again. Any other key cancels.".to_owned();
+            ("HOLD the countdown", vec![strong(format!("Enter {left} holds."))], vec![plain(anew)])
+        }
+        Prompt::Check { moves } => {
+            let begins = if moves {
+                format!("Gimbal and fins MOVE for 8 s: hands off. Enter {left}.")
+            } else {
+                format!("Nothing moves. Enter {left} begins.")
+            };
+            let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
+            ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
+        }
+        Prompt::Sign { step: number, void } => {
+            let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
+            let words = step.map(|step| step.words.clone()).unwrap_or_default();
+            let who = step.and_then(|step| step.role).map_or("Anybody who commands", role_name);
+            let verb = if void { "voids the signature" } else { "signs" };
+            let above =
+                vec![plain(format!("{}: {words}", number + 1)), strong(format!("Enter {left} {verb}."))];
+            let title = if void { "VOID a step of the checklist" } else { "SIGN a step of the checklist" };
+            (title, above, vec![plain(format!("{who} signs it. Any other key cancels."))])
+        }
+        Prompt::Disarm => {
+            let disarms = strong(format!("Enter {left} disarms."));
+            ("DISARM", vec![disarms], vec![plain("Any other key cancels.".to_owned())])
+        }
     };
-    Some(dialog)
-}
-
-/// The question whether a person typed the keys.
-fn again(name: &str, left_s: f64, theme: Theme) -> (&'static str, Vec<Line<'static>>) {
-    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
-    let key = AGAIN_KEY.name();
-    let lines = vec![
-        plain(format!("The keys for the {name} came faster than a hand types:")),
-        plain("a paste, or a connection that delivers them in bunches.".to_owned()),
-        Line::styled(format!("{key} within {left_s:.0} s: yes, do it."), theme.style(TextRole::Caution)),
-        plain("Any other key cancels. Nothing has been sent.".to_owned()),
-    ];
-    ("DID YOU TYPE THIS?", lines)
-}
-
-/// Who quits leaves the vehicle as it is.
-fn quit(model: &Model, typed: &str, left_s: f64, theme: Theme) -> (&'static str, Vec<Line<'static>>) {
-    let goes_on = match model.settings.role {
-        Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
-        Role::Station => "The station continues without a screen: `ground attach` shows it.",
-        _ => "The station continues; a countdown is held once nobody can command.",
-    };
-    let words = format!("Type {QUIT_WORD} and Enter within {left_s:.0} s:  [{typed:<4}]");
-    let lines = vec![
-        Line::styled(words, theme.style(TextRole::Caution)),
-        Line::styled(goes_on, theme.style(TextRole::Plain)),
-        Line::styled(
-            "Quitting neither disarms nor aborts. Any other key cancels.",
-            theme.style(TextRole::Plain),
-        ),
-    ];
-    ("QUIT although armed or in flight", lines)
-}
-
-/// What is wrong with the station's log, and what goes on without it.
-fn without_log(
-    model: &Model,
-    typed: &str,
-    left_s: f64,
-    theme: Theme,
-    now: Duration,
-) -> (&'static str, Vec<Line<'static>>) {
-    let why = model.why_no_log(now).unwrap_or_else(|| "It is fit again.".to_owned());
-    let words = format!("Type {WITHOUT_LOG_WORD} and Enter within {left_s:.0} s:  [{typed:<5}]");
-    let goes_on = "Then arm and start go on without a record, a book and a place.";
-    let lines = vec![
-        Line::styled(why, theme.style(TextRole::Alarm)),
-        Line::styled(words, theme.style(TextRole::Caution)),
-        Line::styled(goes_on, theme.style(TextRole::Plain)),
-        Line::styled(ANY_OTHER_KEY, theme.style(TextRole::Plain)),
-    ];
-    ("THE STATION'S LOG IS UNFIT", lines)
-}
-
-/// The step that is signed or voided, and who signs it.
-fn sign(
-    model: &Model,
-    (number, void): (usize, bool),
-    left_s: f64,
-    theme: Theme,
-) -> (&'static str, Vec<Line<'static>>) {
-    let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
-    let words = step.map(|step| step.words.clone()).unwrap_or_default();
-    let who = step.and_then(|step| step.role).map_or("Anybody who commands", role_name);
-    let verb = if void { "voids the signature" } else { "signs" };
-    let lines = vec![
-        Line::styled(format!("{}: {words}", number + 1), theme.style(TextRole::Plain)),
-        Line::styled(format!("Enter within {left_s:.0} s {verb}."), theme.style(TextRole::Caution)),
-        Line::styled(format!("{who} signs it. Any other key cancels."), theme.style(TextRole::Plain)),
-    ];
-    (if void { "VOID a step of the checklist" } else { "SIGN a step of the checklist" }, lines)
+    let typing = dialog.prompt.word().map(|word| {
+        strong(format!("Type {word} and Enter {left}:  [{:<width$}]", dialog.typed, width = word.len()))
+    });
+    Some((title, above.into_iter().chain(typing).chain(below).collect()))
 }
 
 /// What somebody else has to do after this dialog.
@@ -212,8 +141,8 @@ fn commander(model: &Model) -> String {
 
 /// What is asked or waited for, while no dialog is open: it is on every page.
 fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
-    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
-    let strong = |text: String| Line::styled(text, theme.style(TextRole::Caution));
+    let plain = |text: String| theme.line(text, TextRole::Plain);
+    let strong = |text: String| theme.line(text, TextRole::Caution);
     let keys = &model.settings.keys;
     let own = model.own_number();
     if let Some(ask) = model.ask(now) {
@@ -246,23 +175,17 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, V
 
 fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let Some(status) = model.vehicle.status.as_ref() else {
-        return vec![Line::styled(
-            "The vehicle has not reported its checks.",
-            theme.style(TextRole::Caution),
-        )];
+        return vec![theme.line("The vehicle has not reported its checks.", TextRole::Caution)];
     };
     let failing = words::failed_checks(status.value.checks_failed);
     if failing.is_empty() {
-        let mut lines = vec![Line::styled("Every arming check passes.", theme.style(TextRole::Good))];
+        let mut lines = vec![theme.line("Every arming check passes.", TextRole::Good)];
         let failure = model.vehicle.pad_check.as_ref().and_then(PadCheck::failure);
-        lines.extend(failure.map(|failure| Line::styled(failure, theme.style(TextRole::Alarm))));
+        lines.extend(failure.map(|failure| theme.line(failure, TextRole::Alarm)));
         return lines;
     }
-    let mut lines =
-        vec![Line::styled("Failing checks; the vehicle will refuse:", theme.style(TextRole::Alarm))];
-    lines.extend(
-        failing.into_iter().map(|name| Line::styled(format!("  NO {name}"), theme.style(TextRole::Caution))),
-    );
+    let mut lines = vec![theme.line("Failing checks; the vehicle will refuse:", TextRole::Alarm)];
+    lines.extend(failing.into_iter().map(|name| theme.line(format!("  NO {name}"), TextRole::Caution)));
     lines
 }
 
@@ -273,10 +196,10 @@ pub fn draw_dialog(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(2).min(area.height);
     // A notice leaves the middle of the page free.
     let free = area.height - height;
-    let down = if model.dialog == Dialog::Closed { free } else { free / 2 };
+    let down = if model.dialog.is_none() { free } else { free / 2 };
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + down, width, height };
     let at = at.intersection(frame.area());
-    let block = Block::bordered().title(Line::styled(format!(" {title} "), theme.style(TextRole::Title)));
+    let block = Block::bordered().title(theme.line(format!(" {title} "), TextRole::Title));
     let inside = block.inner(at);
     frame.render_widget(Clear, at);
     frame.buffer_mut().set_style(at, theme.ground());
@@ -299,7 +222,7 @@ pub fn draw_palette(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) 
     }
     let width = PALETTE_COLUMNS.min(area.width);
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
-    let block = Block::bordered().title(Line::styled(" Every action ", theme.style(TextRole::Title)));
+    let block = Block::bordered().title(theme.line(" Every action ", TextRole::Title));
     let inside = block.inner(at);
     frame.render_widget(Clear, at);
     frame.buffer_mut().set_style(at, theme.ground());
@@ -316,18 +239,15 @@ pub fn palette_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'stat
     let Some(TextEntry::Palette { typed, chosen }) = &model.pages.entry else { return Vec::new() };
     let entries = palette_entries(model, typed);
     let head = Line::from(vec![
-        Span::styled(format!(" :{typed}_"), theme.style(TextRole::Key)),
-        Span::styled(
-            format!("   {} found; Up Down choose, Enter does it, Esc closes", entries.len()),
-            theme.style(TextRole::Label),
-        ),
+        theme.key(format!(" :{typed}_")),
+        theme.label(format!("   {} found; Up Down choose, Enter does it, Esc closes", entries.len())),
     ]);
     let start = (chosen + 1).saturating_sub(rows);
     let list = entries.iter().enumerate().skip(start).take(rows).map(|(place, entry)| {
         let (mark, role) = if place == *chosen { (">", TextRole::Key) } else { (" ", TextRole::Plain) };
         Line::from(vec![
-            Span::styled(format!("{mark}{:<KEY_COLUMNS$}", entry.key), theme.style(TextRole::Key)),
-            Span::styled(entry.words.clone(), theme.style(role)),
+            theme.key(format!("{mark}{:<KEY_COLUMNS$}", entry.key)),
+            theme.span(entry.words.clone(), role),
         ])
     });
     std::iter::once(head).chain(list).collect()

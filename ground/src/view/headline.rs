@@ -91,7 +91,7 @@ fn places(items: &[Item], form: usize, size: Size, labelled: u16, columns: u16) 
 
 fn one(item: &Item, form: usize, (size, labelled): (Size, u16), theme: Theme, frame: &mut Frame, at: Rect) {
     if labelled > 0 {
-        let label = Line::styled(item.label.clone(), theme.style(TextRole::Label));
+        let label = theme.line(item.label.clone(), TextRole::Label);
         frame.render_widget(label, Rect { height: 1.min(at.height), ..at });
     }
     let below = Rect { y: at.y + labelled, height: at.height.saturating_sub(labelled), ..at };
@@ -183,7 +183,7 @@ impl Banner {
 
 /// Draws the reason and, in letters as large as the room allows, the words. Returns the area below.
 pub fn draw_banner(banner: &Banner, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let reason = Line::styled(banner.reason(), theme.style(banner.role));
+    let reason = theme.line(banner.reason(), banner.role);
     draw_line(frame, area, reason);
     let below = Rect { y: area.y + area.height.min(1), height: area.height.saturating_sub(1), ..area };
     let words = banner.words.to_owned();
@@ -226,7 +226,7 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     if let Some(left) = vehicle.countdown_s().filter(|left| left.value > 0.0) {
         return (format!("T-{}", fixed(left.value, 1)), TextRole::Alarm);
     }
-    if vehicle.armed().is_some_and(|armed| armed.value) {
+    if vehicle.is_armed() {
         return word("ARMED", TextRole::Alarm);
     }
     let other_mission = why_other_mission(model).is_some() || why_nothing_moves(model, now).is_some();

@@ -55,12 +55,9 @@ fn chosen(
             let mark = event.mark();
             let mut pieces = wrap(&event.text, text_columns).into_iter();
             let first = pieces.next().unwrap_or_default();
-            let first = Line::from(vec![
-                Span::styled(head, theme.style(TextRole::Label)),
-                Span::styled(format!("{mark}{first}"), theme.style(role)),
-            ]);
+            let first = Line::from(vec![theme.label(head), theme.span(format!("{mark}{first}"), role)]);
             let rest = pieces.map(move |piece| {
-                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), Span::styled(piece, theme.style(role))])
+                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), theme.span(piece, role)])
             });
             std::iter::once(first).chain(rest).collect()
         })
@@ -166,8 +163,8 @@ pub fn checklist_rows(
     }
     let refused = model.sign_refused.as_ref().filter(|(_, at)| now.saturating_sub(*at) < REFUSAL_SHOWN);
     lines.push(match refused {
-        Some((why, _)) => Line::styled(format!(" {why}"), theme.style(TextRole::Caution)),
-        None => Line::styled(format!(" {}", below(&list.steps[chosen])), theme.style(TextRole::Label)),
+        Some((why, _)) => theme.line(format!(" {why}"), TextRole::Caution),
+        None => theme.line(format!(" {}", below(&list.steps[chosen])), TextRole::Label),
     });
     lines
 }
@@ -199,9 +196,9 @@ fn step_rows(
     let mark = if is_chosen { ">" } else { " " };
     let words_style = theme.style(if is_chosen { TextRole::Title } else { TextRole::Plain });
     let front = Line::from(vec![
-        Span::styled(format!("{mark}{word} "), theme.style(role)),
+        theme.span(format!("{mark}{word} "), role),
         Span::styled(format!("{:>2} {first:<room$}", place + 1), words_style),
-        Span::styled(value, theme.style(TextRole::Plain)),
+        theme.plain(value),
     ]);
     let more = parts.map(|part| Line::styled(format!("{:FRONT_COLUMNS$}{part}", ""), words_style));
     std::iter::once(front).chain(more).collect()
@@ -268,8 +265,8 @@ pub fn filter_line(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let (cursor, keys) =
         if typing { ("_", "Enter keeps it, Esc lists all") } else { ("", "FILTERED; Esc lists all") };
     Some(Line::from(vec![
-        Span::styled(format!(" /{filter}{cursor}"), theme.style(TextRole::Key)),
-        Span::styled(format!("   {keys}"), theme.style(TextRole::Caution)),
+        theme.key(format!(" /{filter}{cursor}")),
+        theme.span(format!("   {keys}"), TextRole::Caution),
     ]))
 }
 

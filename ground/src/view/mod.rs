@@ -127,7 +127,7 @@ fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
     draw_line(frame, armed, top_lines::armed(model, theme, now).into());
     draw_line(frame, countdown, top_lines::countdown(model, theme, now).into());
     draw_line(frame, link, top_lines::link(model, theme, now));
-    draw_line(frame, abort, Line::styled(top_lines::abort_key(model), theme.style(TextRole::Key)));
+    draw_line(frame, abort, theme.line(top_lines::abort_key(model), TextRole::Key));
 }
 
 /// Says that the page shows the past, and for how long.
@@ -137,7 +137,7 @@ fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -
     let words = format!(
         " PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move"
     );
-    Line::styled(words, theme.style(TextRole::Alarm))
+    theme.line(words, TextRole::Alarm)
 }
 
 /// Keys and names of the pages, the shown one in brackets, and whether it is held.
@@ -156,18 +156,18 @@ fn names_line(model: &Model, theme: Theme, columns: u16) -> Line<'static> {
         // Ascent and descent share a key.
         let name = if is_shown { shown.name() } else { page.name() };
         let key = model.settings.keys.name(Act::Show(page));
-        spans.push(Span::styled(format!("{left}{key}{name}{right}"), theme.style(role)));
+        spans.push(theme.span(format!("{left}{key}{name}{right}"), role));
     }
     if every || !lettered {
         let key = model.settings.keys.name(Act::Palette);
-        spans.push(Span::styled(format!(" {key}more"), theme.style(TextRole::Label)));
+        spans.push(theme.label(format!(" {key}more")));
     }
     let (word, role) = match model.pages.held {
         Some(_) if every || !lettered => (" HELD 0", TextRole::Caution),
         Some(_) => (" HELD", TextRole::Caution),
         None => (" auto", TextRole::Good),
     };
-    spans.push(Span::styled(word, theme.style(role)));
+    spans.push(theme.span(word, role));
     Line::from(spans)
 }
 
@@ -182,8 +182,7 @@ const NAMED_ROWS: u16 = 10;
 pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let mut lines = vec![top_lines::identity_line(model, theme, now)];
     lines.extend(
-        headline::banner(model, now)
-            .map(|words| Line::styled(format!(" {}", words.sentence()), theme.style(words.role))),
+        headline::banner(model, now).map(|words| theme.line(format!(" {}", words.sentence()), words.role)),
     );
     lines.push(Line::from(vec![
         top_lines::phase(model, theme, now),
@@ -228,7 +227,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         let key = model.settings.keys.name(Act::Show(page.keyed()));
         let text = format!(" [{key}{}] 1-9 {held}  ? help", page.name());
         let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
-        frame.render_widget(Line::styled(text, theme.style(TextRole::Label)), last);
+        frame.render_widget(theme.line(text, TextRole::Label), last);
     }
 }
 
@@ -241,7 +240,7 @@ fn compact_abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         return top_lines::command_facts_short(track, theme, now);
     }
     let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
-    let mut spans = vec![Span::styled(key, theme.style(TextRole::Key))];
+    let mut spans = vec![theme.key(key)];
     spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
     Line::from(spans)
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdSolverStatus};
+use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus};
 use ratatui::text::{Line, Span};
 
 use super::theme::{TextRole, Theme};
@@ -13,7 +13,7 @@ use crate::model::safety::{Ending, LIMITS, Touchdown, are_of_legs};
 use crate::model::vehicle::{Deflection, Gimbal, Sample};
 use crate::model::{Model, words};
 
-/// The rows: signed values for a planar vehicle, magnitudes for a vehicle in space.
+/// Altitude, speeds and attitude.
 pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
     let (motion, attitude, body) = (vehicle.best_motion(), vehicle.attitude, vehicle.body_speed());
@@ -21,32 +21,16 @@ pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
     let of_attitude = |pick: fn(&Attitude) -> f64| attitude.map(|known| known.map(pick));
     let of_body = |pick: fn(&BodySpeed) -> f64| body.map(|known| known.map(pick));
     let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
-    let mut rows = vec![
+    vec![
         line("altitude", of_motion(|m| m.altitude_m), 2, "m"),
         line("vertical", of_motion(|m| m.climb_m_s), 2, "m/s"),
-    ];
-    let tilt = of_attitude(|a| a.tilt_rad.to_degrees());
-    let axial = of_body(|b| b.u_m_s);
-    if vehicle.in_space {
-        rows.extend([
-            line("horizontal", of_motion(Motion::horizontal_m_s), 2, "m/s"),
-            line("distance", of_motion(Motion::distance_m), 1, "m"),
-            line("u axial", axial, 2, "m/s"),
-            line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
-            line("tilt", tilt, 2, "deg"),
-            line("turn rate", of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
-        ]);
-    } else {
-        rows.extend([
-            line("horizontal", of_motion(|m| m.vx_m_s), 2, "m/s"),
-            line("u axial", axial, 2, "m/s"),
-            line("w lateral", of_body(|b| b.w_m_s), 3, "m/s"),
-            line("pitch", of_attitude(|a| a.pitch_rad.to_degrees()), 2, "deg"),
-            line("tilt", tilt, 2, "deg"),
-            line("pitch rate", of_attitude(|a| a.pitch_rate_rad_s.to_degrees()), 2, "deg/s"),
-        ]);
-    }
-    rows
+        line("horizontal", of_motion(Motion::horizontal_m_s), 2, "m/s"),
+        line("distance", of_motion(Motion::distance_m), 1, "m"),
+        line("u axial", of_body(|b| b.u_m_s), 2, "m/s"),
+        line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
+        line("tilt", of_attitude(|a| a.tilt_rad.to_degrees()), 2, "deg"),
+        line("turn rate", of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
+    ]
 }
 
 // The panel of the landing controller (NMPC).
@@ -64,8 +48,8 @@ pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'
     let wide_text = |label: &str, text: String, role: TextRole| {
         let role = if age_role == TextRole::Stale { age_role } else { role };
         Line::from(vec![
-            Span::styled(format!(" {label:<6}"), theme.style(TextRole::Label)),
-            Span::styled(format!("{mark}{text:>17.17}"), theme.style(role)),
+            theme.label(format!(" {label:<6}")),
+            theme.span(format!("{mark}{text:>17.17}"), role),
         ])
     };
     let level = data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.level, "TD_CONTROL_LEVEL_"));
@@ -123,47 +107,30 @@ pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
                 fins.map_or_else(|| "--".to_owned(), |fins| fixed(pick(&fins.value[k]).to_degrees(), 1))
             };
             Line::from(vec![
-                Span::styled(format!(" fin {} ", k + 1), theme.style(TextRole::Label)),
-                Span::styled(
+                theme.label(format!(" fin {} ", k + 1)),
+                theme.span(
                     format!(
                         "{mark}{:>6} | {:>5}",
                         degrees(|fin| fin.commanded_rad),
                         degrees(|fin| fin.measured_rad)
                     ),
-                    theme.style(role),
+                    role,
                 ),
-                Span::styled(" deg", theme.style(TextRole::Label)),
+                theme.label(" deg"),
             ])
         })
         .collect()
 }
 
-/// The rows of the gimbal: command, measured angle, and a bar with both. In space the gimbal has two planes, with a
-/// row of numbers and a bar each.
+/// The rows of the gimbal's two planes: command and measured angle, and a bar with both.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let gimbal = model.vehicle.gimbal;
     let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
-    if model.vehicle.in_space {
-        let plane = |name, pick: fn(&Gimbal) -> Deflection| {
-            plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
-        };
-        return [plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)].concat();
-    }
-    let angle = |pick: fn(&Deflection) -> f64| gimbal.map(|g| g.map(|g| pick(&g.pitch).to_degrees()));
-    let commanded = angle(|deflection| deflection.commanded_rad);
-    let measured = angle(|deflection| deflection.measured_rad);
-    let role = gimbal.map_or(TextRole::Label, |gimbal| age_mark(&gimbal, now).1);
-    let value = |sample: Option<Sample<f64>>| sample.map(|sample| sample.value);
-    vec![
-        row(theme, "command o", commanded, 2, "deg", now),
-        row(theme, "actual  #", measured, 2, "deg", now),
-        Line::styled(
-            format!(" {}", gimbal_bar(value(commanded), value(measured), limit.unwrap_or(DEFAULT_SCALE_DEG))),
-            theme.style(role),
-        ),
-        Line::styled(gimbal_scale(limit), theme.style(TextRole::Label)),
-    ]
+    let plane = |name, pick: fn(&Gimbal) -> Deflection| {
+        plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
+    };
+    [plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)].concat()
 }
 
 fn plane_rows(
@@ -181,27 +148,18 @@ fn plane_rows(
         limit_deg.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
     vec![
         Line::from(vec![
-            Span::styled(format!(" {name:<5}"), theme.style(TextRole::Label)),
-            Span::styled(format!("{mark}o{:>6} #{:>6}", text(commanded), text(measured)), theme.style(role)),
-            Span::styled(" deg", theme.style(TextRole::Label)),
+            theme.label(format!(" {name:<5}")),
+            theme.span(format!("{mark}o{:>6} #{:>6}", text(commanded), text(measured)), role),
+            theme.label(" deg"),
         ]),
         Line::from(vec![
-            Span::styled(
+            theme.span(
                 format!(" {}", gimbal_bar(commanded, measured, limit_deg.unwrap_or(DEFAULT_SCALE_DEG))),
-                theme.style(role),
+                role,
             ),
-            Span::styled(stop, theme.style(TextRole::Label)),
+            theme.label(stop),
         ]),
     ]
-}
-
-/// The labels at the ends of the bar; without numbers while the limit is unknown.
-fn gimbal_scale(limit_deg: Option<f64>) -> String {
-    let (left, right) = limit_deg.map(shortest).map_or_else(
-        || ("-".to_owned(), "+".to_owned()),
-        |limit| (format!("-{limit}"), format!("+{limit} deg")),
-    );
-    format!(" {left:<10}0{right:>10}")
 }
 
 /// A mark beyond the scale is drawn at its end.
@@ -226,27 +184,25 @@ fn gimbal_bar(commanded_deg: Option<f64>, measured_deg: Option<f64>, scale_deg: 
 pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     if let Some(verdict) = model.vehicle.verdict {
         let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
-        rows.extend(
-            ending_role(model, now).map(|(ending, role)| Line::styled(ending.word(), theme.style(role))),
-        );
+        rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
         let by_legs = model.vehicle.limits.as_ref().is_some_and(are_of_legs);
         return (if by_legs { "Verdict by the legs" } else { "Verdict" }, rows);
     }
     let Some(prediction) = model.vehicle.prediction else {
-        return ("Touchdown predicted", vec![Line::styled("no prediction", theme.style(TextRole::Label))]);
+        return ("Touchdown predicted", vec![theme.line("no prediction", TextRole::Label)]);
     };
     let (mark, role) = age_mark(&prediction, now);
     let mut rows = limit_lines(model, &prediction.value.touchdown, theme, mark, role);
     let in_s = model.vehicle.touchdown_in_s(now);
     let in_s = in_s.map_or_else(|| "--".to_owned(), |left| fixed(left.value, 1));
     rows.push(Line::from(vec![
-        Span::styled("in      ", theme.style(TextRole::Label)),
-        Span::styled(format!("{mark}{in_s:>6}"), theme.style(role)),
-        Span::styled(" s", theme.style(TextRole::Label)),
+        theme.label("in      "),
+        theme.span(format!("{mark}{in_s:>6}"), role),
+        theme.label(" s"),
     ]));
     rows.push(match prediction.value.touchdown.violations() {
-        None => Line::styled("inside every limit", theme.style(TextRole::Good)),
-        Some(names) => Line::styled(format!("OUTSIDE {names}"), theme.style(TextRole::Alarm)),
+        None => theme.line("inside every limit", TextRole::Good),
+        Some(names) => theme.line(format!("OUTSIDE {names}"), TextRole::Alarm),
     });
     ("Touchdown predicted", rows)
 }
@@ -263,11 +219,11 @@ pub fn touchdown_panel_with_bars(
     let judged = vehicle.verdict.map(|verdict| verdict.value.touchdown);
     let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
     let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits.as_ref()) else { return (title, rows) };
-    let used = limits_used(&touchdown, limits);
-    let widest = rows.iter().take(used.len()).map(Line::width).max().unwrap_or(0);
+    let limits = limit_rows(&touchdown, Some(limits));
+    let widest = rows.iter().take(limits.len()).map(Line::width).max().unwrap_or(0);
     let room = columns.saturating_sub(widest);
     if room >= LIMIT_BAR_COLUMNS_MIN {
-        for (row, used) in rows.iter_mut().zip(used) {
+        for (row, LimitRow { used, .. }) in rows.iter_mut().zip(limits) {
             let gap = widest - row.width();
             row.spans.push(Span::raw(" ".repeat(gap)));
             row.spans.push(limit_bar(used, room, theme));
@@ -298,13 +254,10 @@ fn limit_lines(
     let line = |row: &LimitRow| {
         let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         Line::from(vec![
-            Span::styled(word, theme.style(word_role)),
-            Span::styled(format!(" {:<8}", row.name), theme.style(TextRole::Label)),
-            Span::styled(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), theme.style(role)),
-            Span::styled(
-                format!(" {} {}", theme.either_side(&row.limit), row.unit),
-                theme.style(TextRole::Label),
-            ),
+            theme.span(word, word_role),
+            theme.label(format!(" {:<8}", row.name)),
+            theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
+            theme.label(format!(" {} {}", theme.either_side(&row.limit), row.unit)),
         ])
     };
     rows.iter().map(line).collect()
@@ -322,52 +275,42 @@ pub struct LimitRow {
     pub unit: &'static str,
     /// The limit as text; `--` until the vehicle has reported it.
     pub limit: String,
+    /// How much of the limit is used: 0 for a perfect landing, 1 at the limit; NaN until it is reported.
+    pub used: f64,
     /// Whether the vehicle says that the limit is kept.
     pub kept: bool,
 }
 
 /// The six limits in the order of the state. Limits and judgement are the vehicle's own.
-pub fn limit_rows(touchdown: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
-    let texts = limits.map(limit_texts);
-    let values = [
-        (touchdown.x_m.abs(), "m"),
-        (touchdown.altitude_m, "m"),
-        (touchdown.tilt_rad().to_degrees(), "deg"),
-        (-touchdown.u_m_s, "m/s"),
-        (touchdown.w_m_s.abs(), "m/s"),
-        (touchdown.q_rad_s.abs().to_degrees(), "deg/s"),
+pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
+    let told = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
+        limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
+    };
+    let (lowest_m, highest_m) = (told(|l| l.altitude_min_m), told(|l| l.altitude_max_m));
+    // From the ground towards the edge on its side; one edge may be the ground itself.
+    let edge_m = match at.altitude_m {
+        0.0 => f64::INFINITY,
+        below if below < 0.0 => lowest_m.abs(),
+        _ => highest_m.abs(),
+    };
+    let degrees = f64::to_degrees;
+    let rows = [
+        (at.x_m.abs(), told(|l| l.x_m), "m"),
+        (at.altitude_m, edge_m, "m"),
+        (degrees(at.tilt_rad()), degrees(told(|l| l.pitch_error_rad)), "deg"),
+        (-at.u_m_s, told(|l| l.u_m_s), "m/s"),
+        (at.w_m_s.abs(), told(|l| l.w_m_s), "m/s"),
+        (degrees(at.q_rad_s.abs()), degrees(told(|l| l.q_rad_s)), "deg/s"),
     ];
     std::array::from_fn(|place| {
-        let ((name, bit), (value, unit)) = (LIMITS[place], values[place]);
-        LimitRow {
-            name,
-            value,
-            unit,
-            limit: texts.as_ref().map_or_else(|| "--".to_owned(), |texts| texts[place].clone()),
-            kept: !touchdown.violated.contains(bit),
-        }
+        let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
+        let limit = match bit {
+            _ if limits.is_none() => "--".to_owned(),
+            TdLimit::TD_LIMIT_ALTITUDE => format!("{}..{}", shortest(lowest_m), shortest(highest_m)),
+            _ => format!("±{}", shortest(most)),
+        };
+        LimitRow { name, value, unit, limit, used: value.abs() / most, kept: !at.violated.contains(bit) }
     })
-}
-
-fn limit_texts(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [String; 6] {
-    [
-        either_side(f64::from(limits.x_m)),
-        range(f64::from(limits.altitude_min_m), f64::from(limits.altitude_max_m)),
-        either_side(f64::from(limits.pitch_error_rad).to_degrees()),
-        either_side(f64::from(limits.u_m_s)),
-        either_side(f64::from(limits.w_m_s)),
-        either_side(f64::from(limits.q_rad_s).to_degrees()),
-    ]
-}
-
-/// A limit to either side, as in `±0.4`.
-fn either_side(limit: f64) -> String {
-    format!("±{}", shortest(limit))
-}
-
-/// A range, as in `85..95`.
-fn range(lowest: f64, highest: f64) -> String {
-    format!("{}..{}", shortest(lowest), shortest(highest))
 }
 
 /// How many decimals a value gets, so that it takes five characters with its sign.
@@ -388,21 +331,6 @@ const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'
 /// The most columns: a longer one says no more.
 const LIMIT_BAR_COLUMNS_MAX: usize = 24;
 
-/// How much of each limit is used, in the order of the rows: 0 for a perfect landing, 1 at the limit.
-pub fn limits_used(touchdown: &Touchdown, limits: &TD_TOUCHDOWN_LIMITS_DATA) -> [f64; 6] {
-    let share = |value: f64, most: f32| value.abs() / f64::from(most);
-    // From the ground towards the edge on its side; one edge may be the ground itself.
-    let edge_m = if touchdown.altitude_m < 0.0 { limits.altitude_min_m } else { limits.altitude_max_m };
-    [
-        share(touchdown.x_m, limits.x_m),
-        if touchdown.altitude_m.abs() > 0.0 { share(touchdown.altitude_m, edge_m.abs()) } else { 0.0 },
-        share(touchdown.pitch_rad - std::f64::consts::FRAC_PI_2, limits.pitch_error_rad),
-        share(touchdown.u_m_s, limits.u_m_s),
-        share(touchdown.w_m_s, limits.w_m_s),
-        share(touchdown.q_rad_s, limits.q_rad_s),
-    ]
-}
-
 /// A bar of this many columns; beyond the limit it ends in `>`. It has one colour and blanks: six of them with more are
 /// too much for a slow line when the page changes.
 pub fn limit_bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
@@ -420,7 +348,7 @@ pub fn limit_bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
     if !filled.is_multiple_of(steps) {
         text.push(EIGHTHS[filled % steps]);
     }
-    Span::styled(format!(" [{text:<cells$}{end}"), theme.style(role))
+    theme.span(format!(" [{text:<cells$}{end}"), role)
 }
 
 // The panel of the predicted position after the link is lost in flight.
@@ -437,16 +365,16 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
     }
     let Some(at) = predict_position(&model.vehicle, now) else {
         return vec![
-            Line::styled(" position unknown:", theme.style(TextRole::Alarm)),
-            Line::styled(" not heard since the pad", theme.style(TextRole::Caution)),
+            theme.line(" position unknown:", TextRole::Alarm),
+            theme.line(" not heard since the pad", TextRole::Caution),
         ];
     };
     let row = |label: &str, value: f64| {
         Line::from(vec![
-            Span::styled(format!(" {label:<6}pred"), theme.style(TextRole::Label)),
-            Span::styled(
+            theme.label(format!(" {label:<6}pred")),
+            theme.span(
                 theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1))),
-                theme.style(TextRole::Stale),
+                TextRole::Stale,
             ),
         ])
     };
@@ -457,18 +385,13 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         Basis::Fall => "fall, last drag",
         Basis::FreeFall => "free fall; no plan",
     };
-    let across = if model.vehicle.in_space {
-        vec![row("north", at.x_m), row("east", at.y_m)]
-    } else {
-        vec![row("x", at.x_m)]
-    };
-    let mut rows = vec![row("alt", at.altitude_m)];
-    rows.extend(across);
-    rows.extend([
-        Line::styled(format!(" {source}"), theme.style(TextRole::Label)),
-        Line::styled(format!(" last heard {} ago", seconds(at.age)), theme.style(TextRole::Caution)),
-    ]);
-    rows
+    vec![
+        row("alt", at.altitude_m),
+        row("north", at.x_m),
+        row("east", at.y_m),
+        theme.line(format!(" {source}"), TextRole::Label),
+        theme.line(format!(" last heard {} ago", seconds(at.age)), TextRole::Caution),
+    ]
 }
 
 #[cfg(test)]
@@ -482,20 +405,12 @@ mod actuators_tests {
         assert_eq!(gimbal_bar(Some(90.0), Some(f64::NAN), 20.0), "----------|---------o");
         assert_eq!(gimbal_bar(Some(-5.0), Some(2.5), 5.0), "o---------|----#-----");
     }
-
-    #[test]
-    fn the_scale_shows_the_vehicles_limit_or_no_numbers() {
-        assert_eq!(gimbal_scale(Some(f64::from(0.261_799_4_f32).to_degrees())), " -15       0   +15 deg");
-        assert_eq!(gimbal_scale(None), " -         0         +");
-    }
 }
 
 #[cfg(test)]
 mod limit_rows_tests {
     use super::*;
     use std::f64::consts::FRAC_PI_2;
-
-    use protocol::dialect::TdLimit;
 
     fn limit_words(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> Vec<String> {
         let touchdown = Touchdown {
@@ -530,8 +445,6 @@ mod limit_rows_tests {
 #[cfg(test)]
 mod limit_bar_tests {
     use super::*;
-    use protocol::dialect::TdLimit;
-
     use crate::view::theme::Palette;
 
     fn text(used: f64, columns: usize) -> String {
@@ -569,7 +482,8 @@ mod limit_bar_tests {
         };
         let at = |x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s| {
             let violated = TdLimit::empty();
-            limits_used(&Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated }, &limits)
+            let at = Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated };
+            limit_rows(&at, Some(&limits)).map(|row| row.used)
         };
         let upright = std::f64::consts::FRAC_PI_2;
         let close = |found: [f64; 6], expected: f64| found.iter().all(|used| (used - expected).abs() < 1e-6);

@@ -10,7 +10,6 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
-use ratatui::text::Line as TextLine;
 use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
 use super::theme::{Ink, TextRole, Theme};
@@ -69,10 +68,7 @@ impl Viewpoint {
 
 /// The pictures that fit into an area, with their titles: for a vehicle in space from the east and from the south, or
 /// from the east alone.
-pub fn side_views(model: &Model, area: Rect) -> Vec<(Viewpoint, &'static str, Rect)> {
-    if !model.vehicle.in_space {
-        return vec![(Viewpoint::East, "Side view", area)];
-    }
+pub fn side_views(area: Rect) -> Vec<(Viewpoint, &'static str, Rect)> {
     if area.width < 2 * PICTURE_COLUMNS {
         return vec![(Viewpoint::East, "From east", area)];
     }
@@ -107,7 +103,7 @@ pub fn draw_side_view(
     let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
     let view = Bounds::around(&points, limit_m, area);
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
-    let label = |text: String| ratatui::text::Line::styled(text, theme.style(TextRole::Label));
+    let label = |text: String| theme.line(text, TextRole::Label);
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .background_color(theme.back())
@@ -242,7 +238,7 @@ pub fn draw_top_view(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     let (across, up) = (f64::from(area.width) * DOTS_ACROSS, f64::from(area.height) * DOTS_UP);
     let per_dot = 1.1 * 2.0 * reach_m / across.min(up - DOTS_UP);
     let (half_x, half_y) = (per_dot * across / 2.0, per_dot * up / 2.0);
-    let label = |text: String| TextLine::styled(text, theme.style(TextRole::Label));
+    let label = |text: String| theme.line(text, TextRole::Label);
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .background_color(theme.back())
@@ -336,7 +332,7 @@ pub fn fins_title(model: &Model, now: Duration) -> String {
 /// pad.
 pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let Some(fins) = model.vehicle.fins else {
-        draw_lines(frame, area, &[TextLine::styled(" no data", theme.style(TextRole::Label))]);
+        draw_lines(frame, area, &[theme.line(" no data", TextRole::Label)]);
         return;
     };
     if area.width < FIN_PICTURE_COLUMNS || area.height < FIN_PICTURE_ROWS {
@@ -352,7 +348,7 @@ pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let roll_rad = model.vehicle.attitude.map_or(0.0, |attitude| roll_rad(&attitude.value));
     // In rows; a column is half as wide as a row is high.
     let (across, up) = (f64::from(FIN_PICTURE_COLUMNS - 1) / 4.0, f64::from(FIN_PICTURE_ROWS - 1) / 2.0);
-    let text = |words: String, role: TextRole| TextLine::styled(words, theme.style(role));
+    let text = |words: String, role: TextRole| theme.line(words, role);
     let canvas = Canvas::default()
         .marker(Marker::Braille)
         .background_color(theme.back())

@@ -28,9 +28,9 @@ pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Lin
     let stale = phase.is_stale(now);
     let (mark, role) = if stale { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Title) };
     Some(Line::from(vec![
-        Span::styled(" next", theme.style(TextRole::Label)),
-        Span::styled(format!("{mark}{event}"), theme.style(role)),
-        Span::styled(rest, theme.style(if stale { TextRole::Stale } else { TextRole::Plain })),
+        theme.label(" next"),
+        theme.span(format!("{mark}{event}"), role),
+        theme.span(rest, if stale { TextRole::Stale } else { TextRole::Plain }),
     ]))
 }
 
@@ -102,10 +102,10 @@ fn within(left_s: Option<f64>) -> String {
 /// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
 pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     if model.look_back.is_some() {
-        return Line::styled(" link: only live", theme.style(TextRole::Label));
+        return theme.line(" link: only live", TextRole::Label);
     }
     if let Some(why) = &model.link.trouble {
-        return Line::styled(format!(" LINK DOWN {why}"), theme.style(TextRole::Alarm));
+        return theme.line(format!(" LINK DOWN {why}"), TextRole::Alarm);
     }
     if model.link.reports.len() > 1 {
         return several_links(model, theme, now, columns);
@@ -120,7 +120,7 @@ pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
     let rejected =
         model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
-    let span = |text: String, role: TextRole| Span::styled(text, theme.style(role));
+    let span = |text: String, role: TextRole| theme.span(text, role);
     let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
     let received = span(format!(" rx {:.0}{capacity} B/s", figures.rx_bytes_s), TextRole::Plain);
     let refused = (rejected > 0 || model.link.send_drops > 0)
@@ -166,27 +166,27 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let all = model.link.loss(now);
     let role = |loss: f64| if loss > 0.05 { TextRole::Caution } else { TextRole::Plain };
     let mut spans = vec![
-        Span::styled(
+        theme.span(
             format!(" {} links, loss {}", model.link.reports.len(), percent(all)),
-            theme.style(role(all.unwrap_or(0.0))),
+            role(all.unwrap_or(0.0)),
         ),
         log_state(model, theme),
     ];
     if let Some(refused) = model.link.signing.map(|signing| signing.rejected()).filter(|refused| *refused > 0)
     {
-        spans.push(Span::styled(format!("  refused {refused}"), theme.style(TextRole::Caution)));
+        spans.push(theme.span(format!("  refused {refused}"), TextRole::Caution));
     }
     let mut used: usize = spans.iter().map(Span::width).sum();
     for report in &model.link.reports {
         let kind = report.name.split(':').next().unwrap_or_default();
         let span = if report.trouble.is_some() {
-            Span::styled(format!("  {kind} DOWN"), theme.style(TextRole::Alarm))
+            theme.span(format!("  {kind} DOWN"), TextRole::Alarm)
         } else {
             let (rate, loss) = (report.figures.rx_bytes_s, report.figures.loss);
             let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
             let known = (report.figures.rx_frames_s > 0.0).then_some(loss);
             let words = format!("  {kind} {rate:.0}{capacity} B/s {}", percent(known));
-            Span::styled(words, theme.style(role(loss)))
+            theme.span(words, role(loss))
         };
         used += span.width();
         if used > columns {
@@ -195,7 +195,7 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         spans.push(span);
     }
     if let Some(words) = radio(model, now).filter(|words| used + words.len() <= columns) {
-        spans.push(Span::styled(words, theme.style(TextRole::Plain)));
+        spans.push(theme.plain(words));
     }
     Line::from(spans)
 }
@@ -212,7 +212,7 @@ fn log_state(model: &Model, theme: Theme) -> Span<'static> {
     } else {
         ("  log ok".to_owned(), TextRole::Good)
     };
-    Span::styled(words, theme.style(role))
+    theme.span(words, role)
 }
 
 // The alarm line above the page names, with the foremost alarm or the newest event.
@@ -235,7 +235,7 @@ pub fn draw_alarm_line(model: &Model, theme: Theme, now: Duration, frame: &mut F
     let last = model.events.newest(1).next().map_or_else(Line::default, |event| {
         let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
         let head = format!(" {:.1} ", event.at.as_secs_f64());
-        Line::styled(format!("{head}{}{}", event.mark().trim_start(), event.text), theme.style(role))
+        theme.line(format!("{head}{}{}", event.mark().trim_start(), event.text), role)
     });
     draw_line(frame, area, last);
 }
@@ -244,12 +244,12 @@ pub fn draw_alarm_line(model: &Model, theme: Theme, now: Duration, frame: &mut F
 pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
     let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
     let state = if playing.paused { "PAUSED" } else { "plays" };
-    Line::styled(
+    theme.line(
         format!(
             " REPLAY {state} {at:.1} of {of:.1} s x{}  Space  Left Right 5 s  [ ] phase  + -",
             shortest(playing.speed)
         ),
-        theme.style(TextRole::Title),
+        TextRole::Title,
     )
 }
 
@@ -269,9 +269,9 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     let text = cut(&alarm.text, room);
     let line = format!(" {word} {text} {age}{more}");
     let columns = columns.saturating_sub(key.len());
-    let mut spans = vec![Span::styled(format!("{line:<columns$}"), theme.style(role))];
+    let mut spans = vec![theme.span(format!("{line:<columns$}"), role)];
     if !key.is_empty() {
-        spans.push(Span::styled(key, theme.style(TextRole::Key)));
+        spans.push(theme.key(key));
     }
     Some(Line::from(spans))
 }
@@ -399,7 +399,7 @@ fn flight_bar_line(
     if let Some(cell) = cells.get_mut(here).filter(|cell| !cell.is_alphabetic()) {
         *cell = NOW;
     }
-    let part = |cells: &[char], role| Span::styled(cells.iter().collect::<String>(), theme.style(role));
+    let part = |cells: &[char], role| theme.span(cells.iter().collect::<String>(), role);
     let (before, rest) = cells.split_at(here);
     Line::from(vec![
         Span::raw(" "),
@@ -423,8 +423,8 @@ pub fn pinned_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> 
         let room = COLUMNS.saturating_sub(name.chars().count());
         let role = if role == TextRole::Plain { TextRole::Title } else { role };
         [
-            Span::styled(name, theme.style(TextRole::Label)),
-            Span::styled(format!("{:<room$}", format!("{mark}{value} {}", quantity.unit)), theme.style(role)),
+            theme.label(name),
+            theme.span(format!("{:<room$}", format!("{mark}{value} {}", quantity.unit)), role),
         ]
     });
     Line::from(spans.collect::<Vec<_>>())

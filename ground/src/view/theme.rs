@@ -4,8 +4,11 @@
 //! Dark, light and high contrast paint their own background, in colours whose values are fixed (the upper 240 of the
 //! 256 of xterm), so that their contrast is known. In the sun only the light theme can be read.
 
+use std::borrow::Cow;
+
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::{Line, Span};
 
 /// The role of a piece of text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -222,6 +225,28 @@ impl Theme {
                 style.add_modifier(Modifier::BOLD)
             }
         }
+    }
+
+    /// A piece of text in its role.
+    pub fn span(self, text: impl Into<Cow<'static, str>>, role: TextRole) -> Span<'static> {
+        Span::styled(text, self.style(role))
+    }
+
+    pub fn plain(self, text: impl Into<Cow<'static, str>>) -> Span<'static> {
+        self.span(text, TextRole::Plain)
+    }
+
+    pub fn label(self, text: impl Into<Cow<'static, str>>) -> Span<'static> {
+        self.span(text, TextRole::Label)
+    }
+
+    pub fn key(self, text: impl Into<Cow<'static, str>>) -> Span<'static> {
+        self.span(text, TextRole::Key)
+    }
+
+    /// A line in its role, to its end.
+    pub fn line(self, text: impl Into<Cow<'static, str>>, role: TextRole) -> Line<'static> {
+        Line::styled(text.into(), self.style(role))
     }
 
     /// The colour of a part of a picture.

@@ -40,25 +40,22 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     draw_line(frame, vehicle_area, vehicle.into());
     let Address { system_id, component_id } = model.settings.us;
     let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
-    draw_line(frame, station_area, Line::styled(station, theme.style(TextRole::Label)));
+    draw_line(frame, station_area, theme.line(station, TextRole::Label));
     draw_line(frame, crew_area, crew.into());
 }
 
 /// The same for narrow screens.
 pub fn identity_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(words) = doubt(model, now) {
-        return Line::from(vec![
-            mode(model, theme),
-            Span::styled(format!(" {words}"), theme.style(TextRole::Alarm)),
-        ]);
+        return Line::from(vec![mode(model, theme), theme.span(format!(" {words}"), TextRole::Alarm)]);
     }
     let number = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
     let system = model.settings.vehicle.system_id;
     Line::from(vec![
         mode(model, theme),
-        Span::styled(format!(" {system} {number} "), theme.style(TextRole::Plain)),
+        theme.plain(format!(" {system} {number} ")),
         crew(model, theme, now),
-        Span::styled(format!(" {}", model.settings.link_name), theme.style(TextRole::Label)),
+        theme.label(format!(" {}", model.settings.link_name)),
     ])
 }
 
@@ -74,7 +71,7 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
         Role::Station | Role::Attached if simulated => ("SIM", TextRole::Title),
         Role::Station | Role::Attached => ("LIVE", TextRole::Caution),
     };
-    Span::styled(format!(" {word}"), theme.style(role))
+    theme.span(format!(" {word}"), role)
 }
 
 /// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
@@ -88,12 +85,12 @@ fn doubt(model: &Model, now: Duration) -> Option<String> {
 
 fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     if let Some(words) = doubt(model, now) {
-        return Span::styled(words, theme.style(TextRole::Alarm));
+        return theme.span(words, TextRole::Alarm);
     }
     let boot = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
     let name = model.settings.vehicle_name.as_deref().unwrap_or_default();
     let words = format!("system {} boot {boot} {name}", model.settings.vehicle.system_id);
-    Span::styled(words, theme.style(TextRole::Plain))
+    theme.plain(words)
 }
 
 /// Whether other screens than this one can command.
@@ -104,7 +101,7 @@ fn others_can_command(model: &Model) -> bool {
 /// Who commands: another station that armed the vehicle, otherwise who can command here.
 fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     if model.link.station_gone_for(now).is_some() {
-        return Span::styled(" NO STATION", theme.style(TextRole::Alarm));
+        return theme.span(" NO STATION", TextRole::Alarm);
     }
     if let Some(people) = model.people() {
         let who = match model.own_number() {
@@ -115,13 +112,13 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
             number => model.operator(number),
         };
         let mode = if people == 2 { "TWO-PERSON" } else { "one-person" };
-        return Span::styled(format!(" {who} {mode}"), theme.style(TextRole::Title));
+        return theme.span(format!(" {who} {mode}"), TextRole::Title);
     }
     if let Some(other) = model.link.uplink.armed_by_other {
         // Another station under our own id is not this one.
         let whose = if other == model.settings.us { "by another " } else { "" };
         let text = format!("armed {whose}{}/{}", other.system_id, other.component_id);
-        return Span::styled(format!(" {text}"), theme.style(TextRole::Caution));
+        return theme.span(format!(" {text}"), TextRole::Caution);
     }
     let text = match model.settings.role {
         Role::Replaying => "nobody".to_owned(),
@@ -131,7 +128,7 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
         _ => "commands here".to_owned(),
     };
-    Span::styled(format!(" {text}"), theme.style(TextRole::Plain))
+    theme.plain(format!(" {text}"))
 }
 
 // The top lines of every screen: phase, armed, countdown, link, abort, and the line of the latest command.
@@ -156,16 +153,16 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.phase() {
         None if model.vehicle.as_foreign().is_some() => {
             let mode = model.vehicle.as_foreign().map(Foreign::mode).unwrap_or_default();
-            Span::styled(format!(" {mode}"), theme.style(TextRole::Plain))
+            theme.plain(format!(" {mode}"))
         }
-        None => Span::styled(" no vehicle", theme.style(TextRole::Label)),
+        None => theme.label(" no vehicle"),
         Some(_) if may_have_left(&model.vehicle, now).is_some() => {
-            Span::styled(" IN THE AIR?", theme.style(TextRole::Alarm))
+            theme.span(" IN THE AIR?", TextRole::Alarm)
         }
         Some(phase) => {
             let (mark, stale) = age_mark(&phase, now);
             let role = if stale == TextRole::Stale { stale } else { TextRole::Title };
-            Span::styled(format!("{mark}{}", words::phase(phase.value)), theme.style(role))
+            theme.span(format!("{mark}{}", words::phase(phase.value)), role)
         }
     }
 }
@@ -173,15 +170,13 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// Whether the vehicle is armed, from HEARTBEAT.
 pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.armed() {
-        None => Span::styled(" armed ?", theme.style(TextRole::Label)),
+        None => theme.label(" armed ?"),
         Some(armed) => {
             let (mark, stale) = age_mark(&armed, now);
             match (armed.value, stale) {
-                (true, _) => Span::styled(format!("{mark}ARMED"), theme.style(TextRole::Alarm)),
-                (false, TextRole::Stale) => {
-                    Span::styled(format!("{mark}disarmed"), theme.style(TextRole::Stale))
-                }
-                (false, _) => Span::styled(format!("{mark}disarmed"), theme.style(TextRole::Good)),
+                (true, _) => theme.span(format!("{mark}ARMED"), TextRole::Alarm),
+                (false, TextRole::Stale) => theme.span(format!("{mark}disarmed"), TextRole::Stale),
+                (false, _) => theme.span(format!("{mark}disarmed"), TextRole::Good),
             }
         }
     }
@@ -190,16 +185,16 @@ pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// Time to release, or since it.
 pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.countdown_s() {
-        None => Span::styled(" T --", theme.style(TextRole::Label)),
+        None => theme.label(" T --"),
         Some(_) if let Some(since) = may_have_left(&model.vehicle, now) => {
             let words = format!("{STALE_MARK}T+{:.1}", since.as_secs_f64());
-            Span::styled(words, theme.style(TextRole::Stale))
+            theme.span(words, TextRole::Stale)
         }
         Some(time) => {
             let (mark, role) = age_mark(&time, now);
             let sign = if time.value > 0.0 { '-' } else { '+' };
             let role = if role == TextRole::Stale { role } else { TextRole::Title };
-            Span::styled(format!("{mark}T{sign}{:.1}", time.value.abs()), theme.style(role))
+            theme.span(format!("{mark}T{sign}{:.1}", time.value.abs()), role)
         }
     }
 }
@@ -208,32 +203,26 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// us. Whole seconds, because heartbeats come only once a second. On an attached screen, that its station is silent.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(gone) = model.link.station_gone_for(now) {
-        return Line::styled(format!("STATION GONE {}s", gone.as_secs()), theme.style(TextRole::Alarm));
+        return theme.line(format!("STATION GONE {}s", gone.as_secs()), TextRole::Alarm);
     }
     if let Some(silence) = model.link.station_silence(now) {
         let words = format!("STATION SILENT {}s", silence.as_secs());
-        return Line::styled(words, theme.style(TextRole::Alarm));
+        return theme.line(words, TextRole::Alarm);
     }
     let down = model.link.down(now);
     if down == LinkState::NeverHeard {
-        return Line::styled("down: not heard", theme.style(TextRole::Caution));
+        return theme.line("down: not heard", TextRole::Caution);
     }
     let direction = |name: &str, loud: &str, state| match state {
-        LinkState::NeverHeard => Span::styled(format!("{loud} NOT PROVEN"), theme.style(TextRole::Alarm)),
-        LinkState::Alive(age) => {
-            Span::styled(format!("{name} {}s", age.as_secs()), theme.style(TextRole::Good))
-        }
-        LinkState::Doubtful(age) => {
-            Span::styled(format!("{name} late {}s", age.as_secs()), theme.style(TextRole::Caution))
-        }
-        LinkState::Lost(age) => {
-            Span::styled(format!("{loud} LOST {}s", age.as_secs()), theme.style(TextRole::Alarm))
-        }
+        LinkState::NeverHeard => theme.span(format!("{loud} NOT PROVEN"), TextRole::Alarm),
+        LinkState::Alive(age) => theme.span(format!("{name} {}s", age.as_secs()), TextRole::Good),
+        LinkState::Doubtful(age) => theme.span(format!("{name} late {}s", age.as_secs()), TextRole::Caution),
+        LinkState::Lost(age) => theme.span(format!("{loud} LOST {}s", age.as_secs()), TextRole::Alarm),
     };
     let up = match model.link.uplink.state(now) {
         // There has been no report about the uplink since the downlink was lost.
         LinkState::Lost(age) | LinkState::Doubtful(age) if !down.carries() => {
-            Span::styled(format!("{STALE_MARK}up {}s", age.as_secs()), theme.style(TextRole::Stale))
+            theme.span(format!("{STALE_MARK}up {}s", age.as_secs()), TextRole::Stale)
         }
         state => direction("up", "UP", state),
     };
@@ -244,20 +233,17 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.link.abort_unsent {
         let words = " ABORT NOT SENT: no station. The next one sends it; Esc cancels it";
-        return Line::styled(words, theme.style(TextRole::Alarm));
+        return theme.line(words, TextRole::Alarm);
     }
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
-        return Line::styled(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), theme.style(TextRole::Alarm));
+        return theme.line(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), TextRole::Alarm);
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return command_facts(track, theme, now);
     }
-    let mut spans = vec![
-        Span::styled(" abort now: ", theme.style(TextRole::Label)),
-        Span::styled(effect, theme.style(TextRole::Plain)),
-    ];
-    spans.extend(hold_until(model, now).map(|words| Span::styled(words, theme.style(TextRole::Caution))));
+    let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
+    spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
     Line::from(spans)
 }
 
@@ -296,19 +282,19 @@ fn abort_effect(model: &Model, now: Duration) -> String {
 pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
     let words = match standing(model, now) {
         Standing::Runs => {
-            let done = model.vehicle.pad_check.as_ref().map_or(0, |check| check.progress);
+            let done = model.vehicle.pad_check.as_ref().map_or(0, |check| check.told.progress);
             format!(" HANDS OFF: a check of the vehicle runs, {done} %")
         }
         Standing::MayRun => " HANDS OFF: a check of the vehicle may run".to_owned(),
         Standing::JustEnded | Standing::Rests => return None,
     };
-    Some(Line::styled(words, theme.style(TextRole::Caution)))
+    Some(theme.line(words, TextRole::Caution))
 }
 
 /// The line of a held countdown: why, and what happens next.
 fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let words = hold_words(&model.vehicle, model.link.uplink.armed_by_us)?;
-    Some(Line::styled(words, theme.style(TextRole::Alarm)))
+    Some(theme.line(words, TextRole::Alarm))
 }
 
 /// The three facts of a command, for narrow screens.
@@ -326,17 +312,17 @@ pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) 
         None => ("-", TextRole::Plain),
     };
     Line::from(vec![
-        Span::styled(format!("{} x{}", track.kind.name(), track.attempts), theme.style(TextRole::Title)),
-        Span::styled(" ack ", theme.style(TextRole::Label)),
-        Span::styled(acknowledged, theme.style(acknowledged_role)),
-        Span::styled(" obs ", theme.style(TextRole::Label)),
-        Span::styled(observed, theme.style(observed_role)),
+        theme.span(format!("{} x{}", track.kind.name(), track.attempts), TextRole::Title),
+        theme.label(" ack "),
+        theme.span(acknowledged, acknowledged_role),
+        theme.label(" obs "),
+        theme.span(observed, observed_role),
     ])
 }
 
 /// The three facts of a command: commanded, acknowledged, observed.
 pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    let label = |text: &str| Span::styled(text.to_owned(), theme.style(TextRole::Label));
+    let label = |text: &str| theme.label(text.to_owned());
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
@@ -351,16 +337,13 @@ pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Lin
         None => ("not yet".to_owned(), TextRole::Plain),
     };
     Line::from(vec![
-        Span::styled(format!(" {:<6} ", track.kind.name()), theme.style(TextRole::Title)),
+        theme.span(format!(" {:<6} ", track.kind.name()), TextRole::Title),
         label("commanded "),
-        Span::styled(
-            format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts),
-            theme.style(TextRole::Plain),
-        ),
+        theme.plain(format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts)),
         label("  acknowledged "),
-        Span::styled(acknowledged, theme.style(acknowledged_role)),
+        theme.span(acknowledged, acknowledged_role),
         label("  observed "),
-        Span::styled(observed, theme.style(observed_role)),
+        theme.span(observed, observed_role),
     ])
 }
 
@@ -399,7 +382,7 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     }
     let unheard = link::unheard_hints(model, now).and_then(|hints| hints.into_iter().next());
     let words = ready.or_else(|| unheard.map(|words| (words, TextRole::Caution)));
-    words.map_or_else(Line::default, |(words, role)| Line::styled(format!(" {words}"), theme.style(role)))
+    words.map_or_else(Line::default, |(words, role)| theme.line(format!(" {words}"), role))
 }
 
 fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {

@@ -1,4 +1,4 @@
-//! Numbers, scales, the height gauge and sparklines. Numbers have a bounded width, whatever arrives over the radio.
+//! Rows of numbers, scales, the height gauge and sparklines.
 
 use std::time::Duration;
 
@@ -13,39 +13,13 @@ use crate::model::Model;
 use crate::model::dead_reckoning::{is_unheard, predict_position};
 use crate::model::quantity::Quantity;
 use crate::model::vehicle::Sample;
+pub use crate::model::words::{fixed, shortest};
 
 /// The mark before a value that is too old.
 pub const STALE_MARK: &str = "~";
 /// The width of a value in a row, without its mark.
 const VALUE_WIDTH: usize = 9;
 const LABEL_WIDTH: usize = 10;
-
-/// A number with fixed decimals; `--` for NaN and infinity.
-pub fn fixed(value: f64, decimals: usize) -> String {
-    if !value.is_finite() {
-        "--".to_owned()
-    } else if value.abs() >= 1e6 {
-        format!("{value:.1e}")
-    } else {
-        // A value that rounds to zero has no minus sign.
-        let text = format!("{value:.decimals$}");
-        match text.strip_prefix('-') {
-            Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
-            _ => text,
-        }
-    }
-}
-
-/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the error of an `f32`.
-pub fn shortest(value: f64) -> String {
-    let text = fixed(value, 3);
-    match text.split_once('.') {
-        Some((_, decimals)) if decimals.bytes().all(|digit| digit.is_ascii_digit()) => {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        }
-        _ => text,
-    }
-}
 
 /// The mark and the role of a value by its age.
 pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole) {
@@ -76,9 +50,9 @@ pub fn text_row(
     unit: &'static str,
 ) -> Line<'static> {
     Line::from(vec![
-        Span::styled(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}"), theme.style(TextRole::Label)),
-        Span::styled(format!("{mark}{text:>VALUE_WIDTH$}"), theme.style(role)),
-        Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
+        theme.label(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}")),
+        theme.span(format!("{mark}{text:>VALUE_WIDTH$}"), role),
+        theme.label(format!(" {unit}")),
     ])
 }
 
@@ -161,19 +135,16 @@ pub fn gauge_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> V
                 (false, true) => "─┤ ",
                 (false, false) => " │ ",
             };
-            let mut spans = vec![
-                Span::styled(format!("{tick:>6} "), theme.style(TextRole::Label)),
-                Span::styled(bar, theme.style(TextRole::Plain)),
-            ];
+            let mut spans = vec![theme.label(format!("{tick:>6} ")), theme.plain(bar)];
             if here(height) {
                 let text = height.map_or_else(String::new, |height| fixed(height, 1));
                 let role = if role == TextRole::Stale { role } else { TextRole::Title };
-                spans.push(Span::styled(format!("<{mark}{text} "), theme.style(role)));
+                spans.push(theme.span(format!("<{mark}{text} "), role));
             }
             for (at, name) in [(chosen, "IGNITE"), (commit, "commit"), (apogee, "apogee")] {
                 if here(at) {
                     let text = at.map_or_else(String::new, |height| fixed(height, 0));
-                    spans.push(Span::styled(format!("-{name} {text} "), theme.style(TextRole::Caution)));
+                    spans.push(theme.span(format!("-{name} {text} "), TextRole::Caution));
                 }
             }
             Line::from(spans)
@@ -235,15 +206,15 @@ pub fn draw_sparkline(
     let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
     let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
     let mut spans = vec![
-        Span::styled(format!(" {}", quantity.name), theme.style(TextRole::Label)),
-        Span::styled(format!("{mark}{value} {}", quantity.unit), theme.style(role)),
+        theme.label(format!(" {}", quantity.name)),
+        theme.span(format!("{mark}{value} {}", quantity.unit), role),
     ];
     if least <= most {
         let range =
             format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
         let used: usize = spans.iter().map(Span::width).sum();
         if used + range.len() <= usize::from(heading.width) {
-            spans.push(Span::styled(range, theme.style(TextRole::Label)));
+            spans.push(theme.label(range));
         }
     }
     draw_line(frame, heading, Line::from(spans));
@@ -274,30 +245,6 @@ fn resampled(quantity: &Quantity, model: &Model, now: Duration, columns: usize) 
         }
     }
     values
-}
-
-#[cfg(test)]
-mod number_tests {
-    use super::*;
-
-    #[test]
-    fn numbers_never_grow_wide() {
-        let wild = [0.0, -0.0, -0.001, 1.0, f64::MAX, f64::MIN, f64::NAN, f64::INFINITY, -999_999.99];
-        for value in wild {
-            assert!(fixed(value, 2).len() <= 10, "{value} became {}", fixed(value, 2));
-        }
-        assert_eq!(fixed(-0.001, 2), "0.00");
-        assert_eq!(fixed(-0.01, 2), "-0.01");
-    }
-
-    #[test]
-    fn numbers_have_no_unneeded_digits() {
-        let cases = [(20.0, "20"), (f64::from(0.1_f32), "0.1"), (82.5, "82.5"), (0.0, "0"), (f64::NAN, "--")];
-        for (value, expected) in cases {
-            assert_eq!(shortest(value), expected);
-        }
-        assert_eq!(shortest(1e9), "1.0e9");
-    }
 }
 
 #[cfg(test)]

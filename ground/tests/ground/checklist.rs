@@ -56,8 +56,8 @@ fn list(rig: &Rig) -> &Checklist {
     rig.model.checklist.as_ref().expect("the station has a checklist")
 }
 
-fn asked(rig: &mut Rig, step: usize, void: bool, who: &str) {
-    rig.msg(Msg::SignAsked { step, void, by: Seat::new(2, who) });
+fn asked(rig: &mut Rig, step: u8, void: bool, who: &str) {
+    rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, who) });
 }
 
 fn sign_all(rig: &mut Rig) {
@@ -171,7 +171,7 @@ fn the_example_crew_can_finish_both_example_checklists() {
             let signer =
                 signer.unwrap_or_else(|| panic!("nobody of the example crew signs `{}`", step.words));
             upright(&mut rig, 90.0);
-            asked(&mut rig, place, false, &signer.name);
+            asked(&mut rig, u8::try_from(place).unwrap(), false, &signer.name);
         }
         let (done, all) = rig.model.steps_done(rig.now).expect("a checklist");
         assert_eq!(done, all, "{}", rig.events());

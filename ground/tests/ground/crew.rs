@@ -24,7 +24,7 @@ fn ben() -> Seat {
 }
 
 fn requested(kind: CommandKind, by: Seat) -> Msg {
-    Msg::Requested { kind, by }
+    Msg::command(kind, by)
 }
 
 /// A station with Anna at its own screen.

@@ -104,8 +104,8 @@ impl Screen {
             let (told, at) = decode_to_screen(&bytes).expect("what a station tells");
             match told {
                 ToScreen::Hello(hello) => {
-                    assert!(hello.log_path.ends_with("flight.mcap"));
-                    self.model.settings.session = hello.session;
+                    assert!(hello.station.log_path.is_some_and(|path| path.ends_with("flight.mcap")));
+                    self.model.settings.session = hello.station.session;
                 }
                 ToScreen::Live => self.live = true,
                 ToScreen::Msg(msg) => {
@@ -200,7 +200,7 @@ fn a_socket_serves_one_station_and_garbage_does_not_end_it() {
 /// The vehicle may have changed since the crew completed the steps on a screen.
 #[test]
 fn a_request_is_checked_again_by_the_station() {
-    let request = |kind| Msg::Requested { kind, by: Seat::new(2, "anna") };
+    let request = |kind| Msg::command(kind, Seat::new(2, "anna"));
     let mut model = Model::new(settings(false, true));
     drop(update(&mut model, request(CommandKind::Arm), Duration::from_secs(1)));
     assert!(model.commands.tracks.is_empty(), "nothing was heard of a vehicle yet");

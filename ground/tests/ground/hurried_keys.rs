@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::dialog::{AGAIN_AFTER, Dialog};
+use ground::model::dialog::AGAIN_AFTER;
 use ground::update::Msg;
 use proptest::prelude::*;
 use protocol::dialect::{MavCmd, TdCheck};
@@ -84,7 +84,7 @@ fn pass(rig: &mut Rig, time: Duration) {
 
 /// Presses the key that the screen asks for, if it asks, as a person does who has read it.
 fn answer_the_question(rig: &mut Rig) -> bool {
-    let asked = matches!(rig.model.dialog, Dialog::Again { .. });
+    let asked = rig.model.dialog.as_ref().is_some_and(|dialog| dialog.again_from.is_some());
     if asked {
         let screen = rig.screen(80, 24);
         assert!(screen.contains("DID YOU TYPE THIS?") && screen.contains("Ctrl-Y within"), "{screen}");
@@ -116,7 +116,7 @@ fn the_question_needs_its_own_key_after_a_pause() {
         rig.msg(Msg::Keys(ladder()));
         pass(&mut rig, AGAIN_AFTER);
         rig.press(key);
-        assert_eq!(rig.model.dialog, Dialog::Closed, "{key:?} cancels");
+        assert_eq!(rig.model.dialog, None, "{key:?} cancels");
         rig.key(Key::CtrlY);
         assert!(!rig.take_commands().iter().any(is_arm), "{key:?}");
     }
@@ -156,7 +156,7 @@ fn a_question_closes_when_the_vehicle_reboots_and_checks_again_before_it_sends()
     rig.msg(Msg::Keys(ladder()));
     rig.boot_number += 1;
     rig.run(1.0);
-    assert_eq!(rig.model.dialog, Dialog::Closed);
+    assert_eq!(rig.model.dialog, None);
     let mut rig = Rig::crewed();
     rig.msg(Msg::Keys(ladder()));
     rig.phase = protocol::dialect::TdPhase::TD_PHASE_BOOST;
@@ -188,7 +188,7 @@ fn keys_without_a_meaning_among_fast_ones_are_dropped_with_an_event() {
     let mut rig = Rig::crewed();
     rig.msg(Msg::Keys(typed("12 Send the crew away")));
     assert!(rig.events().contains("faster than a hand types"));
-    assert_eq!(rig.model.dialog, Dialog::Closed);
+    assert_eq!(rig.model.dialog, None);
     // What only shows something works.
     let mut rig = Rig::crewed();
     rig.msg(Msg::Keys(typed("15")));
@@ -216,7 +216,7 @@ fn what_is_left_of_a_refused_word_does_nothing() {
             last.starts_with("cannot ") || last.contains("cancelled, nothing was done"),
             "{keys}: {last}"
         );
-        assert_eq!((rig.model.page(), &rig.model.dialog), (page, &Dialog::Closed), "{keys}");
+        assert_eq!((rig.model.page(), &rig.model.dialog), (page, &None), "{keys}");
         assert!(rig.take_commands().is_empty());
         // A pause, or another key, and keys are keys again.
         rig.key(Key::Char('5'));

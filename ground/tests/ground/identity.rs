@@ -85,7 +85,7 @@ fn a_reboot_within_seconds_of_a_boot_voids_earlier_commands() {
     assert!(said.contains("rebooted, boot 000000BB"), "{said}");
     assert!(said.contains("void since the reboot: ARM"), "{said}");
     assert!(rig.model.commands.tracks.is_empty() && rig.model.vehicle.armed().is_none());
-    assert_eq!(rig.model.dialog, ground::model::dialog::Dialog::Closed);
+    assert_eq!(rig.model.dialog, None);
     assert!(rig.screen(80, 24).contains("ALARM the vehicle has REBOOTED"));
     rig.keys(&[Key::Enter]);
     assert!(!rig.commands().iter().any(|command| command.command == MavCmd::MAV_CMD_MISSION_START));

@@ -7,7 +7,7 @@ use ground::key::Key;
 use ground::model::Role;
 use ground::model::command::CommandKind;
 use ground::model::dialog::ABORT_TIME_LIMIT;
-use ground::model::dialog::{ARM_TIME_LIMIT, Dialog, QUIT_TIME_LIMIT, START_TIME_LIMIT};
+use ground::model::dialog::WORD_TIME_LIMIT;
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
 
@@ -90,7 +90,7 @@ fn each_missing_step_leaves_the_vehicle_disarmed() {
 fn the_arming_dialog_expires() {
     let mut rig = Rig::crewed();
     rig.keys(&typed("AARM"));
-    rig.run(ARM_TIME_LIMIT.as_secs_f64() + 0.1);
+    rig.run(WORD_TIME_LIMIT.as_secs_f64() + 0.1);
     rig.key(Key::Enter);
     assert!(!rig.take_commands().iter().any(is_arm));
     assert!(rig.events().contains("time is up"));
@@ -152,7 +152,7 @@ fn an_abort_that_is_confirmed_too_late_neither_starts_nor_arms() {
         rig.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.1);
         rig.key(Key::Enter);
         assert!(rig.take_commands().is_empty(), "{opening:?}");
-        assert_eq!(rig.model.dialog, Dialog::Closed);
+        assert_eq!(rig.model.dialog, None);
     }
 }
 
@@ -164,7 +164,7 @@ fn other_keys_do_not_cancel_the_abort_chord() {
         rig.keys(&[Key::CtrlX, between, between]);
         rig.run(1.0);
         assert!(!rig.take_commands().iter().any(is_abort) && !rig.wants_to_quit(), "{between:?}");
-        assert_eq!(rig.model.dialog, Dialog::Closed, "{between:?} does nothing else");
+        assert_eq!(rig.model.dialog, None, "{between:?} does nothing else");
         rig.key(Key::Enter);
         assert!(rig.take_commands().iter().any(is_abort), "{between:?}");
     }
@@ -218,7 +218,7 @@ fn ctrl_x_and_enter_abort_at_once_from_every_dialog_and_close_it() {
         rig.key(Key::Enter);
         let sent = rig.take_commands();
         assert!(sent.len() == 1 && is_abort(&sent[0]), "{opening:?}: {sent:?}");
-        assert_eq!(rig.model.dialog, Dialog::Closed);
+        assert_eq!(rig.model.dialog, None);
         rig.answer(ABORT, ACCEPTED);
         rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
         rig.key(Key::Enter);
@@ -249,7 +249,7 @@ fn abort_works_from_every_dialog_and_closes_it() {
         assert!(!rig.take_commands().iter().any(is_abort), "it may be the first repeat of a held key");
         rig.run(0.2);
         assert_eq!(rig.take_commands().iter().filter(|command| is_abort(command)).count(), 1);
-        assert_eq!(rig.model.dialog, Dialog::Closed);
+        assert_eq!(rig.model.dialog, None);
     }
 }
 
@@ -353,7 +353,7 @@ fn a_start_needs_its_typed_word_and_is_resent_a_few_times() {
     assert_eq!(starts.len(), 4);
     assert!(starts.iter().all(|command| command.command == START));
     rig.keys(&start_ladder()[..6]);
-    rig.run(START_TIME_LIMIT.as_secs_f64() + 0.1);
+    rig.run(WORD_TIME_LIMIT.as_secs_f64() + 0.1);
     rig.key(Key::Enter);
     assert!(rig.take_commands().is_empty(), "the offer to start has ended");
 }
@@ -381,9 +381,9 @@ fn any_other_key_cancels_a_dialog() {
             rig.take_commands();
             let (last, before) = ladder.split_last().unwrap();
             rig.keys(&before[..2]);
-            assert_ne!(rig.model.dialog, Dialog::Closed);
+            assert_ne!(rig.model.dialog, None);
             rig.key(key);
-            assert_eq!(rig.model.dialog, Dialog::Closed, "{key:?} in {ladder:?}");
+            assert_eq!(rig.model.dialog, None, "{key:?} in {ladder:?}");
             rig.keys(&[&before[2..], &[*last]].concat());
             rig.run(1.0);
             assert!(rig.take_commands().is_empty() && !leaves(&rig), "{key:?} in {ladder:?}");
@@ -397,7 +397,7 @@ fn a_paste_is_dropped_with_an_event_and_cancels_the_dialog() {
     rig.keys(&start_ladder()[..6]);
     rig.msg(Msg::Pasted);
     assert!(rig.events().contains("a paste was dropped"));
-    assert_eq!(rig.model.dialog, Dialog::Closed);
+    assert_eq!(rig.model.dialog, None);
     rig.key(Key::Enter);
     assert!(rig.take_commands().is_empty());
 }
@@ -475,9 +475,9 @@ fn quitting_takes_one_key_and_while_armed_a_typed_word() {
         rig.keys(&[key, key]);
         rig.run(1.0);
         assert!(!leaves(&rig), "two keys do not");
-        rig.run(QUIT_TIME_LIMIT.as_secs_f64() + 0.1);
+        rig.run(WORD_TIME_LIMIT.as_secs_f64() + 0.1);
         rig.keys(&[vec![key], typed("quit")].concat());
-        rig.run(QUIT_TIME_LIMIT.as_secs_f64() + 0.1);
+        rig.run(WORD_TIME_LIMIT.as_secs_f64() + 0.1);
         rig.key(Key::Enter);
         assert!(!leaves(&rig), "the offer has ended");
         rig.keys(&[vec![key], typed("Quit"), vec![Key::Enter]].concat());
@@ -547,7 +547,7 @@ fn a_wrong_letter_closes_the_arming_dialog() {
     for word in ["AARMA", "AARN", "AAM", "AB"] {
         let mut rig = Rig::crewed();
         rig.keys(&typed(word));
-        assert_eq!(rig.model.dialog, Dialog::Closed, "{word}");
+        assert_eq!(rig.model.dialog, None, "{word}");
         rig.keys(&[Key::Backspace, Key::Enter]);
         assert!(!rig.take_commands().iter().any(is_arm));
     }

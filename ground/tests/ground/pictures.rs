@@ -13,7 +13,7 @@ use ground::key::Key;
 use ground::model::crew::Seat;
 use ground::model::page::Page;
 use ground::replay::recording::{RecordedEvent, Recording};
-use ground::update::Msg;
+use ground::update::{Msg, Request};
 use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
 use protocol::dialect::{
@@ -62,7 +62,7 @@ fn with_checklist() -> Rig {
     let list = ground::model::checklist::parse_checklist(include_str!("../../checklist-example.toml"));
     rig.msg(Msg::Checklist(Box::new(list.expect("the example is a checklist"))));
     for (step, void) in [(0, false), (1, false), (3, false), (1, true)] {
-        rig.msg(Msg::SignAsked { step, void, by: Seat::new(2, "Ann") });
+        rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });
     }
     rig.key(Key::Char('k'));
     rig.run(1.0);

@@ -2,7 +2,7 @@
 
 use ground::key::Key;
 use ground::model::crew::Seat;
-use ground::model::dialog::Dialog;
+use ground::model::dialog::Prompt;
 use ground::model::log::{LogFault, LogHealth, LogSpace, LogStanding};
 use ground::model::{Role, Settings};
 use ground::update::{Action, Msg, Request};
@@ -78,7 +78,7 @@ fn the_crew_may_go_on_without_a_log_by_a_word_that_is_recorded() {
     let mut rig = on_the_pad();
     rig.msg(Msg::Log(FAILED));
     rig.key(Key::Char('A'));
-    assert!(matches!(rig.model.dialog, Dialog::WithoutLog { .. }));
+    assert!(rig.model.dialog.as_ref().is_some_and(|dialog| dialog.prompt == Prompt::WithoutLog));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("Type NOLOG and Enter") && screen.contains("FAILED"), "{screen}");
     rig.keys(&enter("NOLOG"));
@@ -120,7 +120,7 @@ fn a_log_that_fails_after_the_arming_stops_the_start() {
     rig.msg(Msg::Log(FAILED));
     rig.take_commands();
     rig.key(Key::Char('S'));
-    assert!(matches!(rig.model.dialog, Dialog::WithoutLog { .. }));
+    assert!(rig.model.dialog.as_ref().is_some_and(|dialog| dialog.prompt == Prompt::WithoutLog));
     rig.keys(&[Key::Escape, Key::Char('S'), Key::Enter]);
     assert!(rig.take_commands().is_empty());
 }
@@ -145,7 +145,7 @@ fn an_attached_screen_asks_its_station_to_go_on_without_a_log() {
     rig.keys(&enter("ANOLOG"));
     assert!(rig.actions.contains(&Action::Request(Request::WithoutLog)));
     assert!(rig.model.why_no_log(rig.now).is_some(), "the station decides");
-    rig.msg(Msg::WithoutLog(Seat::new(2, "bob on pts/2")));
+    rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::new(2, "bob on pts/2") });
     assert_eq!(rig.model.why_no_log(rig.now), None);
     assert!(rig.events().contains("(screen 2, bob on pts/2)"), "{}", rig.events());
 }

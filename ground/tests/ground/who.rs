@@ -71,7 +71,7 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
     rig.keys(&ladder());
     rig.keys(&[typed("CTAKE"), vec![Key::Enter], typed("X"), vec![Key::Enter]].concat());
     for kind in CommandKind::ALL {
-        rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+        rig.msg(Msg::command(kind, Seat::new(2, "ann")));
     }
     rig.abort();
     let sent = rig.take_commands();
@@ -107,7 +107,7 @@ fn what_can_move_something_names_the_boot_and_what_stops_does_not() {
     rig.boot_number = 0x00AB_CDEF;
     rig.run(1.0);
     for kind in [CommandKind::Arm, CommandKind::Check, CommandKind::CheckStill] {
-        rig.msg(Msg::Requested { kind, by: Seat::default() });
+        rig.msg(Msg::command(kind, Seat::default()));
         rig.run(1.0);
     }
     rig.armed = true;
@@ -115,10 +115,10 @@ fn what_can_move_something_names_the_boot_and_what_stops_does_not() {
     rig.armed_here = false;
     rig.run(1.0);
     for kind in [CommandKind::Start, CommandKind::TakeCommand, CommandKind::Hold, CommandKind::EndCheck] {
-        rig.msg(Msg::Requested { kind, by: Seat::default() });
+        rig.msg(Msg::command(kind, Seat::default()));
     }
-    rig.msg(Msg::Requested { kind: CommandKind::Disarm, by: Seat::default() });
-    rig.msg(Msg::Requested { kind: CommandKind::Abort, by: Seat::default() });
+    rig.msg(Msg::command(CommandKind::Disarm, Seat::default()));
+    rig.msg(Msg::command(CommandKind::Abort, Seat::default()));
     let sent = rig.take_commands();
     for command in [ARM, CHECK, START, TAKE] {
         assert!(sent.iter().any(|sent| sent.command == command && moves(sent)), "{command:?}");
@@ -267,16 +267,16 @@ fn a_screen_of_another_operator_says_beforehand_that_it_only_stops_and_the_stati
     station.take_commands();
     for operator in ["Bob", "", "ann", "flight on pts/3"] {
         for kind in CommandKind::ALL.into_iter().filter(|kind| kind.needs_the_owner()) {
-            station.msg(Msg::Requested { kind, by: Seat::new(2, operator) });
+            station.msg(Msg::command(kind, Seat::new(2, operator)));
         }
     }
     assert_eq!(station.take_commands(), []);
     assert!(station.events().contains("cannot arm: this station signs as Ann"), "{}", station.events());
-    station.msg(Msg::Requested { kind: CommandKind::Hold, by: Seat::new(2, "Bob") });
-    station.msg(Msg::Requested { kind: CommandKind::Abort, by: Seat::new(2, "Bob") });
+    station.msg(Msg::command(CommandKind::Hold, Seat::new(2, "Bob")));
+    station.msg(Msg::command(CommandKind::Abort, Seat::new(2, "Bob")));
     assert_eq!(station.take_commands().len(), 2);
     station.run(1.0);
-    station.msg(Msg::Requested { kind: CommandKind::Arm, by: Seat::new(3, "Ann") });
+    station.msg(Msg::command(CommandKind::Arm, Seat::new(3, "Ann")));
     assert!(station.take_commands().iter().any(is_arm), "Ann attaches a second screen");
 }
 
@@ -354,7 +354,7 @@ fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
     rig.keys(&ladder());
     rig.keys(&[Key::Char('D'), Key::Enter]);
     for kind in CommandKind::ALL.into_iter().filter(|kind| *kind != CommandKind::Abort) {
-        rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+        rig.msg(Msg::command(kind, Seat::new(2, "ann")));
     }
     assert!(!rig.take_commands().iter().any(|sent| moves(sent) || sent.command == ARM));
     assert!(
@@ -465,7 +465,7 @@ fn no_screen_acts_with_the_key_of_another_person() {
         }
         let by = random.of(&PEOPLE);
         let kind = random.of(&KINDS);
-        station.msg(Msg::Requested { kind, by: Seat::new(1 + random.below(4) as u32, by) });
+        station.msg(Msg::command(kind, Seat::new(1 + random.below(4) as u32, by)));
         for command in
             station.take_commands().iter().filter(|command| moves(command) && command.confirmation == 0)
         {
@@ -543,7 +543,7 @@ fn no_foreign_vehicle_is_ever_armed_or_started() {
             6 => rig.key(Key::Enter),
             _ => {
                 let kind = random.of(&CommandKind::ALL);
-                rig.msg(Msg::Requested { kind, by: Seat::new(2, "ann") });
+                rig.msg(Msg::command(kind, Seat::new(2, "ann")));
             }
         }
         if step % 16 == 0 {

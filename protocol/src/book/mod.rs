@@ -42,6 +42,7 @@ pub struct Line<'a> {
 
 /// The end of a book: how many entries it has, and the hash of the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct Head {
     /// The beginning of the first entry's hash, which names the book.
     pub book: u64,

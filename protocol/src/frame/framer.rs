@@ -7,6 +7,7 @@ use super::{CRC_LEN, Frame, FrameView, HEADER_LEN, INCOMPAT_SIGNED, MAGIC, SIGNA
 
 /// What a [`Framer`] has accepted and rejected.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct FramerCounters {
     /// Frames with a correct CRC.
     pub frames: u64,

@@ -119,6 +119,7 @@ pub enum Rejection {
 
 /// How many frames were accepted and rejected.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct SigningCounters {
     /// Frames with a good signature.
     pub accepted: u64,

@@ -3,14 +3,14 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
+use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
 use ratatui::text::{Line, Span};
 
 use crate::model::Model;
 use crate::model::act::Act;
 use crate::model::dead_reckoning::may_have_left;
 use crate::model::pad_check::{
-    CheckedValue, LOSS_MOST, MARGIN_LEAST_DB, PadCheck, RangeFound, RangeTest, Standing, standing,
+    LOSS_MOST, MARGIN_LEAST_DB, PadCheck, RangeFound, RangeTest, Standing, shown, standing,
 };
 use crate::model::place::{LastPlace, Spot};
 use crate::view::theme::{TextRole, Theme};
@@ -26,12 +26,12 @@ const VALUE_COLUMNS: usize = 39;
 pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let check = model.vehicle.pad_check.as_ref();
     let mut lines = vec![headline(model, check, theme, now), supply(model, theme)];
-    lines.push(Line::styled(
+    lines.push(theme.line(
         format!(" {:<14}{:>24}{:>20}{:>20}", "surface", "range, least", "error, most", "lag, most"),
-        theme.style(TextRole::Label),
+        TextRole::Label,
     ));
     lines.extend(SURFACES.map(|(name, first)| surface(check, name, first, theme)));
-    let others: Vec<&CheckedValue> =
+    let others: Vec<&TD_PAD_CHECK_DATA> =
         check.into_iter().flat_map(PadCheck::values).filter(|value| value.item as u32 >= 18).collect();
     let beside = (columns / VALUE_COLUMNS).max(1);
     // Down the first column first, as they were found.
@@ -52,35 +52,36 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
     let begin = format!("  {all} checks (MOVES), {still} without motion");
     if standing(model, now) == Standing::MayRun {
         return Line::from(vec![
-            Span::styled(" A CHECK MAY RUN: hands off", theme.style(TextRole::Caution)),
-            Span::styled(format!("  {all} ends it"), theme.style(TextRole::Label)),
+            theme.span(" A CHECK MAY RUN: hands off", TextRole::Caution),
+            theme.label(format!("  {all} ends it")),
         ]);
     }
-    let Some(check) = check.filter(|check| check.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
-        return Line::from(vec![
-            Span::styled(" no check yet".to_owned(), theme.style(TextRole::Plain)),
-            Span::styled(begin, theme.style(TextRole::Label)),
-        ]);
+    let Some(check) = check.filter(|check| check.told.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
+        return Line::from(vec![theme.plain(" no check yet"), theme.label(begin)]);
     };
     let failing = check.failing().count();
-    let (words, role, then) = match check.state {
+    let (words, role, then) = match check.told.state {
         S::TD_PAD_CHECK_STATE_RUNNING => (
-            format!(" CHECK {} RUNS {} %: hands off", check.run, check.progress),
+            format!(" CHECK {} RUNS {} %: hands off", check.told.run, check.told.progress),
             TextRole::Caution,
             format!("  {all} ends it"),
         ),
-        S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.run), TextRole::Good, begin),
+        S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.told.run), TextRole::Good, begin),
         S::TD_PAD_CHECK_STATE_FAILED => {
-            (format!(" CHECK {} FAILED: {failing} outside", check.run), TextRole::Alarm, begin)
+            (format!(" CHECK {} FAILED: {failing} outside", check.told.run), TextRole::Alarm, begin)
         }
-        _ => (format!(" CHECK {} STOPPED early", check.run), TextRole::Caution, begin),
+        _ => (format!(" CHECK {} STOPPED early", check.told.run), TextRole::Caution, begin),
     };
     let told = seconds(now.saturating_sub(check.told_at));
-    let by = if check.asked_by > 0 { format!(", {}", model.operator(check.asked_by)) } else { String::new() };
+    let by = if check.told.asked_by > 0 {
+        format!(", {}", model.operator(check.told.asked_by))
+    } else {
+        String::new()
+    };
     Line::from(vec![
-        Span::styled(words, theme.style(role)),
-        Span::styled(format!(" (told {told} ago{by})"), theme.style(TextRole::Label)),
-        Span::styled(then, theme.style(TextRole::Label)),
+        theme.span(words, role),
+        theme.label(format!(" (told {told} ago{by})")),
+        theme.label(then),
     ])
 }
 
@@ -116,30 +117,31 @@ fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
 
 /// One surface: range, error and lag, each with its limit.
 fn surface(check: Option<&PadCheck>, name: &str, first: u32, theme: Theme) -> Line<'static> {
-    let values: Vec<Option<&CheckedValue>> = (first..first + 3)
+    let values: Vec<Option<&TD_PAD_CHECK_DATA>> = (first..first + 3)
         .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
         .collect();
-    let mut spans = vec![Span::styled(format!(" {name:<14}"), theme.style(TextRole::Plain))];
+    let mut spans = vec![theme.plain(format!(" {name:<14}"))];
     for (value, columns) in values.into_iter().zip([24, 20, 20]) {
         let Some(value) = value else {
-            spans.push(Span::styled(format!("{:>columns$}", "--"), theme.style(TextRole::Label)));
+            spans.push(theme.label(format!("{:>columns$}", "--")));
             continue;
         };
         let (mark, role) = role_of(value.verdict);
-        let (_, unit, factor, decimals) = value.shown();
+        let (_, unit, factor, decimals) = shown(value);
+        let number = |number: f32| fixed(factor * f64::from(number), decimals);
         let limit = if value.least.is_finite() { value.least } else { value.most };
-        let (found, limit) = (fixed(factor * value.value, decimals), fixed(factor * limit, decimals));
+        let (found, limit) = (number(value.value), number(limit));
         let text = format!("{mark}{found}, {limit} {unit}");
-        spans.push(Span::styled(format!("{text:>columns$}"), theme.style(role)));
+        spans.push(theme.span(format!("{text:>columns$}"), role));
     }
     Line::from(spans)
 }
 
 /// A value with its limits, in a column.
-fn cell(value: &CheckedValue, theme: Theme) -> Vec<Span<'static>> {
+fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     let (mark, role) = role_of(value.verdict);
-    let (name, unit, factor, decimals) = value.shown();
-    let number = |number: f64| fixed(factor * number, decimals);
+    let (name, unit, factor, decimals) = shown(value);
+    let number = |number: f32| fixed(factor * f64::from(number), decimals);
     let found = match value.item {
         item if is_switch(item) => if value.value > 0.5 { "yes" } else { "no" }.to_owned(),
         _ => format!("{} {unit}", number(value.value)),
@@ -152,10 +154,10 @@ fn cell(value: &CheckedValue, theme: Theme) -> Vec<Span<'static>> {
         (false, false) => String::new(),
     };
     vec![
-        Span::styled(format!(" {mark}"), theme.style(role)),
-        Span::styled(format!("{name:<13.13}"), theme.style(TextRole::Plain)),
-        Span::styled(format!("{found:>10.10}"), theme.style(role)),
-        Span::styled(format!(" {limits:<11.11}"), theme.style(TextRole::Label)),
+        theme.span(format!(" {mark}"), role),
+        theme.plain(format!("{name:<13.13}")),
+        theme.span(format!("{found:>10.10}"), role),
+        theme.label(format!(" {limits:<11.11}")),
     ]
 }
 
@@ -176,7 +178,7 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let key = model.settings.keys.name(Act::RangeTest);
     let Some(test) = model.range_test.as_ref() else {
         return vec![Line::from(vec![
-            Span::styled(" radio: no range test yet", theme.style(TextRole::Plain)),
+            theme.plain(" radio: no range test yet"),
             Span::styled(format!("  {key} begins one: 30 s, antennas as in flight"), label),
         ])];
     };
@@ -192,21 +194,21 @@ fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> 
         (false, None, true) => ("PASSED".to_owned(), TextRole::Good),
         (false, None, false) => ("FAILED".to_owned(), TextRole::Alarm),
     };
-    let mut spans = vec![Span::styled(format!(" RADIO {words}"), theme.style(role))];
+    let mut spans = vec![theme.span(format!(" RADIO {words}"), role)];
     let judged = |ok: bool| if ok { ("ok ", TextRole::Good) } else { ("NO ", TextRole::Alarm) };
     for (name, loss) in [("lost down", found.loss_down), ("up", found.loss_up)] {
         let (mark, role) = judged(loss <= LOSS_MOST);
-        spans.push(Span::styled(format!(" {mark}{name} {} %", fixed(100.0 * loss, 1)), theme.style(role)));
+        spans.push(theme.span(format!(" {mark}{name} {} %", fixed(100.0 * loss, 1)), role));
     }
-    spans.push(Span::styled(format!(" most {:.0}", 100.0 * LOSS_MOST), theme.style(TextRole::Label)));
+    spans.push(theme.label(format!(" most {:.0}", 100.0 * LOSS_MOST)));
     match found.margin_db {
         Some(margin_db) => {
             let (mark, role) = judged(margin_db >= MARGIN_LEAST_DB);
-            spans.push(Span::styled(format!(" {mark}margin {} dB", fixed(margin_db, 1)), theme.style(role)));
+            spans.push(theme.span(format!(" {mark}margin {} dB", fixed(margin_db, 1)), role));
             let least = format!(" least {MARGIN_LEAST_DB:.0}");
-            spans.push(Span::styled(least, theme.style(TextRole::Label)));
+            spans.push(theme.label(least));
         }
-        None => spans.push(Span::styled(" no margin told", theme.style(TextRole::Label))),
+        None => spans.push(theme.label(" no margin told")),
     }
     Line::from(spans)
 }
@@ -216,16 +218,15 @@ fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> 
 /// The places and the ways to them.
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let place = model.last_place(now).or(model.place);
-    let label = |words: &'static str| Line::styled(words, theme.style(TextRole::Label));
+    let label = |words: &'static str| theme.line(words, TextRole::Label);
     if let Some(since) = may_have_left(&model.vehicle, now) {
         return may_have_left_lines(model, since, theme);
     }
     let Some(place) = place else {
         if model.vehicle.left_pad_at.is_some() {
-            return vec![Line::styled(
-                " The vehicle has left the pad, and has not told its place.",
-                theme.style(TextRole::Caution),
-            )];
+            return vec![
+                theme.line(" The vehicle has left the pad, and has not told its place.", TextRole::Caution),
+            ];
         }
         return vec![
             label(" The vehicle has not left the pad."),
@@ -236,11 +237,11 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
     let mut lines = Vec::new();
     if let Some(predicted) = &place.predicted {
-        lines.push(Line::styled(" PREDICTED: look here first", theme.style(TextRole::Caution)));
+        lines.push(theme.line(" PREDICTED: look here first", TextRole::Caution));
         lines.extend(spot(model, &place, predicted, theme));
         lines.push(Line::default());
     }
-    lines.push(Line::styled(" Last heard", theme.style(TextRole::Title)));
+    lines.push(theme.line(" Last heard", TextRole::Title));
     lines.extend(spot(model, &place, &place.heard, theme));
     lines.push(row("height then", format!("{} m", fixed(place.height_m, 1)), theme));
     let ago = now_unix_s.saturating_sub(place.heard_unix_s);
@@ -248,10 +249,10 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(Line::default());
     if place.pad.is_none() {
         let words = " Latitude, longitude and KML need the pad's place: --pad LATITUDE,LONGITUDE";
-        lines.push(Line::styled(words, theme.style(TextRole::Label)));
+        lines.push(theme.line(words, TextRole::Label));
     } else if model.settings.here.is_none() {
         let words = " The way from this station needs its place: --here LATITUDE,LONGITUDE";
-        lines.push(Line::styled(words, theme.style(TextRole::Label)));
+        lines.push(theme.line(words, TextRole::Label));
     }
     lines
 }
@@ -259,10 +260,10 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
 /// It was last heard on the pad, in a countdown that must have ended.
 fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line<'static>> {
     let words = format!(" MAY BE IN THE AIR since T+{:.1} s", since.as_secs_f64());
-    let mut lines = vec![Line::styled(words, theme.style(TextRole::Alarm))];
+    let mut lines = vec![theme.line(words, TextRole::Alarm)];
     let Some(meant) = model.meant_to_come_down() else {
         let words = " It has not told the fence of its mission: look around the pad.";
-        lines.push(Line::styled(words, theme.style(TextRole::Caution)));
+        lines.push(theme.line(words, TextRole::Caution));
         return lines;
     };
     let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
@@ -272,15 +273,12 @@ fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line
         lines.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
     }
     let words = " Under a parachute, or without its landing motor, it may come down farther away.";
-    lines.push(Line::styled(words, theme.style(TextRole::Caution)));
+    lines.push(theme.line(words, TextRole::Caution));
     lines
 }
 
 fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
-    Line::from(vec![
-        Span::styled(format!("   {label:<16}"), theme.style(TextRole::Label)),
-        Span::styled(value, theme.style(TextRole::Plain)),
-    ])
+    Line::from(vec![theme.label(format!("   {label:<16}")), theme.plain(value)])
 }
 
 fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {

@@ -83,7 +83,7 @@ fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, fr
         let inside = titled("From above", theme, frame, above);
         pictures::draw_top_view(model, theme, now, frame, inside);
     }
-    for (from, title, area) in pictures::side_views(model, sides) {
+    for (from, title, area) in pictures::side_views(sides) {
         let inside = titled(title, theme, frame, area);
         pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
     }
@@ -142,7 +142,7 @@ fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
 /// What carries the vehicle up, in words.
 fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(phase) = model.vehicle.phase() else {
-        return Line::styled(" no data", theme.style(TextRole::Caution));
+        return theme.line(" no data", TextRole::Caution);
     };
     let (mark, role) = age_mark(&phase, now);
     let text = match phase.value {
@@ -150,7 +150,7 @@ fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         TdPhase::TD_PHASE_COAST => "coasting",
         _ => "not rising",
     };
-    Line::styled(format!("{mark}{text}"), theme.style(role))
+    theme.line(format!("{mark}{text}"), role)
 }
 
 fn booster(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
@@ -220,10 +220,10 @@ fn band(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) 
 /// Compares the height with the ignition band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
-        return Line::styled(" NO BURN: motor inhibited", theme.style(TextRole::Alarm));
+        return theme.line(" NO BURN: motor inhibited", TextRole::Alarm);
     }
     let Some(descent) = model.vehicle.descent.as_ref() else {
-        return Line::styled(" ignition band: no data", theme.style(TextRole::Caution));
+        return theme.line(" ignition band: no data", TextRole::Caution);
     };
     let (mark, stale) = age_mark(descent, now);
     let d = &descent.value;
@@ -243,13 +243,13 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let committed = height_m < f64::from(d.commit_height_m) && !parachute_may_fly(model, d.chute);
     let commit = if committed { ", committed" } else { "" };
     let role = if stale == TextRole::Stale { stale } else { role };
-    Line::styled(format!("{mark}{words}{commit}"), theme.style(role))
+    theme.line(format!("{mark}{words}{commit}"), role)
 }
 
 /// Whether the parachute is out, or an abort would still throw it out. Then the vehicle is not committed to a burn.
 fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
     let out = matches!(chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
-    let ordered = model.vehicle.phase().is_some_and(|phase| phase.value == TdPhase::TD_PHASE_CHUTE);
+    let ordered = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
     let now = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
     out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
 }

@@ -6,7 +6,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
-use super::{is_roomy, plots, titled};
+use super::{is_roomy, panel, plots, titled};
 use crate::model::link::RED_AFTER;
 use crate::model::motion::{BodySpeed, Motion};
 use crate::model::vehicle::Sample;
@@ -66,7 +66,7 @@ pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
 
 fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows = if panels::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
-    for (from, title, area) in pictures::side_views(model, area) {
+    for (from, title, area) in pictures::side_views(area) {
         let shows = if from == pictures::Viewpoint::South { "flown" } else { shows };
         let whole = format!("{title}: {shows}");
         // With a blank on either side, one column and some rule.
@@ -79,8 +79,7 @@ fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 /// Altitude, speeds and attitude; after the loss of the link the predicted position.
 fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if panels::is_lost(model, now) {
-        let inside = titled("PREDICTED, not heard", theme, frame, area);
-        draw_lines(frame, inside, &panels::lost_rows(model, theme, now));
+        panel("PREDICTED, not heard", &panels::lost_rows(model, theme, now), theme, frame, area);
     } else {
         let inside = titled("Flight", theme, frame, area);
         let mut rows = panels::controller_rows(model, theme, now);
@@ -92,8 +91,7 @@ fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
 
 fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (title, rows) = panels::touchdown_panel_with_bars(model, theme, now, usize::from(area.width));
-    let inside = titled(title, theme, frame, area);
-    draw_lines(frame, inside, &rows);
+    panel(title, &rows, theme, frame, area);
 }
 
 /// Who steers, how upright, and the gimbal against its limit.
@@ -115,10 +113,8 @@ fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 
 fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [fins, gimbal] = area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
-    let inside = titled("Fins command|actual", theme, frame, fins);
-    draw_lines(frame, inside, &panels::fin_rows(model, theme, now));
-    let inside = titled("Gimbal", theme, frame, gimbal);
-    draw_lines(frame, inside, &panels::gimbal_rows(model, theme, now));
+    panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, fins);
+    panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, gimbal);
 }
 
 /// The same content as lines, the most important first.
@@ -141,16 +137,16 @@ pub fn landing_lines(
     }
     lines.push(attitude(model, theme, now));
     let (title, touchdown) = panels::touchdown_panel(model, theme, now);
-    let mut verdict = Line::styled(format!(" {title}: "), theme.style(TextRole::Label));
+    let mut verdict = theme.line(format!(" {title}: "), TextRole::Label);
     verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
         let style = line.style;
         line.spans.into_iter().map(move |span| span.patch_style(style))
     }));
     lines.push(verdict);
     lines.extend(panels::controller_rows(model, theme, now).into_iter().take(2));
-    // For a planar vehicle command and measurement; in space one row of each gimbal plane.
+    // The numbers of each plane, without its bar.
     let gimbal = panels::gimbal_rows(model, theme, now).into_iter();
-    lines.extend(gimbal.step_by(if model.vehicle.in_space { 2 } else { 1 }).take(2));
+    lines.extend(gimbal.step_by(2));
     lines.extend(panels::fin_rows(model, theme, now));
     lines.push(status_lines::link_line(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
@@ -169,10 +165,7 @@ fn value(
     let stale = sample.is_some_and(|sample| sample.is_stale(now));
     let mark = if stale { STALE_MARK } else { "" };
     let role = if stale { TextRole::Stale } else { TextRole::Plain };
-    vec![
-        Span::styled(format!(" {label} "), theme.style(TextRole::Label)),
-        Span::styled(format!("{mark}{text}"), theme.style(role)),
-    ]
+    vec![theme.label(format!(" {label} ")), theme.span(format!("{mark}{text}"), role)]
 }
 
 fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
@@ -188,22 +181,15 @@ fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let vehicle = &model.vehicle;
     let (body, attitude) = (vehicle.body_speed(), vehicle.attitude);
     let axial = body.map(|body| body.map(|b| b.u_m_s));
-    let mut spans;
-    if vehicle.in_space {
-        spans = value(theme, "tilt", attitude.map(|a| a.map(|a| a.tilt_rad.to_degrees())), 1, now);
-        spans.extend(value(theme, "u", axial, 1, now));
-        spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
-    } else {
-        spans = value(theme, "pitch", attitude.map(|a| a.map(|a| a.pitch_rad.to_degrees())), 1, now);
-        spans.extend(value(theme, "u", axial, 1, now));
-        spans.extend(value(theme, "w", body.map(|body| body.map(|b| b.w_m_s)), 2, now));
-    }
+    let mut spans = value(theme, "tilt", attitude.map(|a| a.map(|a| a.tilt_rad.to_degrees())), 1, now);
+    spans.extend(value(theme, "u", axial, 1, now));
+    spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
     Line::from(spans)
 }
 
 fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let event = model.events.newest(1).next()?;
-    Some(Line::styled(format!(" {}{}", event.mark().trim_start(), event.text), theme.style(TextRole::Plain)))
+    Some(theme.line(format!(" {}{}", event.mark().trim_start(), event.text), TextRole::Plain))
 }
 
 // The review page after a flight: verdict, limits, greatest values and timeline.
@@ -252,8 +238,8 @@ pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
         Some((ending, role)) => (ending.sentence(&model.vehicle), role),
         None => ("no verdict received yet".to_owned(), TextRole::Caution),
     };
-    let head = Line::styled(format!(" {words}"), theme.style(role));
-    limits.insert(0, Line::styled(title, theme.style(TextRole::Title)));
+    let head = theme.line(format!(" {words}"), role);
+    limits.insert(0, theme.line(title, TextRole::Title));
     let limit_columns = PLAN_COLUMNS;
     let mut lines = vec![head];
     let maxima = maxima(model, theme, now);
@@ -263,7 +249,7 @@ pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
         lines.extend(limits);
         lines.extend(maxima);
     }
-    lines.push(Line::styled(" Timeline", theme.style(TextRole::Title)));
+    lines.push(theme.line(" Timeline", TextRole::Title));
     lines.extend(timeline(model, theme, columns));
     lines
 }
@@ -292,7 +278,7 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let lost = most.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64());
     // What happened in the silence is not known.
     let title = if lost.is_some() { " Greatest values heard" } else { " Greatest values in flight" };
-    let mut lines = vec![Line::styled(title, theme.style(TextRole::Title))];
+    let mut lines = vec![theme.line(title, TextRole::Title)];
     lines.extend(lost.map(|silence_s| {
         let unheard = model.vehicle.in_flight() && !model.link.state(now).carries();
         let words = if unheard {
@@ -300,14 +286,14 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         } else {
             format!(" silent for {} s of the flight", fixed(silence_s, 1))
         };
-        Line::styled(words, theme.style(TextRole::Caution))
+        theme.line(words, TextRole::Caution)
     }));
     let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
         let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
         Line::from(vec![
-            Span::styled(format!(" {label:<18}"), theme.style(TextRole::Label)),
-            Span::styled(format!("{text:>9}"), theme.style(TextRole::Plain)),
-            Span::styled(format!(" {unit}"), theme.style(TextRole::Label)),
+            theme.label(format!(" {label:<18}")),
+            theme.plain(format!("{text:>9}")),
+            theme.label(format!(" {unit}")),
         ])
     };
     let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
@@ -334,10 +320,10 @@ fn timeline(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
         .map(|(phase, at)| format!("{:>8.1} {:<14}", at.as_secs_f64(), words::phase(*phase)))
         .collect();
     if entries.is_empty() {
-        return vec![Line::styled("  nothing heard", theme.style(TextRole::Label))];
+        return vec![theme.line("  nothing heard", TextRole::Label)];
     }
     entries
         .chunks((columns / TIMELINE_COLUMNS).max(1))
-        .map(|chunk| Line::styled(chunk.concat(), theme.style(TextRole::Plain)))
+        .map(|chunk| theme.line(chunk.concat(), TextRole::Plain))
         .collect()
 }

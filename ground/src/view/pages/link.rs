@@ -52,9 +52,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
             report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme, columns)),
         );
     }
-    lines.push(Line::styled(
+    lines.push(theme.line(
         format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
-        theme.style(TextRole::Title),
+        TextRole::Title,
     ));
     lines.extend(lists::filter_line(model, theme));
     lines.extend(age_lines(model, theme, now, columns));
@@ -76,21 +76,19 @@ fn directions(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         format!("; it refused {} of {system_id}/{component_id}, {since} ago: {why}", refused.count)
     });
     Line::from(vec![
-        Span::styled(" heard    ", theme.style(TextRole::Label)),
-        Span::styled(
-            format!("down {} ago, up {} ago{refused}", age(model.link.state(now)), age(uplink.state(now))),
-            theme.style(TextRole::Plain),
-        ),
+        theme.label(" heard    "),
+        theme.plain(format!(
+            "down {} ago, up {} ago{refused}",
+            age(model.link.state(now)),
+            age(uplink.state(now))
+        )),
     ])
 }
 
 /// Counts of rejected frames by reason.
 fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let row = |label: &str, value: String| {
-        Line::from(vec![
-            Span::styled(format!(" {label:<9}"), theme.style(TextRole::Label)),
-            Span::styled(value, theme.style(TextRole::Plain)),
-        ])
+        Line::from(vec![theme.label(format!(" {label:<9}")), theme.plain(value)])
     };
     let framing = &model.link.framing;
     let unreadable = format!(
@@ -154,13 +152,13 @@ fn heading(theme: Theme, columns: usize) -> Line<'static> {
     } else {
         " Over 10 s: rate, loss, age".to_owned()
     };
-    Line::styled(text, theme.style(TextRole::Title))
+    theme.line(text, TextRole::Title)
 }
 
 fn report_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
     let name = &report.name;
     if let Some(why) = &report.trouble {
-        return Line::styled(format!(" {name} DOWN {why}"), theme.style(TextRole::Alarm));
+        return theme.line(format!(" {name} DOWN {why}"), TextRole::Alarm);
     }
     let LinkFigures { rx_bytes_s, tx_bytes_s, rx_frames_s, loss } = report.figures;
     let loss = (rx_frames_s > 0.0).then_some(loss);
@@ -176,7 +174,7 @@ fn report_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'stati
         let kind = name.split(':').next().unwrap_or_default();
         format!(" {kind} {rx} B/s {loss_words}")
     };
-    Line::styled(text, theme.style(loss_role(loss)))
+    theme.line(text, loss_role(loss))
 }
 
 fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: usize) -> Line<'static> {
@@ -197,7 +195,7 @@ fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: 
         format!(" {name} {rx_frames_s:.1}/s {loss_words} {mark}{age_words}")
     };
     let role = if age > STALE_AFTER { TextRole::Stale } else { loss_role(loss) };
-    Line::styled(text, theme.style(role))
+    theme.line(text, role)
 }
 
 /// What a component is, by its ids (MAVLink's `MAV_COMPONENT`).
@@ -233,10 +231,7 @@ fn age_cell(name: &str, age: Option<Duration>, theme: Theme) -> [Span<'static>; 
         Some(age) if age > STALE_AFTER => (format!("{STALE_MARK}{}", seconds(age)), TextRole::Stale),
         Some(age) => (format!(" {}", seconds(age)), TextRole::Plain),
     };
-    [
-        Span::styled(format!(" {name:<24.24}"), theme.style(TextRole::Label)),
-        Span::styled(format!("{text:<10}"), theme.style(role)),
-    ]
+    [theme.label(format!(" {name:<24.24}")), theme.span(format!("{text:<10}"), role)]
 }
 
 /// The regular messages, received or not; then every other message that was received, by its id.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
 use super::window;
 use crate::model::act::{ABORT_WORDS, Act, DEFINITIONS};
@@ -25,17 +25,14 @@ pub fn alarms_lines(
 ) -> Vec<Line<'static>> {
     let list = model.alarms.list();
     if list.is_empty() {
-        return vec![Line::styled(" no active or unacknowledged alarm", theme.style(TextRole::Good))];
+        return vec![theme.line(" no active or unacknowledged alarm", TextRole::Good)];
     }
     let chosen = model.pointed_at().map(|alarm| alarm.kind);
     let head = Line::from(vec![
-        Span::styled(" Space", theme.style(TextRole::Key)),
-        Span::styled(" acknowledges the marked one; ", theme.style(TextRole::Label)),
-        Span::styled("Up Down", theme.style(TextRole::Key)),
-        Span::styled(
-            format!(" choose; {} of {} not seen", model.alarms.unacknowledged(), list.len()),
-            theme.style(TextRole::Label),
-        ),
+        theme.key(" Space"),
+        theme.label(" acknowledges the marked one; "),
+        theme.key("Up Down"),
+        theme.label(format!(" choose; {} of {} not seen", model.alarms.unacknowledged(), list.len())),
     ]);
     let mut marked = 0;
     let lines: Vec<Line> = list
@@ -53,9 +50,9 @@ pub fn alarms_lines(
             let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
             let text = cut(&alarm.text, room);
             Line::from(vec![
-                Span::styled(mark, theme.style(TextRole::Key)),
-                Span::styled(format!("{word:<WORD_COLUMNS$}"), theme.style(role)),
-                Span::styled(format!("{text:<room$} {age}{lasted}"), theme.style(TextRole::Plain)),
+                theme.key(mark),
+                theme.span(format!("{word:<WORD_COLUMNS$}"), role),
+                theme.plain(format!("{text:<room$} {age}{lasted}")),
             ])
         })
         .collect();
@@ -80,7 +77,7 @@ pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) 
     let place = if back == 0 { String::new() } else { format!(", {back} below") };
     let text = format!(" {} events, {count} lines{place}; Up and Down scroll", model.events.total());
     let head = lists::filter_line(model, theme);
-    lines.insert(0, head.unwrap_or_else(|| Line::styled(text, theme.style(TextRole::Label))));
+    lines.insert(0, head.unwrap_or_else(|| theme.line(text, TextRole::Label)));
     lines
 }
 
@@ -98,9 +95,9 @@ pub fn parameters_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'s
         format!(" {} of {of} known", parameters.len())
     };
     let head = Line::from(vec![
-        Span::styled(state, theme.style(TextRole::Plain)),
-        Span::styled("   r", theme.style(TextRole::Key)),
-        Span::styled(" asks the vehicle again; read-only here", theme.style(TextRole::Label)),
+        theme.plain(state),
+        theme.key("   r"),
+        theme.label(" asks the vehicle again; read-only here"),
     ]);
     let head = lists::filter_line(model, theme).unwrap_or(head);
     let list: Vec<Line> = parameters
@@ -108,8 +105,8 @@ pub fn parameters_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'s
         .filter(|(name, _)| model.pages.lets_pass(name))
         .map(|(name, value)| {
             Line::from(vec![
-                Span::styled(format!("  {name:<18}"), theme.style(TextRole::Label)),
-                Span::styled(format!("{:>14}", shortest(value)), theme.style(TextRole::Plain)),
+                theme.label(format!("  {name:<18}")),
+                theme.plain(format!("{:>14}", shortest(value))),
             ])
         })
         .collect();
@@ -136,10 +133,7 @@ fn space(model: &Model) -> String {
 /// The state of the recording, its files and counts.
 pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let row = |label: &str, value: String, role: TextRole| {
-        Line::from(vec![
-            Span::styled(format!(" {label:<14}"), theme.style(TextRole::Label)),
-            Span::styled(value, theme.style(role)),
-        ])
+        Line::from(vec![theme.label(format!(" {label:<14}")), theme.span(value, role)])
     };
     if model.settings.role == Role::Replaying {
         return vec![
@@ -164,14 +158,11 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),
         Line::default(),
-        Line::styled(
+        theme.line(
             " Both directions of the link, every key, command and event are recorded.",
-            theme.style(TextRole::Label),
+            TextRole::Label,
         ),
-        Line::styled(
-            " Records older than 0.2 s are on disk, even if this program crashes.",
-            theme.style(TextRole::Label),
-        ),
+        theme.line(" Records older than 0.2 s are on disk, even if this program crashes.", TextRole::Label),
     ]
 }
 
@@ -200,10 +191,7 @@ const MARKS: [&str; 4] = [
 /// The actions whose keys do something now; those that show a page in one line.
 pub fn help_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let line = |key: String, words: &str| {
-        Line::from(vec![
-            Span::styled(format!(" {key:<KEY_COLUMNS$}"), theme.style(TextRole::Key)),
-            Span::styled(words.to_owned(), theme.style(TextRole::Plain)),
-        ])
+        Line::from(vec![theme.key(format!(" {key:<KEY_COLUMNS$}")), theme.plain(words.to_owned())])
     };
     let mut lines = Vec::new();
     if model.settings.role.why_not_command().is_none() {
@@ -232,6 +220,6 @@ pub fn help_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         }
     }
     lines.extend(rows.iter().map(|row| line("pages".to_owned(), row)));
-    lines.extend(MARKS.map(|mark| Line::styled(format!(" {mark}"), theme.style(TextRole::Label))));
+    lines.extend(MARKS.map(|mark| theme.line(format!(" {mark}"), TextRole::Label)));
     lines
 }

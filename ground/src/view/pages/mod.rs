@@ -66,11 +66,17 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
 
 /// Draws a title with a rule and returns the area below it.
 pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let title = Line::styled(format!(" {title} "), theme.style(TextRole::Title));
+    let title = theme.line(format!(" {title} "), TextRole::Title);
     let block = Block::new().borders(Borders::TOP).border_style(theme.style(TextRole::Label)).title(title);
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
     inside
+}
+
+/// Draws lines with a title and a rule above them.
+fn panel(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
+    let inside = titled(title, theme, frame, area);
+    draw_lines(frame, inside, lines);
 }
 
 /// From this size on a page has room for more than the essentials.

@@ -5,9 +5,9 @@ use std::time::Duration;
 use protocol::dialect::{TdCheck, TdInterlock, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
-use super::{is_roomy, titled};
+use super::{is_roomy, panel, titled};
 use crate::model::act::Act;
 use crate::model::command::{CommandKind, why_not_here};
 use crate::model::identity::Foreign;
@@ -70,11 +70,9 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     if lists_steps {
         draw_checklist(model, theme, now, frame, checks_area);
     } else {
-        let inside = titled(&summary(model, now).0, theme, frame, checks_area);
-        draw_lines(frame, inside, &checks);
+        panel(&summary(model, now).0, &checks, theme, frame, checks_area);
     }
-    let inside = titled("Arming ladder", theme, frame, ladder_area);
-    draw_lines(frame, inside, &ladder);
+    panel("Arming ladder", &ladder, theme, frame, ladder_area);
     let inside = titled("Events", theme, frame, events);
     let lines = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lines);
@@ -110,15 +108,12 @@ pub fn pad_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         None => vec![top_lines::command(model, theme, now)],
     };
     let (words, role) = summary(model, now);
-    lines.push(Line::styled(format!(" {words}"), theme.style(role)));
+    lines.push(theme.line(format!(" {words}"), role));
     let mut checks = checks(model, theme, now);
     checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
     lines.extend(checks);
     if model.checklist.is_some() {
-        lines.push(Line::styled(
-            format!(" {}", lists::checklist_title(model, now)),
-            theme.style(TextRole::Title),
-        ));
+        lines.push(theme.line(format!(" {}", lists::checklist_title(model, now)), TextRole::Title));
         lines.extend(lists::checklist_rows(
             model,
             theme,
@@ -147,13 +142,10 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         let name = words::check(name);
         let found = found(&model.vehicle, bit);
         Line::from(vec![
-            Span::styled(
-                word,
-                theme.style(if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm }),
-            ),
-            Span::styled(format!("{mark}{name:<19.19}"), theme.style(TextRole::Plain)),
-            Span::styled(format!("{found:>10} "), theme.style(TextRole::Plain)),
-            Span::styled(reason, theme.style(TextRole::Caution)),
+            theme.span(word, if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm }),
+            theme.plain(format!("{mark}{name:<19.19}")),
+            theme.plain(format!("{found:>10} ")),
+            theme.span(reason, TextRole::Caution),
         ])
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
@@ -169,7 +161,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     }
     let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
     let count = format!(" GO {mark}{pass} of {of} checks");
-    lines.push(Line::styled(count, theme.style(TextRole::Good)));
+    lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
     if !station_log_fails {
@@ -207,9 +199,9 @@ fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'stati
         LogStanding::Unfit(_, words) => (" !! ", TextRole::Caution, format!("overruled: {words}")),
     };
     let line = Line::from(vec![
-        Span::styled(word, theme.style(role)),
-        Span::styled(" station log ", theme.style(TextRole::Plain)),
-        Span::styled(found, theme.style(if word == "    " { TextRole::Plain } else { TextRole::Caution })),
+        theme.span(word, role),
+        theme.plain(" station log "),
+        theme.span(found, if word == "    " { TextRole::Plain } else { TextRole::Caution }),
     ]);
     (word == " NO ", line)
 }
@@ -289,8 +281,8 @@ fn checks_rung(model: &Model, now: Duration) -> String {
 /// The steps from link to countdown, and which are done.
 fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
-    let phase = vehicle.phase().map(|phase| phase.value);
-    let armed = vehicle.armed().is_some_and(|armed| armed.value);
+    let phase = vehicle.phase_now();
+    let armed = vehicle.is_armed();
     let on_pad = phase.is_some_and(is_on_pad);
     let checked =
         on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
@@ -319,26 +311,23 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         .into_iter()
         .map(|(stands, words)| {
             let (mark, role) = if stands { (" [x] ", TextRole::Good) } else { (" [ ] ", TextRole::Label) };
-            Line::from(vec![
-                Span::styled(mark, theme.style(role)),
-                Span::styled(words, theme.style(TextRole::Plain)),
-            ])
+            Line::from(vec![theme.span(mark, role), theme.plain(words)])
         })
         .collect();
     if let Some(number) = model.commanded_by() {
         let here = number == model.own_number();
         let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
-        lines.push(Line::styled(words, theme.style(TextRole::Plain)));
+        lines.push(theme.line(words, TextRole::Plain));
     }
     let watches = model.settings.role.why_not_command();
     let only_stops = why_not_here(model).map(|_| "HOLD and ABORT only from here");
     lines.push(match watches.or(only_stops) {
-        Some(why) => Line::styled(format!(" {why}"), theme.style(TextRole::Label)),
+        Some(why) => theme.line(format!(" {why}"), TextRole::Label),
         None => Line::from(vec![
-            Span::styled(format!(" {}", keys.name(Act::Disarm)), theme.style(TextRole::Key)),
-            Span::styled(" disarm   ", theme.style(TextRole::Label)),
-            Span::styled(top_lines::ABORT_KEY, theme.style(TextRole::Key)),
-            Span::styled(" ABORT", theme.style(TextRole::Label)),
+            theme.key(format!(" {}", keys.name(Act::Disarm))),
+            theme.label(" disarm   "),
+            theme.key(top_lines::ABORT_KEY),
+            theme.label(" ABORT"),
         ]),
     });
     let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
@@ -356,19 +345,19 @@ pub fn foreign_lines(
     now: Duration,
     (columns, rows): (usize, usize),
 ) -> Vec<Line<'static>> {
-    let plain = |text: String| Line::styled(text, theme.style(TextRole::Plain));
+    let plain = |text: String| theme.line(text, TextRole::Plain);
     let mut lines = vec![
-        Line::styled(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), theme.style(TextRole::Alarm)),
+        theme.line(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), TextRole::Alarm),
         plain(format!(" mode {}, {}", foreign.mode(), if foreign.armed { "ARMED" } else { "disarmed" })),
         plain(" Nothing is armed or started there from here.".to_owned()),
-        Line::styled(format!(" An abort {}.", foreign.termination()), theme.style(TextRole::Caution)),
+        theme.line(format!(" An abort {}.", foreign.termination()), TextRole::Caution),
     ];
     lines.extend(foreign.told.iter().map(|(name, text)| {
         let (mark, role) = age_mark(text, now);
         let role = if role == TextRole::Stale { role } else { TextRole::Plain };
         Line::from(vec![
-            Span::styled(format!(" {name:<9}"), theme.style(TextRole::Label)),
-            Span::styled(format!("{mark}{}", text.value), theme.style(role)),
+            theme.label(format!(" {name:<9}")),
+            theme.span(format!("{mark}{}", text.value), role),
         ])
     }));
     let room = rows.saturating_sub(lines.len());

@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
 use super::flight::of_descent;
-use super::{is_roomy, titled};
+use super::{is_roomy, panel, titled};
 use crate::model::act::Act;
 use crate::model::motion::Motion;
 use crate::model::quantity::{ALL, Quantity};
@@ -58,7 +58,7 @@ fn names(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
         let is_chosen = quantity == chosen;
         let (mark, role) = if is_chosen { (">", TextRole::Key) } else { (" ", TextRole::Label) };
         let pin = if model.pages.pinned.contains(&quantity) { "*" } else { " " };
-        Line::styled(format!("{mark}{pin}{}", quantity.name), theme.style(role))
+        theme.line(format!("{mark}{pin}{}", quantity.name), role)
     };
     ALL.iter().skip(start).take(rows).map(line).collect()
 }
@@ -72,10 +72,7 @@ fn present(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> L
             format!("{mark}{value} {}", quantity.unit),
             theme.style(role).patch(theme.style(TextRole::Title)),
         ),
-        Span::styled(
-            format!("   {} pins it to every page", model.settings.keys.name(Act::Pin)),
-            theme.style(TextRole::Label),
-        ),
+        theme.label(format!("   {} pins it to every page", model.settings.keys.name(Act::Pin))),
     ])
 }
 
@@ -90,7 +87,7 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
         .map(|(at, value)| (at.as_secs_f64() - zero_s, value))
         .collect();
     if points.len() < 2 {
-        return draw_line(frame, area, Line::styled(" nothing to plot yet", theme.style(TextRole::Label)));
+        return draw_line(frame, area, theme.line(" nothing to plot yet", TextRole::Label));
     }
     let of = |pick: fn(&(f64, f64)) -> f64| {
         let least = points.iter().map(pick).fold(f64::INFINITY, f64::min);
@@ -184,10 +181,7 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         }
         None => " x where it will come down: not known".to_owned(),
     };
-    Line::from(vec![
-        Span::styled(words, theme.style(TextRole::Plain)),
-        Span::styled("; line flown, dots planned", theme.style(TextRole::Label)),
-    ])
+    Line::from(vec![theme.plain(words), theme.label("; line flown, dots planned")])
 }
 
 // The page of all values: flight, descent, controller with its residuals, actuators, link.
@@ -247,11 +241,6 @@ pub fn values_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'sta
     lines
 }
 
-fn panel(title: &str, rows: &[Line<'static>], theme: Theme, frame: &mut Frame, area: Rect) {
-    let inside = titled(title, theme, frame, area);
-    draw_lines(frame, inside, rows);
-}
-
 /// The estimates behind the descent.
 fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let of = |pick| of_descent(model, pick);
@@ -271,7 +260,7 @@ fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         line("down east", of(|d| d.touchdown_y_m), 1, "m"),
     ];
     if model.vehicle.descent.is_none() {
-        rows.insert(0, Line::styled(" no data", theme.style(TextRole::Caution)));
+        rows.insert(0, theme.line(" no data", TextRole::Caution));
     }
     rows
 }
