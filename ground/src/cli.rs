@@ -14,10 +14,7 @@ use simulated_vehicle::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;
-use crate::model::act::Bindings;
-use crate::model::alarm::Amount;
-use crate::model::place::Degrees;
-use crate::model::words;
+use crate::model::{Amount, Bindings, Degrees, words};
 use crate::view::theme::Palette;
 
 /// The profile that the demonstration flies by default.
@@ -81,7 +78,7 @@ pub struct Cli {
     #[arg(long, value_name = "FILE|none", global = true)]
     pub log: Option<LogChoice>,
 
-    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2; the paper's landing is paper-calibrated.
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2.
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
     pub profile: Option<String>,
 

@@ -9,8 +9,7 @@ use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
 use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, ThemeChoice};
-use crate::model::act::{Bindings, DEFINITIONS};
-use crate::model::alarm::{Amount, Talk};
+use crate::model::{Amount, Bindings, DEFINITIONS, Talk};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = include_str!("../config-example.toml");
@@ -272,8 +271,7 @@ mod tests {
     use super::*;
     use clap::{CommandFactory as _, Parser as _};
 
-    use crate::model::act::Act;
-    use crate::model::alarm::Amount;
+    use crate::model::{Act, Amount};
     use crate::view::theme::Palette;
 
     // Tests of the settings file, its example and the flags.

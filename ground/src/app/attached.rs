@@ -21,12 +21,7 @@ use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::act::Bindings;
-use crate::model::alarm::Talk;
-use crate::model::command::CommandKind;
-use crate::model::crew::Seat;
-use crate::model::log::Speaker;
-use crate::model::{Action, Model, Request, Role, Settings};
+use crate::model::{Action, Bindings, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk};
 use crate::update::{Msg, update};
 
 /// The period of the screen's own ticks: dialogs and chords expire even while the station sends nothing.

@@ -15,10 +15,10 @@ use time::OffsetDateTime;
 use time::macros::format_description;
 
 use crate::cli::LogChoice;
-use crate::model::checklist::{Checklist, ChecklistEntry, Remembered};
-use crate::model::log::LogSpace;
-use crate::model::place::LastPlace;
-use crate::model::{BookLine, checklist, place};
+use crate::model::{
+    BookLine, Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, entry_text, geojson, kml,
+    parse_checklist, read_geojson, remembered,
+};
 
 /// How many logs may start in the same second.
 const SAME_SECOND_MAX: u32 = 100;
@@ -241,8 +241,7 @@ pub(super) fn open_checklist(
     let written = File::open(path).with_context(|| format!("the checklist {shown}"))?;
     lock(&written, path)?;
     (&written).take(BYTES_MAX).read_to_string(&mut text).with_context(|| format!("the checklist {shown}"))?;
-    let mut checklist =
-        checklist::parse_checklist(&text).with_context(|| format!("the checklist {shown}"))?;
+    let mut checklist = parse_checklist(&text).with_context(|| format!("the checklist {shown}"))?;
     let mut signed_path = path.as_os_str().to_owned();
     signed_path.push(".signed");
     let signed_path = PathBuf::from(signed_path);
@@ -258,7 +257,7 @@ pub(super) fn open_checklist(
         }
     };
     let Remembered { entries, outdated, broken } =
-        checklist::remembered(&String::from_utf8_lossy(&list), &checklist.hash, now_unix_s);
+        remembered(&String::from_utf8_lossy(&list), &checklist.hash, now_unix_s);
     let mut told = Vec::new();
     for entry in &entries {
         checklist.apply(entry);
@@ -302,7 +301,7 @@ impl SignatureFile {
             lock(&file, &self.path)?;
             file
         };
-        let text = checklist::entry_text(&self.hash, entry);
+        let text = entry_text(&self.hash, entry);
         let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_data());
         let written = written.with_context(signatures);
         self.file = Some(file);
@@ -325,8 +324,8 @@ const PLACE_BYTES_MAX: u64 = 64 * 1024;
 /// The folder cannot be written.
 pub(super) fn write_place(folder: &Path, place: &LastPlace) -> anyhow::Result<()> {
     let name = format!("{PLACE_NAME}{:08X}", place.boot);
-    write_one(folder, &format!("{name}.geojson"), &place::geojson(place))?;
-    match place::kml(place) {
+    write_one(folder, &format!("{name}.geojson"), &geojson(place))?;
+    match kml(place) {
         Some(kml) => write_one(folder, &format!("{name}.kml"), &kml),
         None => Ok(()),
     }
@@ -356,7 +355,7 @@ pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<Las
     let places = ours.filter_map(|file| {
         let mut text = String::new();
         File::open(file.path()).ok()?.take(PLACE_BYTES_MAX).read_to_string(&mut text).ok()?;
-        place::read_geojson(&text)
+        read_geojson(&text)
     });
     places
         .filter(|place| now_unix_s.saturating_sub(place.heard_unix_s) <= KEPT_FOR_S)
@@ -438,7 +437,7 @@ mod book_tests {
 #[cfg(test)]
 mod checklist_tests {
     use super::*;
-    use crate::model::checklist::{Mark, Signature};
+    use crate::model::{Mark, Signature};
 
     #[test]
     fn signatures_survive_a_restart_and_another_text_has_none() {
@@ -474,7 +473,7 @@ mod checklist_tests {
 #[cfg(test)]
 mod places_tests {
     use super::*;
-    use crate::model::place::{Degrees, Spot};
+    use crate::model::{Degrees, Spot};
 
     #[test]
     fn the_newest_place_of_today_survives_a_restart() {

@@ -16,8 +16,7 @@ use tokio::sync::{Semaphore, broadcast, mpsc, oneshot};
 
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
 use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
-use crate::model::crew::Seat;
-use crate::model::{Model, Settings};
+use crate::model::{Model, Seat, Settings};
 use crate::update::Msg;
 
 /// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood. It is most of what a station
@@ -476,8 +475,7 @@ mod watchers_tests {
 
     use crate::attach::codec::{decode_to_screen, encode_to_station};
     use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
-    use crate::model::Request;
-    use crate::model::command::CommandKind;
+    use crate::model::{CommandKind, Request};
     use crate::update::Msg;
 
     #[test]

@@ -21,10 +21,7 @@ use super::wire::Wire;
 use super::{files, programs, screen, stations};
 use crate::attach::{ToScreen, ToStation};
 use crate::demo::Demo;
-use crate::model::checklist::ChecklistEntry;
-use crate::model::crew::{Seat, role_name};
-use crate::model::place::LastPlace;
-use crate::model::{BookLine, LogHealth, Model, Settings};
+use crate::model::{BookLine, ChecklistEntry, LastPlace, LogHealth, Model, Seat, Settings, role_name};
 use crate::update::{Action, Msg, update};
 
 /// How often the vehicle is told the end of the closed book, because a frame may be lost.

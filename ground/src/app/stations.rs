@@ -14,8 +14,7 @@ use super::server::read_one;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
 use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
 use crate::exit::Exit;
-use crate::model::crew::Seat;
-use crate::model::{Model, words};
+use crate::model::{Model, Seat, words};
 
 /// How long a station may take to answer.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);

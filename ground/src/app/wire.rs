@@ -14,8 +14,7 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
 
 use super::clock::{Clock, LogTime};
-use crate::model::identity::GONE_AFTER;
-use crate::model::link::LinkReport;
+use crate::model::{GONE_AFTER, LinkReport};
 use crate::update::Msg;
 
 /// How often signing timestamps are saved, in signing time units of 10 us.

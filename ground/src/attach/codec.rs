@@ -154,12 +154,9 @@ mod tests {
     use protocol::signing::SigningCounters;
 
     use crate::attach::StationStatus;
-    use crate::model::alarm::AlarmKind;
-    use crate::model::command::CommandKind;
-    use crate::model::crew::{KeyOwner, Seat};
-    use crate::model::link::LinkReport;
-    use crate::model::log::{LogHealth, LogSpace};
-    use crate::model::{Request, Settings};
+    use crate::model::{
+        AlarmKind, CommandKind, KeyOwner, LinkReport, LogHealth, LogSpace, Request, Seat, Settings,
+    };
 
     // Every message decodes to what was encoded, and no bytes cause a panic.
 
@@ -213,9 +210,8 @@ mod tests {
 
     #[test]
     fn a_checklist_survives_the_round_trip() {
-        use crate::model::checklist::{ChecklistEntry, Signature};
-        let mut list =
-            crate::model::checklist::parse_checklist(include_str!("../../checklist-example.toml")).unwrap();
+        use crate::model::{ChecklistEntry, Signature};
+        let mut list = crate::model::parse_checklist(include_str!("../../checklist-example.toml")).unwrap();
         let signature = Signature { by: "Ann".to_owned(), unix_s: 7, found: Some(1.5), role: None };
         list.apply(&ChecklistEntry::Signed { step: 0, signature: signature.clone() });
         list.apply(&ChecklistEntry::Voided { step: 1, signature });

@@ -10,9 +10,11 @@ use std::time::Duration;
 use protocol::dialect::TdPhase;
 use serde::Deserialize;
 
-use super::page::Page;
-use super::quantity::Quantity;
-use super::{Model, Role, command, quantity};
+use super::{
+    Model, Page, Role,
+    quantity::{self, Quantity},
+    why_not_arm, why_not_check, why_not_here, why_not_start, why_not_take,
+};
 use crate::key::Key;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,18 +174,18 @@ impl Act {
     /// Whether the key would do something now.
     pub fn works(self, model: &Model, now: Duration) -> bool {
         let commands = model.settings.role.why_not_command().is_none();
-        let acts = command::why_not_here(model).is_none();
+        let acts = why_not_here(model).is_none();
         match self {
-            Self::Arm => acts && command::why_not_arm(model, now).is_none(),
-            Self::Start => acts && command::why_not_start(model, now).is_none(),
+            Self::Arm => acts && why_not_arm(model, now).is_none(),
+            Self::Start => acts && why_not_start(model, now).is_none(),
             Self::Disarm => acts && model.vehicle.is_armed(),
             Self::HoldCountdown => {
                 commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
             }
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
-            Self::TakeCommand => acts && command::why_not_take(model, now).is_none(),
-            Self::RangeTest => commands && command::why_not_check(model, now).is_none(),
-            Self::Check | Self::CheckStill => acts && command::why_not_check(model, now).is_none(),
+            Self::TakeCommand => acts && why_not_take(model, now).is_none(),
+            Self::RangeTest => commands && why_not_check(model, now).is_none(),
+            Self::Check | Self::CheckStill => acts && why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Pin => matches!(model.page(), Page::Plot),
@@ -290,7 +292,7 @@ impl Bindings {
             Key::Char(letter) if letter.is_ascii_uppercase() => {
                 self.exactly(Key::Char(letter.to_ascii_lowercase()))
             }
-            Key::F1 => Some(Act::Show(crate::model::page::Page::Help)),
+            Key::F1 => Some(Act::Show(crate::model::Page::Help)),
             Key::CtrlC => Some(Act::Quit),
             Key::Escape => Some(Act::Follow),
             _ => None,
@@ -426,7 +428,7 @@ fn every_entry(model: &Model) -> impl Iterator<Item = PaletteEntry> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::page::Page;
+    use crate::model::Page;
     use proptest::prelude::*;
 
     #[test]

@@ -6,8 +6,7 @@ use clap::ValueEnum;
 use protocol::dialect::TdPhase;
 use serde::{Deserialize, Serialize};
 
-use super::command::CommandKind;
-use super::safety::Ending;
+use super::{CommandKind, Ending};
 
 /// An alarm that nobody has acknowledged rings again after this long.
 pub const RING_EVERY: Duration = Duration::from_secs(4);

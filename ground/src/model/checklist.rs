@@ -10,9 +10,10 @@ use protocol::dialect::TdRole;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::quantity::Quantity;
-use super::vehicle::is_flight;
-use super::{Model, quantity};
+use super::{
+    Model, is_flight,
+    quantity::{self, Quantity},
+};
 
 /// The most steps of a checklist.
 pub const STEPS_MAX: usize = 40;
@@ -125,7 +126,7 @@ mod role_words {
 
     use super::{TdRole, role_of, role_word};
 
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives the field itself")]
+    #[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde gives the field itself")]
     pub(super) fn serialize<S: Serializer>(role: &Option<TdRole>, to: S) -> Result<S::Ok, S::Error> {
         to.serialize_str(role.map_or("", role_word))
     }

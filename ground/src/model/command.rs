@@ -7,10 +7,7 @@ use protocol::dialect::{MavCmd, MavResult, TdAct, TdInterlock, TdPhase};
 use protocol::identity::Address;
 use serde::{Deserialize, Serialize};
 
-use super::crew::{Ask, Seat};
-use super::identity::GONE_AFTER;
-use super::vehicle::{Vehicle, is_on_pad};
-use super::{Model, Settings, words};
+use super::{Ask, GONE_AFTER, Model, Seat, Settings, Vehicle, is_on_pad, words};
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little over two
 /// heartbeats.

@@ -6,8 +6,7 @@ use std::time::Duration;
 use protocol::dialect::{TdAct, TdRole};
 use serde::{Deserialize, Serialize};
 
-use super::Model;
-use super::command::why_not_seat;
+use super::{Model, why_not_seat};
 
 /// How long a countdown may continue without a commanding screen.
 pub const UNATTENDED_MAX: Duration = Duration::from_secs(2);

@@ -12,8 +12,7 @@ use std::time::Duration;
 
 use protocol::dialect::{TdChute, TdHold, TdPhase};
 
-use super::motion::{Change, GRAVITY_M_S2, Motion, NorthEastUp};
-use super::vehicle::{Vehicle, is_burning};
+use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Vehicle, is_burning};
 
 /// Error of the last position, m: usual for a satellite receiver.
 const POSITION_ERROR_M: f64 = 1.5;
@@ -354,9 +353,7 @@ mod tests {
     use proptest::prelude::*;
     use protocol::dialect::{TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdLimit};
 
-    use crate::model::motion::{GRAVITY_M_S2, Motion};
-    use crate::model::safety::Touchdown;
-    use crate::model::vehicle::{Heartbeat, Prediction, Sample};
+    use crate::model::{GRAVITY_M_S2, Heartbeat, Motion, Prediction, Sample, Touchdown};
 
     const SEEN: Duration = Duration::from_secs(100);
 

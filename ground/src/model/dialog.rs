@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::crew::Ask;
+use super::Ask;
 use crate::key::Key;
 
 /// How long the crew has to type a word.

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use super::Model;
-use super::motion::{FlownPath, every_second};
-use super::quantity::{ALL, COUNT, Quantity};
-use super::vehicle::{Vehicle, is_flight};
+use super::{
+    FlownPath, Model, Vehicle, every_second, is_flight,
+    quantity::{ALL, COUNT, Quantity},
+};
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
 const TIMELINE_MAX: usize = 64;

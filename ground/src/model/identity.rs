@@ -9,8 +9,7 @@ use protocol::dialect::{
 };
 use protocol::identity::LARGEST_BOOT_NUMBER;
 
-use super::vehicle::Sample;
-use super::words;
+use super::{Sample, words};
 
 /// Messages of a slow and a fast link mix: a vehicle's clock, ms, may go back by this much.
 const REORDERED_MS: u32 = 5_000;

@@ -10,8 +10,7 @@ use protocol::link_stats::{ContentAge, LinkFigures, LinkStats, SourceFigures};
 use protocol::signing::SigningCounters;
 use serde::{Deserialize, Serialize};
 
-use super::identity::time_boot_ms;
-use super::{Model, Role};
+use super::{Model, Role, time_boot_ms};
 
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);

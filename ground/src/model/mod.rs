@@ -3,25 +3,25 @@
 //! Every received value carries the time of its reception. The model decides nothing, and it imports neither `update`
 //! nor `view`.
 
-pub mod act;
-pub mod alarm;
-pub mod checklist;
-pub mod command;
-pub mod crew;
+mod act;
+mod alarm;
+mod checklist;
+mod command;
+mod crew;
 pub mod dead_reckoning;
-pub mod dialog;
-pub mod history;
-pub mod identity;
-pub mod link;
-pub mod log;
-pub mod motion;
-pub mod pad_check;
-pub mod page;
-pub mod place;
+mod dialog;
+mod history;
+mod identity;
+mod link;
+mod log;
+mod motion;
+mod pad_check;
+mod page;
+mod place;
 pub mod quantity;
-pub mod safety;
+mod safety;
 pub mod telemetry;
-pub mod vehicle;
+mod vehicle;
 pub mod words;
 
 use std::sync::Arc;
@@ -29,28 +29,30 @@ use std::time::Duration;
 
 use protocol::dialect::{MavMessage, TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::record::{self, EventLevel, Record};
 use protocol::log::v1::OperatorAction;
 use protocol::mission::MissionHash;
 use protocol::text::Reassembler;
 use serde::{Deserialize, Serialize};
 
-use act::Bindings;
-use alarm::{Alarm, AlarmKind, Alarms, Called, Talk};
-use checklist::{Checklist, ChecklistEntry};
+pub use act::*;
+pub use alarm::*;
+pub use checklist::*;
+pub use command::*;
+pub use crew::*;
+pub use dialog::*;
+pub use history::*;
+pub use identity::*;
+pub use link::*;
+pub use log::*;
+pub use motion::*;
+pub use pad_check::*;
+pub use page::*;
+pub use place::*;
+pub use safety::*;
+pub use vehicle::*;
+
 pub(crate) use command::AutoStep;
-use command::{CommandKind, Commands};
-use crew::{Crew, KeyOwner, Seat};
-use dialog::{AbortChord, Dialog, KeyTiming, RestOfWord};
-use history::{History, LookBack, Recall};
-use link::Link;
-pub use log::LogHealth;
-use log::{BookState, Events, LogFault, Speaker};
-use pad_check::RangeTest;
-use page::{Page, Pages};
-use place::{Degrees, LastPlace};
-use safety::Danger;
-use vehicle::{Parameters, Vehicle};
 
 /// The settings of a run, which do not change during it.
 ///
@@ -452,7 +454,7 @@ impl Action {
     }
 
     pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
-        let event = Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
+        let event = record::Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
         Self::Record(Record::Event(event))
     }
 }

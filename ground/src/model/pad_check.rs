@@ -8,9 +8,7 @@ use protocol::dialect::{
 };
 use protocol::link_stats::FrameCounts;
 
-use super::Model;
-use super::command::{Acknowledgement, CommandKind};
-use super::crew::Seat;
+use super::{Acknowledgement, CommandKind, Model, Seat};
 
 /// A check with motion takes 13 s. If neither answer nor end of one that was asked for is heard, it may run for so long.
 const LONGEST: Duration = Duration::from_secs(20);

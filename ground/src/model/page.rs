@@ -2,9 +2,10 @@
 
 use protocol::dialect::TdPhase;
 
-use super::alarm::AlarmKind;
-use super::quantity;
-use super::quantity::Quantity;
+use super::{
+    AlarmKind,
+    quantity::{self, Quantity},
+};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {

@@ -7,9 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use serde_json::{Value, json};
 
-use super::Model;
-use super::dead_reckoning::predict_position;
-use super::vehicle::Sample;
+use super::{Model, Sample, dead_reckoning::predict_position};
 
 /// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
 const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;

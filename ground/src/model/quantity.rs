@@ -4,9 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_CONTROLLER_DATA, TD_DESCENT_DATA};
 
-use super::Model;
-use super::motion::{Attitude, BodySpeed, Motion};
-use super::vehicle::{Sample, Vehicle};
+use super::{Attitude, BodySpeed, Model, Motion, Sample, Vehicle};
 
 /// A number of the telemetry or of the link, in the unit of the screen.
 pub struct Quantity {

@@ -8,12 +8,11 @@ use protocol::dialect::{
 };
 use protocol::log::record::EventLevel;
 
-use super::Model;
-use super::command::CommandKind;
-use super::crew::role_name;
-use super::dead_reckoning::{is_unheard, may_have_left, predict_position};
-use super::log::Speaker;
-use super::vehicle::{Vehicle, Verdict, is_on_pad};
+use super::{
+    CommandKind, Model, Speaker, Vehicle, Verdict,
+    dead_reckoning::{is_unheard, may_have_left, predict_position},
+    is_on_pad, role_name,
+};
 
 /// Why nobody may approach, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,12 +8,9 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 
-use super::identity::{Foreign, MessageBoot, may_be_ours};
-use super::motion::{Attitude, Motion};
-use super::pad_check::PadCheck;
-use super::safety::Touchdown;
-use super::vehicle::{
-    Battery, Deflection, Gimbal, Heartbeat, Prediction, Sample, Vehicle, Verdict, is_burning, is_on_pad,
+use super::{
+    Attitude, Battery, Deflection, Foreign, Gimbal, Heartbeat, MessageBoot, Motion, PadCheck, Prediction,
+    Sample, Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
 };
 
 /// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted; then everything received

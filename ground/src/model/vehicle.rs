@@ -9,11 +9,9 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 
-use super::identity::{Boot, Foreign, GONE_AFTER};
-use super::motion::{Attitude, BodySpeed, FlownPath, Motion, Trend};
-use super::pad_check::PadCheck;
-use super::safety::Touchdown;
-use super::words;
+use super::{
+    Attitude, BodySpeed, Boot, FlownPath, Foreign, GONE_AFTER, Motion, PadCheck, Touchdown, Trend, words,
+};
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);

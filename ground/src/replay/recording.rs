@@ -15,8 +15,7 @@ use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::frame_length;
 
-use crate::model::command::CommandKind;
-use crate::model::telemetry::phase_of as phase_of_heartbeat;
+use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 
 /// How often the reading progress is reported, bytes.
 const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;

@@ -7,15 +7,11 @@ use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 
 use super::Action;
-use crate::model::alarm::{AlarmKind, Amount};
-use crate::model::command::{Acknowledgement, CommandKind};
-use crate::model::dead_reckoning::may_have_left;
-use crate::model::link::{LinkState, RED_AFTER};
-use crate::model::log::{LogStanding, Speaker};
-use crate::model::pad_check::PadCheck;
-use crate::model::safety::{Approach, Danger, Ending, KeepAway, hold_words};
-use crate::model::vehicle::is_on_pad;
-use crate::model::{Model, Role, link, safety, words};
+use crate::model::{
+    Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Danger, Ending, KeepAway, LinkState,
+    LogStanding, Model, PadCheck, RED_AFTER, Role, Speaker, dead_reckoning::may_have_left, hold_words,
+    is_on_pad, latch_words, refused_frames, words,
+};
 
 /// An abort without an answer raises an alarm after this time.
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
@@ -81,7 +77,7 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let text = format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s");
         found.push((AlarmKind::MayBeFlying, text));
     }
-    found.extend(link::refused_frames(model, now).map(|words| (AlarmKind::Signatures, words)));
+    found.extend(refused_frames(model, now).map(|words| (AlarmKind::Signatures, words)));
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
@@ -170,7 +166,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
     found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
     found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
-    found.extend(safety::latch_words(model).map(|words| (AlarmKind::Aborted, words)));
+    found.extend(latch_words(model).map(|words| (AlarmKind::Aborted, words)));
     if let Some(locks) = vehicle.interlocks() {
         let latched = [
             (TdInterlock::TD_INTERLOCK_NO_LIGHT, AlarmKind::NoLight, "NO LIGHT: the motor did not light"),

@@ -10,10 +10,10 @@ use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
 use super::Action;
-use crate::model::command::{Acknowledgement, CommandKind, TrackedCommand, why_nothing_moves};
-use crate::model::crew::{Seat, UNATTENDED_MAX};
-use crate::model::log::Speaker;
-use crate::model::{AutoStep, Model, words};
+use crate::model::{
+    Acknowledgement, AutoStep, CommandKind, Model, Seat, Speaker, TrackedCommand, UNATTENDED_MAX,
+    why_nothing_moves, words,
+};
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
 const ABORT_REPORTED_EVERY: u32 = 100;

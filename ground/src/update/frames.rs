@@ -10,8 +10,7 @@ use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
 use super::{Action, commands, pad, vehicle_changes};
-use crate::model::log::Speaker;
-use crate::model::{Model, Role, telemetry};
+use crate::model::{Model, Role, Speaker, telemetry};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;

@@ -13,21 +13,12 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
-use crate::model::act::{Act, Does};
-use crate::model::alarm::AlarmKind;
-use crate::model::command::{
-    CommandKind, is_only_the_log, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_seat,
-    why_not_start, why_not_take, why_nothing_moves,
+use crate::model::{
+    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
+    KeyOrigin, LOOKS_FOR, LogStanding, LookBack, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
+    Standing, TextEntry, is_only_the_log, palette_entries, quantity, standing, why_not_arm, why_not_check,
+    why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves,
 };
-use crate::model::crew::Seat;
-use crate::model::dialog::{
-    AGAIN_AFTER, AGAIN_KEY, CONFIRM_WORD, Dialog, FINGERS_APART, KeyOrigin, Prompt, RestOfWord,
-};
-use crate::model::history::{LOOKS_FOR, LookBack};
-use crate::model::log::{LogStanding, Speaker};
-use crate::model::pad_check::{Standing, standing};
-use crate::model::page::{Page, TextEntry};
-use crate::model::{Model, Role, act, quantity};
 use crate::update;
 
 /// How many lines PgUp and PgDn scroll.
@@ -323,7 +314,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::TakeCommand => match why_not_take(model, now) {
             None => open(model, Prompt::TakeCommand, now),
             Some(why) => {
-                refuse(model, &words(model, Prompt::TakeCommand), format!("cannot take command: {why}"), now)
+                refuse(model, &words(model, Prompt::TakeCommand), format!("cannot take command: {why}"), now);
             }
         },
         Act::Check | Act::CheckStill => match standing(model, now) {
@@ -634,7 +625,7 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
     match key {
         Key::Escape => return,
         Key::Enter => {
-            let entry = act::palette_entries(model, &typed).into_iter().nth(chosen);
+            let entry = palette_entries(model, &typed).into_iter().nth(chosen);
             return match entry.map(|entry| entry.does) {
                 Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
                     drop_run(model, now);
@@ -644,7 +635,7 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
             };
         }
         Key::Up => chosen = chosen.saturating_sub(1),
-        Key::Down => chosen = (chosen + 1).min(act::palette_entries(model, &typed).len().saturating_sub(1)),
+        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed).len().saturating_sub(1)),
         _ => {
             edit(&mut typed, key);
             chosen = 0;

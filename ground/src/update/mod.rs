@@ -19,14 +19,10 @@ use protocol::signing::SigningCounters;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::key::Key;
-use crate::model::checklist::Checklist;
-use crate::model::command::CommandKind;
-use crate::model::crew::Seat;
-use crate::model::link::LinkReport;
-use crate::model::log::{LogStanding, Speaker};
-use crate::model::place::LastPlace;
 pub use crate::model::{Action, Request};
-use crate::model::{LogHealth, Model, Role};
+use crate::model::{
+    Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat, Speaker,
+};
 
 /// The name of a signal, or of another reason to end.
 pub type SignalName = &'static str;

@@ -6,13 +6,10 @@ use protocol::dialect::{MavMessage, TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdPadCheck
 use protocol::log::record::EventLevel;
 
 use super::{Action, Request};
-use crate::model::checklist::{ChecklistEntry, Mark, Signature};
-use crate::model::command::why_not_check;
-use crate::model::crew::{Seat, role_name};
-use crate::model::dialog::Prompt;
-use crate::model::log::Speaker;
-use crate::model::pad_check::{PadCheck, RangeTest, shown};
-use crate::model::{Model, Role, words};
+use crate::model::{
+    ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker, role_name,
+    shown, why_not_check, words,
+};
 
 /// Opens the dialog that signs or voids the chosen step.
 pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
@@ -133,7 +130,7 @@ fn signature(
 
 /// The vehicle has left the pad: every step is open again.
 pub(super) fn reopen_checklist(model: &mut Model, now: Duration) {
-    let touched = model.checklist.as_ref().is_some_and(crate::model::checklist::Checklist::is_touched);
+    let touched = model.checklist.as_ref().is_some_and(crate::model::Checklist::is_touched);
     if model.settings.role == Role::Station && touched {
         change_checklist(
             model,

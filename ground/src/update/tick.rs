@@ -9,10 +9,7 @@ use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
-use crate::model::link::LinkState;
-use crate::model::log::Speaker;
-use crate::model::vehicle::{Deflection, is_on_pad};
-use crate::model::{Model, Role, history, link};
+use crate::model::{Deflection, LinkState, Model, Role, Speaker, is_on_pad, note_trace, unheard_hints};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 /// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
@@ -53,14 +50,14 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
     note_loss(model, now);
     if !model.link.unheard_reported
-        && let Some(hints) = link::unheard_hints(model, now)
+        && let Some(hints) = unheard_hints(model, now)
     {
         model.link.unheard_reported = true;
         model.warn(now, hints.join(" "));
     }
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
-    history::note_trace(model, now);
+    note_trace(model, now);
     if model.vehicle.in_flight() || model.vehicle.countdown_s().is_some() {
         model.recall.note(&model.vehicle, now);
     }
@@ -133,7 +130,7 @@ fn note_loss(model: &mut Model, now: Duration) {
 fn why_end(model: &Model, now: Duration) -> Option<String> {
     let outcome = &model.outcome;
     let past = |at: Duration| now.saturating_sub(at) >= WAIT_AFTER_FLIGHT;
-    let on_ground = model.vehicle.phase().is_some_and(|phase| !crate::model::vehicle::is_flight(phase.value));
+    let on_ground = model.vehicle.phase().is_some_and(|phase| !crate::model::is_flight(phase.value));
     if outcome.error.is_some() {
         return Some("the run cannot continue".to_owned());
     }

@@ -9,15 +9,11 @@ use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
 use super::{Action, commands, pad};
-use crate::model::command::is_aborted;
-use crate::model::dialog::RestOfWord;
-use crate::model::history::{History, Maxima};
-use crate::model::link::Uplink;
-use crate::model::log::Speaker;
-use crate::model::motion::FlownPath;
-use crate::model::safety::{Approach, Danger, Ending, KeepAway, hold_words};
-use crate::model::vehicle::{Parameters, Vehicle, Verdict, is_flight, is_on_pad};
-use crate::model::{FlightSoFar, Model, safety, words};
+use crate::model::{
+    Approach, Danger, Ending, FlightSoFar, FlownPath, History, KeepAway, Maxima, Model, Parameters,
+    RestOfWord, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight, is_on_pad, latch_words,
+    words,
+};
 
 /// The part of the vehicle's state whose changes are reported.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -91,7 +87,7 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
     }
     if after.aborted && !before.aborted {
         model.outcome.aborted_at = Some(now);
-        let words = safety::latch_words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
+        let words = latch_words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
         model.say(now, Speaker::Ground, EventLevel::Error, format!("the vehicle says {words}"));
         model.outbox.push(Action::SyncLog);
     }

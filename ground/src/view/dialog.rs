@@ -10,14 +10,10 @@ use ratatui::widgets::{Block, Clear};
 
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
-use crate::model::act::{Act, palette_entries};
-use crate::model::command::why_not_here;
-use crate::model::crew::role_name;
-use crate::model::dialog::{AGAIN_KEY, CONFIRM_WORD, Prompt};
-use crate::model::identity::Foreign;
-use crate::model::pad_check::PadCheck;
-use crate::model::page::TextEntry;
-use crate::model::{Model, Role, words};
+use crate::model::{
+    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
+    role_name, why_not_here, words,
+};
 
 const BOX_COLUMNS: u16 = 68;
 

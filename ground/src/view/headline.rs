@@ -11,12 +11,11 @@ use tui_big_text::{BigText, PixelSize};
 use super::draw_line;
 use super::theme::{TextRole, Theme};
 use super::widgets::{STALE_MARK, age_mark, fixed};
-use crate::model::Model;
-use crate::model::command::{why_nothing_moves, why_other_mission};
-use crate::model::dead_reckoning::{is_unheard, may_have_left, predict_position};
-use crate::model::place::Spot;
-use crate::model::safety::{Approach, Ending, hold_words};
-use crate::model::vehicle::{Sample, is_on_pad};
+use crate::model::{
+    Approach, Ending, Model, Sample, Spot,
+    dead_reckoning::{is_unheard, may_have_left, predict_position},
+    hold_words, is_on_pad, why_nothing_moves, why_other_mission,
+};
 
 /// Columns between two items.
 const GAP_COLUMNS: u16 = 2;

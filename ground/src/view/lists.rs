@@ -8,12 +8,7 @@ use ratatui::text::{Line, Span};
 use super::CUT_MARK;
 use super::theme::{TextRole, Theme};
 use super::widgets::fixed;
-use crate::model::Model;
-use crate::model::act::Act;
-use crate::model::checklist::{Mark, Step, StepState};
-use crate::model::crew::role_name;
-use crate::model::log::Event;
-use crate::model::page::TextEntry;
+use crate::model::{Act, Event, Mark, Model, Step, StepState, TextEntry, role_name};
 
 /// Columns before the text of an event: time, speaker and mark.
 const BEFORE_TEXT: usize = 18;
@@ -275,8 +270,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    use crate::model::Settings;
-    use crate::model::log::Speaker;
+    use crate::model::{Settings, Speaker};
     use crate::view::theme::Palette;
 
     #[test]

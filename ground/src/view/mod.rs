@@ -23,11 +23,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::Model;
-use crate::model::act::Act;
-use crate::model::command::CommandKind;
-use crate::model::history::LookBack;
-use crate::model::page::{Page, TextEntry};
+use crate::model::{Act, CommandKind, LookBack, Model, Page, TextEntry};
 use theme::{TextRole, Theme};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.

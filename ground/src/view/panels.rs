@@ -7,11 +7,11 @@ use ratatui::text::{Line, Span};
 
 use super::theme::{TextRole, Theme};
 use super::widgets::{age_mark, fixed, row, seconds, shortest};
-use crate::model::dead_reckoning::{Basis, is_unheard, predict_position};
-use crate::model::motion::{Attitude, BodySpeed, Motion};
-use crate::model::safety::{Ending, LIMITS, Touchdown, are_of_legs};
-use crate::model::vehicle::{Deflection, Gimbal, Sample};
-use crate::model::{Model, words};
+use crate::model::{
+    Attitude, BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, are_of_legs,
+    dead_reckoning::{Basis, is_unheard, predict_position},
+    words,
+};
 
 /// Altitude, speeds and attitude.
 pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {

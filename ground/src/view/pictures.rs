@@ -15,11 +15,9 @@ use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 use super::theme::{Ink, TextRole, Theme};
 use super::widgets::{STALE_MARK, age_mark, fixed, shortest};
 use super::{draw_lines, widgets};
-use crate::model::Model;
-use crate::model::dead_reckoning::predict_position;
-use crate::model::motion::{Attitude, Motion, NorthEastUp};
-use crate::model::quantity::Quantity;
-use crate::model::vehicle::Deflection;
+use crate::model::{
+    Attitude, Deflection, Model, Motion, NorthEastUp, dead_reckoning::predict_position, quantity::Quantity,
+};
 
 /// Braille dots per cell.
 pub(super) const DOTS_ACROSS: f64 = 2.0;

@@ -12,11 +12,9 @@ use ratatui::text::{Line, Span};
 use super::draw_line;
 use super::theme::{TextRole, Theme};
 use super::widgets::{STALE_MARK, age_mark, fixed, shortest};
-use crate::model::alarm::Alarm;
-use crate::model::link::RADIO_FRESH;
-use crate::model::motion::GRAVITY_M_S2;
-use crate::model::vehicle::{Vehicle, is_on_pad};
-use crate::model::{Model, Playback, Role, safety, words};
+use crate::model::{
+    Alarm, GRAVITY_M_S2, Model, Playback, RADIO_FRESH, Role, Vehicle, is_on_pad, latch_cause, words,
+};
 
 /// A vehicle that is slower than this is not falling, m/s.
 const FALLS_M_S: f64 = 0.5;
@@ -65,7 +63,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
 
 fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String) {
     if vehicle.interlocks().is_some() && !vehicle.may_light() {
-        let why = safety::latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
+        let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
         return ("the ground".to_owned(), format!(": the motor will NOT be lit{why}"));
     }
     let descent = vehicle.descent.as_ref();

@@ -10,15 +10,11 @@ use ratatui::text::{Line, Span};
 use super::theme::{TextRole, Theme};
 use super::widgets::{STALE_MARK, age_mark, shortest};
 use super::{draw_line, status_lines};
-use crate::model::command::{
-    Acknowledgement, CommandKind, TrackedCommand, why_nothing_moves, why_other_mission,
+use crate::model::{
+    Acknowledgement, CommandKind, Foreign, LinkState, Model, Role, Standing, TrackedCommand, abort_too_late,
+    dead_reckoning::may_have_left, hold_words, standing, unheard_hints, why_nothing_moves, why_other_mission,
+    words,
 };
-use crate::model::dead_reckoning::may_have_left;
-use crate::model::identity::Foreign;
-use crate::model::link::LinkState;
-use crate::model::pad_check::{Standing, standing};
-use crate::model::safety::hold_words;
-use crate::model::{Model, Role, link, safety, words};
 
 /// Columns of `REPLAY SIM` with its spaces.
 const MODE_COLUMNS: u16 = 12;
@@ -267,7 +263,7 @@ fn abort_effect(model: &Model, now: Duration) -> String {
     if may_have_left(&model.vehicle, now).is_some() {
         return "MAY NOT ARRIVE; what it would do is not told".to_owned();
     }
-    if let Some(why) = safety::abort_too_late(model, now) {
+    if let Some(why) = abort_too_late(model, now) {
         return why.to_owned();
     }
     let mark = if status.is_stale(now) { "~" } else { "" };
@@ -380,7 +376,7 @@ pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(track) = latest.filter(|track| go || !answered_long_ago(track, now)) {
         return command_facts(track, theme, now);
     }
-    let unheard = link::unheard_hints(model, now).and_then(|hints| hints.into_iter().next());
+    let unheard = unheard_hints(model, now).and_then(|hints| hints.into_iter().next());
     let words = ready.or_else(|| unheard.map(|words| (words, TextRole::Caution)));
     words.map_or_else(Line::default, |(words, role)| theme.line(format!(" {words}"), role))
 }

@@ -9,11 +9,12 @@ use ratatui::widgets::Sparkline;
 
 use super::draw_line;
 use super::theme::{TextRole, Theme};
-use crate::model::Model;
-use crate::model::dead_reckoning::{is_unheard, predict_position};
-use crate::model::quantity::Quantity;
-use crate::model::vehicle::Sample;
 pub use crate::model::words::{fixed, shortest};
+use crate::model::{
+    Model, Sample,
+    dead_reckoning::{is_unheard, predict_position},
+    quantity::Quantity,
+};
 
 /// The mark before a value that is too old.
 pub const STALE_MARK: &str = "~";

@@ -1,8 +1,7 @@
 //! After the flight: the flight again, its report, and where to look for the vehicle.
 
 use ground::key::Key;
-use ground::model::place::{Degrees, LastPlace};
-use ground::model::{Role, Settings};
+use ground::model::{Degrees, LastPlace, Role, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::TdPhase;
 

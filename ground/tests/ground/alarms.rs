@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::alarm::{AlarmKind, RING_EVERY};
-use ground::model::command::CommandKind;
-use ground::model::{Role, Settings};
+use ground::model::{AlarmKind, CommandKind, RING_EVERY, Role, Settings};
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
 use protocol::signing::SigningCounters;

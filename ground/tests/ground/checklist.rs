@@ -3,10 +3,7 @@
 use std::path::Path;
 
 use ground::key::Key;
-use ground::model::checklist::parse_checklist;
-use ground::model::checklist::{Checklist, ChecklistEntry, Mark};
-use ground::model::crew::Seat;
-use ground::model::{Role, Settings};
+use ground::model::{Checklist, ChecklistEntry, Mark, Role, Seat, Settings, parse_checklist};
 use ground::update::{Action, Msg, Request};
 use ground::view::theme::{Palette, Theme};
 use protocol::crew_file::CrewFile;

@@ -1,9 +1,7 @@
 //! The crew: operators in the log, two screens that command at once, and a countdown without a commanding screen.
 
 use ground::key::Key;
-use ground::model::Settings;
-use ground::model::command::CommandKind;
-use ground::model::crew::Seat;
+use ground::model::{CommandKind, Seat, Settings};
 use ground::update::{Action, Msg};
 use protocol::dialect::{MavCmd, TdPhase};
 use protocol::log::record::Record;

@@ -9,9 +9,7 @@ use std::time::Duration;
 
 use ground::attach::codec::{decode_to_screen, encode_to_station, length};
 use ground::attach::{ToScreen, ToStation};
-use ground::model::command::{CommandKind, TrackedCommand};
-use ground::model::crew::Seat;
-use ground::model::{Model, Role, Settings};
+use ground::model::{CommandKind, Model, Role, Seat, Settings, TrackedCommand};
 use ground::update::Request;
 use ground::update::{Msg, update};
 use protocol::dialect::TdPhase;

@@ -3,7 +3,7 @@
 use crate::keys::ladder;
 use crate::rig::Rig;
 use ground::key::Key;
-use ground::model::command::{Acknowledgement, CommandKind};
+use ground::model::{Acknowledgement, CommandKind};
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;

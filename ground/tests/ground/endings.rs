@@ -1,7 +1,7 @@
 //! How a flight ended, why its motor was inhibited, and a flight that nobody heard.
 
 use ground::key::Key;
-use ground::model::safety::Ending;
+use ground::model::Ending;
 use protocol::dialect::{MavSeverity, TdChute, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase};
 
 use crate::rig::Rig;

@@ -1,12 +1,7 @@
 //! The palette, the filter, pinned and plotted numbers, and keys of the crew's choice.
 
 use ground::key::Key;
-use ground::model::act;
-use ground::model::act::Does;
-use ground::model::act::{Act, DEFINITIONS};
-use ground::model::dialog::Prompt;
-use ground::model::page::Page;
-use ground::model::quantity;
+use ground::model::{Act, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 
@@ -21,7 +16,7 @@ fn choose(rig: &mut Rig, text: &str) {
 #[test]
 fn the_palette_lists_every_action_with_its_key() {
     let rig = on_the_pad();
-    let listed = act::palette_entries(&rig.model, "");
+    let listed = palette_entries(&rig.model, "");
     for definition in &DEFINITIONS {
         let entry = listed.iter().find(|entry| entry.does == Does::Act(definition.act)).unwrap();
         assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.usual.name()));

@@ -4,8 +4,10 @@ use std::time::Duration;
 
 use flight::computer::LogState;
 use flight::computer::crew::{Asked, Request};
-use ground::model::Model;
-use ground::model::dead_reckoning::{Basis, PredictedPosition, predict_position};
+use ground::model::{
+    Model,
+    dead_reckoning::{Basis, PredictedPosition, predict_position},
+};
 use ground::update::{Msg, update};
 use ground::view::status_lines;
 use protocol::dialect::{TdChute, TdPhase};

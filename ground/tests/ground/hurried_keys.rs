@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::dialog::AGAIN_AFTER;
+use ground::model::AGAIN_AFTER;
 use ground::update::Msg;
 use proptest::prelude::*;
 use protocol::dialect::{MavCmd, TdCheck};

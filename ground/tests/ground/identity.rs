@@ -1,8 +1,7 @@
 //! Who commands, which boot of which vehicle, and whether people may approach it.
 
 use ground::key::Key;
-use ground::model::crew::Seat;
-use ground::model::{Role, Settings};
+use ground::model::{Role, Seat, Settings};
 use ground::update::{Action, Msg};
 use protocol::dialect::{
     MavCmd, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor, TdPhase,

@@ -4,10 +4,7 @@ use std::time::Duration;
 
 use crate::rig::{Rig, is_abort, is_arm, typed};
 use ground::key::Key;
-use ground::model::Role;
-use ground::model::command::CommandKind;
-use ground::model::dialog::ABORT_TIME_LIMIT;
-use ground::model::dialog::WORD_TIME_LIMIT;
+use ground::model::{ABORT_TIME_LIMIT, CommandKind, Role, WORD_TIME_LIMIT};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
 
@@ -197,7 +194,7 @@ fn the_chord_aborts_in_every_phase_and_the_ladder_arms_only_on_the_pad() {
         rig.run(1.0);
         rig.take_commands();
         rig.keys(&ladder());
-        let on_pad = ground::model::vehicle::is_on_pad(phase);
+        let on_pad = ground::model::is_on_pad(phase);
         assert_eq!(rig.take_commands().iter().any(is_arm), on_pad, "{phase:?}");
         let mut rig = Rig::crewed();
         rig.phase = phase;

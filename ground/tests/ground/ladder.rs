@@ -7,9 +7,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::Role;
-use ground::model::command::CommandKind;
-use ground::model::dialog::ABORT_TIME_LIMIT;
+use ground::model::{ABORT_TIME_LIMIT, CommandKind, Role};
 use ground::update::{Action, Msg, Request};
 use proptest::prelude::*;
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
@@ -279,7 +277,7 @@ impl Watched {
         prop_assert!(!leaves || quits, "left by {history:?}");
         if chord {
             // The abort counts as answered, so that its resends do not look like new ones.
-            self.rig.model.commands = ground::model::command::Commands::default();
+            self.rig.model.commands = ground::model::Commands::default();
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::link::LinkReport;
+use ground::model::LinkReport;
 use ground::update::Msg;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, SYS_STATUS_DATA};
 use protocol::frame::Encoder;

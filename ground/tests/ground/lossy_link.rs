@@ -4,8 +4,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::Model;
-use ground::model::command::CommandKind;
+use ground::model::{CommandKind, Model};
 use ground::update::{Action, Msg, update};
 use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
@@ -13,7 +12,7 @@ use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
 use simulated_vehicle::fly::DeadlinePolicy;
-use simulated_vehicle::fly::load_flight;
+use simulated_vehicle::fly::{StartPoint, load_flight};
 
 use crate::rig::settings;
 
@@ -66,7 +65,8 @@ struct Run {
 }
 
 fn run(seed: u64) -> Run {
-    let mut vehicle = load_flight("paper-calibrated")
+    let mut vehicle = load_flight("mk2")
+        .and_then(|flight| flight.starting_at(Some(StartPoint::Drone)))
         .expect("built in")
         .vehicle(seed, DeadlinePolicy::Observe)
         .expect("sound");

@@ -2,9 +2,7 @@
 
 use crate::rig::{Rig, settings, typed};
 use ground::key::Key;
-use ground::model::alarm::AlarmKind;
-use ground::model::page::Page;
-use ground::model::{Model, Role};
+use ground::model::{AlarmKind, Model, Page, Role};
 use ground::update::Action;
 use protocol::dialect::{
     COMMAND_LONG_DATA, MavCmd, MavMessage, RADIO_STATUS_DATA, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,

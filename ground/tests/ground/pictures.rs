@@ -10,8 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::crew::Seat;
-use ground::model::page::Page;
+use ground::model::{Page, Seat};
 use ground::replay::recording::{RecordedEvent, Recording};
 use ground::update::{Msg, Request};
 use ground::view::CUT_MARK;
@@ -59,7 +58,7 @@ fn with_events() -> Rig {
 /// On the pad with a checklist: signed, open, voided, and with a value.
 fn with_checklist() -> Rig {
     let mut rig = on_the_pad();
-    let list = ground::model::checklist::parse_checklist(include_str!("../../checklist-example.toml"));
+    let list = ground::model::parse_checklist(include_str!("../../checklist-example.toml"));
     rig.msg(Msg::Checklist(Box::new(list.expect("the example is a checklist"))));
     for (step, void) in [(0, false), (1, false), (3, false), (1, true)] {
         rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });

@@ -101,9 +101,9 @@ fn nothing_heard_is_code_5() {
 
 /// The demonstration, through real sockets, faster than real time.
 #[test]
-fn the_papers_landing_ends_with_code_0_and_names_its_log() {
+fn a_landing_ends_with_code_0_and_names_its_log() {
     let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--speed", "4", "--profile", "paper-calibrated"]);
+    let output = ground(directory.path(), &["--speed", "4", "--start", "apogee"]);
     let text = out(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", err(&output));
     for words in [
@@ -143,7 +143,7 @@ fn the_papers_landing_ends_with_code_0_and_names_its_log() {
         ends == ["ground", "vehicle"]
     };
     assert!(both_sides("/mavlink/rx/raw") && both_sides("/mavlink/tx/raw"));
-    for topic in ["/telemetry", "/operator", "/events", "/controller/tick", "/verdict"] {
+    for topic in ["/telemetry", "/operator", "/events", "/computer/frame", "/verdict"] {
         assert!(reader.channels().any(|(_, channel)| channel.topic == topic), "{topic} is missing");
     }
     let output = ground(directory.path(), &["--replay", log]);
@@ -197,7 +197,7 @@ fn the_telemetry_log_contains_the_same_flight() {
     let directory = tempfile::tempdir().unwrap();
     let output = ground(
         directory.path(),
-        &["--profile", "paper-calibrated", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"],
+        &["--start", "apogee", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"],
     );
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     let verdict = |file: &str| {

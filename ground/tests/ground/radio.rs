@@ -3,7 +3,7 @@
 use crate::rig::{Rig, settings, typed};
 use ground::exit::{Exit, decide};
 use ground::key::Key;
-use ground::model::link::LinkState;
+use ground::model::LinkState;
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 use protocol::dialect::{

@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::page::Page;
-use ground::model::{Role, Settings};
+use ground::model::{Page, Role, Settings};
 use ground::replay::Player;
 use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
@@ -166,7 +165,7 @@ fn the_links_figures_are_the_recorded_ones() {
 #[test]
 fn recorded_commands_are_shown() {
     let mut model = ground::model::Model::new(settings(false, true));
-    let msg = Msg::Commanded(ground::model::command::CommandKind::Abort);
+    let msg = Msg::Commanded(ground::model::CommandKind::Abort);
     let actions = ground::update::update(&mut model, msg, S(1));
     assert!(actions.iter().any(|action| matches!(action, Action::Send(_))));
     assert_eq!(model.commands.tracks[0].attempts, 1);

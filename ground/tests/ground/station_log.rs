@@ -1,10 +1,7 @@
 //! The station's own log as a check of its own.
 
 use ground::key::Key;
-use ground::model::crew::Seat;
-use ground::model::dialog::Prompt;
-use ground::model::log::{LogFault, LogHealth, LogSpace, LogStanding};
-use ground::model::{Role, Settings};
+use ground::model::{LogFault, LogHealth, LogSpace, LogStanding, Prompt, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::log::record::Record;
 

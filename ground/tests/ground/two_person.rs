@@ -1,9 +1,7 @@
 //! Two people at two stations: what one asks is on the other's screen, and only the other's ladder confirms it.
 
 use ground::key::Key;
-use ground::model::Settings;
-use ground::model::crew::KeyOwner;
-use ground::model::crew::Seat;
+use ground::model::{KeyOwner, Seat, Settings};
 use ground::update::Msg;
 use protocol::dialect::{
     COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult, TD_CREW_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TdAct,

@@ -1,7 +1,7 @@
 //! The uplink: whether the vehicle hears this station.
 
 use ground::key::Key;
-use ground::model::dialog::Prompt;
+use ground::model::Prompt;
 use ground::update::Action;
 use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA, TdFrameRefusal, TdPhase};
 use protocol::identity::{Address, GROUND};
@@ -79,7 +79,7 @@ fn a_vehicle_that_accepts_nothing_says_why() {
 #[test]
 fn an_answer_proves_the_uplink_of_a_vehicle_that_does_not_report_it() {
     let mut rig = Rig::crewed();
-    rig.model.link.uplink = ground::model::link::Uplink::default();
+    rig.model.link.uplink = ground::model::Uplink::default();
     assert!(!rig.model.link.uplink.is_proven(rig.now));
     let ts1 = i64::try_from(rig.now.as_nanos()).unwrap();
     rig.now += std::time::Duration::from_millis(80);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ground::model::alarm::{Amount, Talk};
+use ground::model::{Amount, Talk};
 use ground::update::Action;
 use protocol::dialect::{TdCheck, TdLimit, TdPhase};
 

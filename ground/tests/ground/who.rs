@@ -4,10 +4,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::command::CommandKind;
-use ground::model::crew::KeyOwner;
-use ground::model::crew::Seat;
-use ground::model::{Role, Settings};
+use ground::model::{CommandKind, KeyOwner, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,

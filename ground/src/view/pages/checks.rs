@@ -6,13 +6,10 @@ use std::time::Duration;
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
 use ratatui::text::{Line, Span};
 
-use crate::model::Model;
-use crate::model::act::Act;
-use crate::model::dead_reckoning::may_have_left;
-use crate::model::pad_check::{
-    LOSS_MOST, MARGIN_LEAST_DB, PadCheck, RangeFound, RangeTest, Standing, shown, standing,
+use crate::model::{
+    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeFound, RangeTest, Spot, Standing,
+    dead_reckoning::may_have_left, shown, standing,
 };
-use crate::model::place::{LastPlace, Spot};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::widgets::{fixed, seconds};
 

@@ -8,9 +8,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::Line;
 
 use super::{is_roomy, titled};
-use crate::model::motion::Motion;
-use crate::model::vehicle::Sample;
-use crate::model::{Model, words};
+use crate::model::{Model, Motion, Sample, words};
 use crate::view::pictures::FlightPart;
 use crate::view::theme::{TextRole, Theme};
 use crate::view::widgets::{age_mark, fixed, row, text_row};

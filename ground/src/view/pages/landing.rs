@@ -7,10 +7,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 
 use super::{is_roomy, panel, plots, titled};
-use crate::model::link::RED_AFTER;
-use crate::model::motion::{BodySpeed, Motion};
-use crate::model::vehicle::Sample;
-use crate::model::{Model, words};
+use crate::model::{BodySpeed, Model, Motion, RED_AFTER, Sample, words};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::widgets::{STALE_MARK, fixed, row};
 use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};

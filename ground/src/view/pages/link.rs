@@ -8,9 +8,7 @@ use protocol::link_stats::{LinkFigures, SourceFigures};
 use ratatui::text::{Line, Span};
 
 use super::window;
-use crate::model::Model;
-use crate::model::link::{LinkReport, LinkState, refusal};
-use crate::model::vehicle::STALE_AFTER;
+use crate::model::{LinkReport, LinkState, Model, STALE_AFTER, refusal};
 use crate::view::lists;
 use crate::view::status_lines::{link_line, percent};
 use crate::view::theme::{TextRole, Theme};

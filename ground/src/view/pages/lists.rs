@@ -5,8 +5,7 @@ use std::time::Duration;
 use ratatui::text::Line;
 
 use super::window;
-use crate::model::act::{ABORT_WORDS, Act, DEFINITIONS};
-use crate::model::{Model, Role};
+use crate::model::{ABORT_WORDS, Act, DEFINITIONS, Model, Role};
 use crate::view::lists;
 use crate::view::status_lines::{AlarmState, alarm_state, cut};
 use crate::view::theme::{TextRole, Theme};

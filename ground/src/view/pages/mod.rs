@@ -17,8 +17,7 @@ use ratatui::widgets::{Block, Borders};
 
 use super::draw_lines;
 use super::theme::{TextRole, Theme};
-use crate::model::Model;
-use crate::model::page::Page;
+use crate::model::{Model, Page};
 
 /// Draws the present page between the top lines and the alarm line.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {

@@ -8,12 +8,9 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::Line;
 
 use super::{is_roomy, panel, titled};
-use crate::model::act::Act;
-use crate::model::command::{CommandKind, why_not_here};
-use crate::model::identity::Foreign;
-use crate::model::log::LogStanding;
-use crate::model::vehicle::{Vehicle, is_on_pad};
-use crate::model::{Model, link, words};
+use crate::model::{
+    Act, CommandKind, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here, words,
+};
 use crate::view::theme::{TextRole, Theme};
 use crate::view::widgets::{STALE_MARK, age_mark, fixed};
 use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};
@@ -132,7 +129,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
-        let hints = link::unheard_hints(model, now).unwrap_or_default();
+        let hints = unheard_hints(model, now).unwrap_or_default();
         let wrapped = |words: String| lists::wrapped(&words, usize::from(CHECK_COLUMNS - 2));
         let lines = hints.into_iter().flat_map(wrapped);
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
@@ -175,7 +172,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     match model.vehicle.status.as_ref() {
         _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
-        None if link::unheard_hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
+        None if unheard_hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
         Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {
             top_lines::readiness(model, now).unwrap_or_default()
@@ -227,7 +224,7 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         }
         TdCheck::TD_CHECK_FINS => {
             let error = vehicle.fins.map(|fins| {
-                let apart = |fin: &crate::model::vehicle::Deflection| {
+                let apart = |fin: &crate::model::Deflection| {
                     (fin.commanded_rad - fin.measured_rad).abs().to_degrees()
                 };
                 fins.value.iter().map(apart).fold(0.0, f64::max)

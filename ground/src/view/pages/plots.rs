@@ -10,11 +10,10 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
 use super::flight::of_descent;
 use super::{is_roomy, panel, titled};
-use crate::model::act::Act;
-use crate::model::motion::Motion;
-use crate::model::quantity::{ALL, Quantity};
-use crate::model::vehicle::is_on_pad;
-use crate::model::{Model, quantity};
+use crate::model::{
+    Act, Model, Motion, is_on_pad,
+    quantity::{self, ALL, Quantity},
+};
 use crate::view::pictures::{FlightPart, Viewpoint};
 use crate::view::theme::{Ink, TextRole, Theme};
 use crate::view::widgets::{age_mark, fixed, row};

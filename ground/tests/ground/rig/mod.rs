@@ -6,8 +6,7 @@ mod telemetry;
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::dialog::KeyTiming;
-use ground::model::{Model, Settings};
+use ground::model::{KeyTiming, Model, Settings};
 use ground::update::{Action, Msg, update};
 use ground::view::theme::{Palette, Theme};
 use ground::view::view;
