@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use campaign::motors::choice::{Choice, Limits, Obstacle, Refusal, StartHeight, choose, usual_limits};
+use campaign::motors::choice::{Choice, Limits, Obstacle, Refusal, StartHeight, Team, choose};
 use campaign::motors::frame::{Frame, start_height_m};
-use campaign::motors::ranking::{Landing, Ranked, Request, Weather, rank};
+use campaign::motors::ranking::{Landing, Ranked, Request, rank};
 use campaign::motors::source::{self, Candidate, SourceError};
 use campaign::motors::table;
 use campaign::run::threads;
@@ -14,16 +14,23 @@ use flight::guidance::vertical::Column;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::mission::Mission;
-use sim::dispersion::Dispersion;
+use flight::vehicle::thrust_curve::ThrustCurve;
+use sim::recipe::Recipe;
 
 fn mission(name: &str) -> Mission {
     vehicles::mission::builtin(name).unwrap().unwrap()
 }
 
+/// The limits of a mission's airframe with a motor and some ballast, kg.
+fn limits(mission: &Mission, frame: &Frame, curve: &ThrustCurve, ballast_kg: [f64; 2]) -> Limits {
+    let recipe = Recipe { mission: mission.clone(), ..Recipe::built_in("mk2", "none").unwrap() };
+    Team::new(recipe, ballast_kg).limits(frame, curve)
+}
+
 fn chosen(mission: &Mission, motor: &str, ballast_kg: [f64; 2]) -> Result<Choice, Refusal> {
     let curve = vehicles::motors::builtin(motor).unwrap();
     let frame = Frame::of(mission).unwrap();
-    choose(mission, &frame, &curve, &usual_limits(mission, &frame, &curve, ballast_kg))
+    choose(mission, &frame, &curve, &limits(mission, &frame, &curve, ballast_kg))
 }
 
 /// The mission's mass and height were found by thousands of flights, and this search knows neither.
@@ -44,7 +51,7 @@ fn val_vlr_drops_land_on_their_motors_from_their_height() {
         let from_m = start_height_m(&dropped);
         let frame = Frame::of(&dropped).unwrap();
         let curve = vehicles::motors::builtin(motor).unwrap();
-        let usual = usual_limits(&dropped, &frame, &curve, [-0.2, 0.2]);
+        let usual = limits(&dropped, &frame, &curve, [-0.2, 0.2]);
         let choose = |start| choose(&dropped, &frame, &curve, &Limits { start, ..usual }).unwrap();
         let own_kg = dropped.airframe.mass.loaded_kg;
         let exactly = choose(StartHeight::Exactly(from_m));
@@ -113,7 +120,7 @@ fn a_low_ceiling_is_a_reason_and_names_the_height_that_is_needed() {
     let mk2 = mission("mk2");
     let curve = mk2.motor_curve.clone();
     let frame = Frame::of(&mk2).unwrap();
-    let limits = usual_limits(&mk2, &frame, &curve, [0.0, 0.0]);
+    let limits = limits(&mk2, &frame, &curve, [0.0, 0.0]);
     let low = Limits { start: StartHeight::AtMost(60.0), ..limits };
     let refusal = choose(&mk2, &frame, &curve, &low).unwrap_err();
     let Obstacle::Height { needed_m, most_m } = refusal.obstacle else { panic!("{refusal}") };
@@ -172,29 +179,14 @@ fn every_broken_file_of_a_folder_is_named_with_line_and_value() {
 fn ranking(jobs: usize) -> Vec<Ranked> {
     let folder = tempfile::tempdir().unwrap();
     broken_folder(folder.path());
-    let toml = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mini-f10").unwrap().1;
-    let weather = Weather {
-        dispersion: Dispersion::builtin("field").unwrap(),
-        dispersion_name: "field".to_owned(),
-        dispersion_toml: Dispersion::builtin_toml("field").unwrap().to_owned(),
-        seed: 7,
-    };
     let mut found = source::built_in();
     // Names of the folder differ from run to run.
     for broken in source::read(folder.path()).unwrap().into_iter().filter(Result::is_err) {
         found.push(broken.map_err(|broken| source::Unusable { origin: "a folder".to_owned(), ..broken }));
     }
-    let request = Request {
-        mission: &mission("mini-f10"),
-        mission_toml: toml,
-        ballast_kg: [0.0, 0.25],
-        ballast_station_m: None,
-        start: StartHeight::AtMost(200.0),
-        tube_m: None,
-        best: 2,
-        flights: 2,
-        weather: &weather,
-    };
+    let recipe = Recipe { seed: 7, ..Recipe::built_in("mini-f10", "field").unwrap() };
+    let team = Team { start: StartHeight::AtMost(200.0), ..Team::new(recipe, [0.0, 0.25]) };
+    let request = Request { team: &team, best: 2, flights: 2 };
     threads(Some(jobs)).unwrap().install(|| rank(&request, found, &|_| {}).unwrap())
 }
 
@@ -243,15 +235,13 @@ fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
 #[test]
 fn a_motor_of_a_list_flies_as_the_mission_that_is_written_for_it() {
     let mini = mission("mini-f10");
-    let toml = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mini-f10").unwrap().1;
     let curve = vehicles::motors::builtin("G12").unwrap();
     let motor = vehicles::thrust_curve::to_rasp(&curve);
     let candidate =
         Candidate { origin: "a list".to_owned(), motor, curve: curve.clone(), in_production: None };
     let choice = chosen(&mini, "G12", [0.0, 0.25]).unwrap();
     let landing = Landing { candidate, choice, flown: None };
-    let text = landing.mission_toml(&mini.name, toml).unwrap();
-    let written = vehicles::mission::from_toml(&text, "written").unwrap();
+    let written = landing.recipe(&Recipe::built_in("mini-f10", "none").unwrap()).unwrap().mission;
     assert_eq!(written.airframe.mass, landing.choice.mass);
     assert_eq!(written.motor_curve.points(), curve.points());
     assert!((written.motor_curve.total_mass_kg() - curve.total_mass_kg()).abs() < 1e-15);

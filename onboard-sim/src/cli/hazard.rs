@@ -9,11 +9,11 @@ use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, wid
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
 
-use sim::dispersion::{self, Dispersion, may_be_kinder};
+use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
-use super::fly::{WIND_MAX_M_S, with_wind};
-use super::{mission_text, on_threads, refuse_loss, show, text_of, write_file};
+use super::fly::WIND_MAX_M_S;
+use super::{in_wind, mission_text, on_threads, refuse_loss, show, text_of, write_file};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -95,15 +95,10 @@ fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
     let start = arguments.start.or_else(|| own.launch.is_some().then_some(StartPoint::Pad));
     let mission_toml = mission_text(&arguments.profile, start)?;
     let set = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
-    // A set that cannot be read is refused by its own name.
-    Dispersion::from_toml(&set, &arguments.dispersion)?;
-    let in_wind = |wind_m_s: &f64| {
-        let name = format!("{} with {wind_m_s} m/s of wind", arguments.dispersion);
-        let set = with_wind(&set, *wind_m_s);
-        let recipe = Recipe::from_texts((&arguments.profile, &mission_toml), (&name, &set))?;
-        Ok(Recipe { seed: arguments.seed, ..recipe })
-    };
-    arguments.winds.iter().map(in_wind).collect()
+    let mission = (arguments.profile.as_str(), mission_toml.as_str());
+    let recipe = Recipe::from_texts(mission, (&arguments.dispersion, &set))?;
+    let recipe = Recipe { seed: arguments.seed, ..recipe };
+    arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()
 }
 
 /// The flights with what was asked.

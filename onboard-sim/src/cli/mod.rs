@@ -20,7 +20,8 @@ use ::campaign::run::threads;
 use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
-use sim::recipe;
+use sim::dispersion::Dispersion;
+use sim::recipe::{self, Recipe};
 use tempfile::NamedTempFile;
 
 /// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
@@ -49,6 +50,14 @@ fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<S
         let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
     })
+}
+
+/// The same flights in another mean wind, m/s.
+fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
+    let dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
+    let dispersion_toml = fly::with_wind(&recipe.dispersion_toml, wind_m_s);
+    let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
+    Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
 }
 
 /// Shows on standard error how much of something is done: every per cent on a terminal, every tenth in a file.

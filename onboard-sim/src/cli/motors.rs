@@ -8,18 +8,19 @@ use std::str::FromStr;
 
 use anyhow::Context as _;
 use campaign::motors::card::{Card, Day, Order};
-use campaign::motors::choice::StartHeight;
+use campaign::motors::choice::{StartHeight, Team};
 use campaign::motors::frame::start_height_m;
-use campaign::motors::ranking::{Progress, Ranked, Request, Weather, rank};
+use campaign::motors::ranking::{Progress, Ranked, Request, rank};
 use campaign::motors::source::{self, Candidate, Found};
 use campaign::motors::table;
 use clap::Args;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use sim::dispersion::{self, Dispersion};
+use sim::recipe::Recipe;
 
-use super::fly::{WIND_MAX_M_S, with_wind};
-use super::{on_threads, refuse_loss, show, text_of, write_file, write_folder};
+use super::fly::WIND_MAX_M_S;
+use super::{in_wind, on_threads, refuse_loss, show, text_of, write_file, write_folder};
 
 /// Most flights of a motor.
 const FLIGHTS_MAX: u64 = 100_000;
@@ -62,20 +63,9 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     for path in [&arguments.csv, &arguments.picture].into_iter().flatten() {
         refuse_loss(path, arguments.force)?;
     }
-    let loaded = choices.load()?;
-    let mission = &loaded.mission;
-    let weather = choices.weather()?;
-    let request = Request {
-        mission,
-        mission_toml: &loaded.toml,
-        ballast_kg: choices.ballast_kg(mission),
-        ballast_station_m: choices.ballast_station_m(mission)?,
-        start: choices.start(mission)?,
-        tube_m: choices.tube_m(mission)?,
-        best: arguments.best,
-        flights: arguments.flights,
-        weather: &weather,
-    };
+    let team = choices.team()?;
+    let mission = &team.recipe.mission;
+    let request = Request { team: &team, best: arguments.best, flights: arguments.flights };
     let found = choices.motors()?;
     let told = |progress| match progress {
         Progress::Motors(done, of) => show(done, of, "motors"),
@@ -156,8 +146,8 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     for name in FILES {
         refuse_loss(&arguments.out.join(name), arguments.force)?;
     }
-    let loaded = choices.load()?;
-    let mission = &loaded.mission;
+    let team = choices.team()?;
+    let mission = &team.recipe.mission;
     let found = choices.motors()?;
     let motor = if let Some(name) = &arguments.motor {
         named(name, &found)?
@@ -166,22 +156,19 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         let curve = mission.motor_curve.clone();
         Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
     };
-    let set = choices.weather()?;
-    let (today, windier) = (day(&set, wind_m_s)?, day(&set, wind_m_s + WINDIER_M_S)?);
-    let steady = STEADY_M_S.into_iter().map(|wind_m_s| Ok((wind_m_s, steady(wind_m_s)?)));
+    let day = |recipe: &Recipe, wind_m_s| {
+        Ok::<_, anyhow::Error>(Day { wind_m_s, recipe: in_wind(recipe, wind_m_s)? })
+    };
+    let certified =
+        Recipe { dispersion_toml: Dispersion::builtin_toml("none")?.to_owned(), ..team.recipe.clone() };
+    let steady = STEADY_M_S.into_iter().map(|wind_m_s| day(&certified, wind_m_s));
     let order = Order {
-        mission,
-        mission_toml: &loaded.toml,
+        team: &team,
         motor: &motor,
         others: &found,
         mass_kg: arguments.mass,
-        ballast_kg: choices.ballast_kg(mission),
-        ballast_station_m: choices.ballast_station_m(mission)?,
-        start: choices.start(mission)?,
-        tube_m: choices.tube_m(mission)?,
-        set: &set.dispersion_name,
-        today: &today,
-        windier: &windier,
+        today: &day(&team.recipe, wind_m_s)?,
+        windier: &day(&team.recipe, wind_m_s + WINDIER_M_S)?,
         steady: &steady.collect::<anyhow::Result<Vec<_>>>()?,
         flights: arguments.flights,
         hazard_flights: arguments.hazard_flights,
@@ -193,8 +180,8 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let files = [
         (html, card.html()),
         (text, page.clone()),
-        (mission_file, card.mission_toml),
-        (day_file, today.weather.dispersion_toml),
+        (mission_file, card.recipe.mission_toml),
+        (day_file, card.recipe.dispersion_toml),
     ];
     write_folder(&arguments.out, &files, arguments.force)?;
     let mut stdout = std::io::stdout().lock();
@@ -253,29 +240,6 @@ fn named(name: &str, found: &[Found]) -> anyhow::Result<Candidate> {
     }
 }
 
-/// A set of dispersions in a mean wind.
-fn day(set: &Weather, wind_m_s: f64) -> anyhow::Result<Day> {
-    let name = format!("{} with {wind_m_s} m/s of wind", set.dispersion_name);
-    let toml = with_wind(&set.dispersion_toml, wind_m_s);
-    let dispersion = Dispersion::from_toml(&toml, &name)?;
-    Ok(Day {
-        wind_m_s,
-        weather: Weather { dispersion, dispersion_name: name, dispersion_toml: toml, seed: set.seed },
-    })
-}
-
-/// The certified vehicle in a steady wind.
-fn steady(wind_m_s: f64) -> anyhow::Result<Weather> {
-    let name = "none";
-    let toml = with_wind(Dispersion::builtin_toml(name)?, wind_m_s);
-    Ok(Weather {
-        dispersion: Dispersion::from_toml(&toml, name)?,
-        dispersion_name: name.to_owned(),
-        dispersion_toml: toml,
-        seed: 1,
-    })
-}
-
 /// The vehicle and its world.
 #[derive(Args)]
 struct Choices {
@@ -328,17 +292,20 @@ impl FromStr for Range {
     }
 }
 
-/// A mission with its text.
-struct Loaded {
-    mission: Mission,
-    toml: String,
-}
-
 impl Choices {
-    fn load(&self) -> anyhow::Result<Loaded> {
-        let toml = text_of(&self.mission, vehicles::mission::BUILTIN, "mission")?;
-        let mission = vehicles::mission::from_toml(&toml, &self.mission)?;
-        Ok(Loaded { mission, toml })
+    fn team(&self) -> anyhow::Result<Team> {
+        let mission_toml = text_of(&self.mission, vehicles::mission::BUILTIN, "mission")?;
+        let set = text_of(&self.dispersion, dispersion::BUILTIN, "set of dispersions")?;
+        let recipe = Recipe::from_texts((&self.mission, &mission_toml), (&self.dispersion, &set))?;
+        let recipe = Recipe { seed: self.seed, ..recipe };
+        let mission = &recipe.mission;
+        Ok(Team {
+            ballast_kg: self.ballast_kg(mission),
+            ballast_station_m: self.ballast_station_m(mission)?,
+            start: self.start(mission)?,
+            tube_m: self.tube_m(mission)?,
+            recipe,
+        })
     }
 
     /// The motors to choose from.
@@ -351,16 +318,6 @@ impl Choices {
             found.extend(source::read(path)?);
         }
         Ok(found)
-    }
-
-    fn weather(&self) -> anyhow::Result<Weather> {
-        let toml = text_of(&self.dispersion, dispersion::BUILTIN, "set of dispersions")?;
-        Ok(Weather {
-            dispersion: Dispersion::from_toml(&toml, &self.dispersion)?,
-            dispersion_name: self.dispersion.clone(),
-            dispersion_toml: toml,
-            seed: self.seed,
-        })
     }
 
     fn ballast_kg(&self, mission: &Mission) -> [f64; 2] {

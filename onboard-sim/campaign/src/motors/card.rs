@@ -12,9 +12,9 @@ use sim::dispersion::Dispersion;
 use sim::draw::draw;
 use sim::recipe::Recipe;
 
-use super::choice::{Choice, Limits, Refusal, StartHeight, choose, usual_limits};
+use super::choice::{Choice, Limits, Refusal, StartHeight, Team, choose};
 use super::frame::{Ballast, Frame, FrameError, start_height_m};
-use super::ranking::{Flown, FlyError, Landing, RankError, Weather, fly_rows};
+use super::ranking::{Flown, FlyError, Landing, RankError, fly_rows};
 use super::sheet;
 use super::source::{Candidate, Found};
 use crate::attainable;
@@ -23,29 +23,18 @@ use crate::run::in_parallel;
 
 /// What a card is made for.
 pub struct Order<'a> {
-    pub mission: &'a Mission,
-    /// Text of the mission.
-    pub mission_toml: &'a str,
+    pub team: &'a Team,
     pub motor: &'a Candidate,
     /// Motors to suggest if this one cannot land.
     pub others: &'a [Found],
     /// Mass with the motor full, kg; the best one within the ballast if not given.
     pub mass_kg: Option<f64>,
-    /// Least and most ballast, kg.
-    pub ballast_kg: [f64; 2],
-    /// Where the ballast is, m above the nozzle; at the centre of gravity of the airframe without its motor if not given.
-    pub ballast_station_m: Option<f64>,
-    pub start: StartHeight,
-    /// Widest motor that fits, m; that of the mission's own motor if not given.
-    pub tube_m: Option<f64>,
-    /// Name of the set of dispersions.
-    pub set: &'a str,
     /// The wind of the day.
     pub today: &'a Day,
     /// More wind.
     pub windier: &'a Day,
-    /// Steady winds, m/s, rising, and the certified vehicle's world in each.
-    pub steady: &'a [(f64, Weather)],
+    /// Steady winds, rising, in which the certified vehicle is flown.
+    pub steady: &'a [Day],
     /// Flights in the wind of the day; as many as a few seconds allow if not given.
     pub flights: Option<u64>,
     /// Flights of the way of ending that reaches farthest.
@@ -55,9 +44,8 @@ pub struct Order<'a> {
 /// A card.
 #[derive(Debug, Clone)]
 pub struct Card {
-    /// The mission and its text, to be loaded.
-    pub mission: Mission,
-    pub mission_toml: String,
+    /// With the mission to be loaded.
+    pub recipe: Recipe,
     pub(super) landing: Landing,
     pub(super) frame: Frame,
     pub(super) set: String,
@@ -65,7 +53,6 @@ pub struct Card {
     pub(super) hazard: Hazard,
     /// Command heights of the feet from which a controller that knows everything would land.
     pub(super) attainable: Option<attainable::Window>,
-    pub(super) seed: u64,
 }
 
 /// Why there is no card.
@@ -102,23 +89,23 @@ impl Card {
     /// # Errors
     /// The vehicle does not land, or the mass cannot be had.
     pub fn new(order: &Order<'_>, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, CardError> {
-        let frame = Frame::of(order.mission)?;
+        let mission = &order.team.recipe.mission;
+        let frame = Frame::of(mission)?;
         let limits = order.limits(&frame)?;
-        let choice = match choose(order.mission, &frame, &order.motor.curve, &limits) {
+        let choice = match choose(mission, &frame, &order.motor.curve, &limits) {
             Ok(choice) => choice,
             Err(refusal) => {
                 return Err(Box::new(no_landing(order, &frame, &limits, refusal)).into());
             }
         };
         let landing = Landing { candidate: order.motor.clone(), choice, flown: None };
-        let mission_toml = landing.mission_toml(&order.mission.name, order.mission_toml)?;
-        let recipe = order.today.weather.recipe(&mission_toml, "the mission of the card")?;
+        let recipe = landing.recipe(&order.today.recipe)?;
         let winds = fly_in_winds(order, &recipe, progress)?;
         if winds.today.legs.count == 0 {
             let reason = winds.today.failure.as_ref().map_or("unknown", |(reason, _)| reason);
             return Err(CardError::NoneLanded {
                 flights: winds.today.legs.of,
-                dispersion: order.today.weather.dispersion_name.clone(),
+                dispersion: recipe.dispersion_name,
                 wind_m_s: order.today.wind_m_s,
                 reason: reason.to_owned(),
             });
@@ -126,15 +113,13 @@ impl Card {
         let hazard = fly_the_hazard(order, &recipe, winds.limit_m_s(), progress)?;
         let attainable = certified_window(&recipe.mission);
         Ok(Self {
-            mission: recipe.mission,
-            mission_toml,
+            recipe,
             landing,
             frame,
-            set: order.set.to_owned(),
+            set: order.team.recipe.dispersion_name.clone(),
             winds,
             hazard,
             attainable,
-            seed: order.today.weather.seed,
         })
     }
 
@@ -163,8 +148,8 @@ pub(crate) fn certified_window(mission: &Mission) -> Option<attainable::Window> 
 impl Order<'_> {
     fn limits(&self, frame: &Frame) -> Result<Limits, CardError> {
         let curve = &self.motor.curve;
-        let usual = usual_limits(self.mission, frame, curve, self.ballast_kg);
-        let [least_kg, most_kg] = usual.masses_kg;
+        let limits = self.team.limits(frame, curve);
+        let [least_kg, most_kg] = limits.masses_kg;
         if let Some(mass_kg) = self.mass_kg {
             // Scales show grams.
             if !(least_kg - 5e-4..=most_kg + 5e-4).contains(&mass_kg) {
@@ -172,12 +157,7 @@ impl Order<'_> {
                 return Err(CardError::Mass { mass_kg, frame_kg, motor_kg, least_kg, most_kg });
             }
         }
-        Ok(Limits {
-            masses_kg: self.mass_kg.map_or(usual.masses_kg, |mass_kg| [mass_kg; 2]),
-            start: self.start,
-            ballast_station_m: self.ballast_station_m.unwrap_or(usual.ballast_station_m),
-            tube_m: self.tube_m.unwrap_or(usual.tube_m),
-        })
+        Ok(Limits { masses_kg: self.mass_kg.map_or(limits.masses_kg, |mass_kg| [mass_kg; 2]), ..limits })
     }
 }
 
@@ -186,7 +166,7 @@ impl Order<'_> {
 pub struct Day {
     /// Mean wind 10 m above the ground, m/s.
     pub wind_m_s: f64,
-    pub weather: Weather,
+    pub recipe: Recipe,
 }
 
 /// What the flights came to.
@@ -239,7 +219,7 @@ fn fly_the_hazard(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Hazard, CardError> {
     let day = if limit_m_s > order.today.wind_m_s { order.windier } else { order.today };
-    let mut recipe = in_weather(recipe, &day.weather);
+    let mut recipe = in_weather_of(day, recipe);
     if recipe.mission.launch.is_some() && recipe.mission.start.at == StartPoint::Apogee {
         recipe = recipe.starting_at(StartPoint::Pad).map_err(HazardError::Recipe)?;
     }
@@ -250,13 +230,9 @@ fn fly_the_hazard(
     Ok(Hazard { wind_m_s: day.wind_m_s, survey: flights.survey, way, radius, rule })
 }
 
-fn in_weather(recipe: &Recipe, weather: &Weather) -> Recipe {
-    Recipe {
-        dispersion: weather.dispersion,
-        dispersion_name: weather.dispersion_name.clone(),
-        dispersion_toml: weather.dispersion_toml.clone(),
-        ..recipe.clone()
-    }
+fn in_weather_of(day: &Day, recipe: &Recipe) -> Recipe {
+    let Recipe { mission, mission_toml, .. } = recipe.clone();
+    Recipe { mission, mission_toml, ..day.recipe.clone() }
 }
 
 /// Flights from which the cost of one is learnt.
@@ -280,8 +256,8 @@ fn fly_in_winds(
         let each = today.iter().map(|row| row.solver_iterations).sum::<u64>() / FIRST + BESIDE;
         (BUDGET / each).clamp(FLIGHTS[0], FLIGHTS[1])
     });
-    let windier = in_weather(recipe, &order.windier.weather);
-    let steady: Vec<Recipe> = order.steady.iter().map(|(_, weather)| in_weather(recipe, weather)).collect();
+    let windier = in_weather_of(order.windier, recipe);
+    let steady: Vec<Recipe> = order.steady.iter().map(|day| in_weather_of(day, recipe)).collect();
     // All at once, so that no thread waits for the last flight of a wind.
     let mut tasks = numbered(recipe, first..flights);
     let from_windier = tasks.len();
@@ -291,14 +267,15 @@ fn fly_in_winds(
     let (before, of) = (today.len(), today.len() + tasks.len());
     let rows = fly_rows(&tasks, &|done| progress(before + done, of))?;
     today.extend_from_slice(&rows[..from_windier]);
+    let set = &order.team.recipe.dispersion_name;
     let landed = rows[from_steady..].iter().take_while(|row| row.legs).count();
     Ok(Winds {
         today_m_s: order.today.wind_m_s,
-        today: Flown::of(order.set, &today),
+        today: Flown::of(set, &today),
         windier_m_s: order.windier.wind_m_s,
-        windier: Flown::of(order.set, &rows[from_windier..from_steady]),
-        steady_m_s: landed.checked_sub(1).map(|last| order.steady[last].0),
-        steady_tried_m_s: order.steady.last().map_or(0.0, |(wind_m_s, _)| *wind_m_s),
+        windier: Flown::of(set, &rows[from_windier..from_steady]),
+        steady_m_s: landed.checked_sub(1).map(|last| order.steady[last].wind_m_s),
+        steady_tried_m_s: order.steady.last().map_or(0.0, |day| day.wind_m_s),
     })
 }
 
@@ -352,7 +329,7 @@ fn no_landing(order: &Order<'_>, frame: &Frame, limits: &Limits, refusal: Refusa
     let without_kg = frame.mass_kg() + curve.total_mass_kg();
     let other_mass = refusal.landing_kg.and_then(|landing_kg| {
         let limits = Limits { masses_kg: landing_kg, ..*limits };
-        let choice = choose(order.mission, frame, curve, &limits).ok()?;
+        let choice = choose(&order.team.recipe.mission, frame, curve, &limits).ok()?;
         let excess_kg = without_kg - choice.mass.loaded_kg;
         Some((choice, excess_kg))
     });
@@ -381,7 +358,7 @@ fn bound(order: &Order<'_>, frame: &Frame, limits: &Limits) -> String {
         StartHeight::AtMost(height_m) => SHARES.map(|share| share * height_m).to_vec(),
     };
     for height_m in &heights_m {
-        let mut mission: Mission = order.mission.clone();
+        let mut mission = order.team.recipe.mission.clone();
         mission.airframe.mass = mass;
         mission.motor_curve = curve.clone();
         mission.start.height_m = *height_m;
@@ -415,13 +392,13 @@ fn other_motors(order: &Order<'_>, frame: &Frame, limits: &Limits) -> Vec<(Strin
     let chosen = in_parallel(
         &others,
         |other| {
-            let usual = usual_limits(order.mission, frame, &other.curve, order.ballast_kg);
-            let masses_kg = order.mass_kg.map_or(usual.masses_kg, |mass_kg| [mass_kg; 2]);
+            let possible_kg = order.team.limits(frame, &other.curve).masses_kg;
+            let masses_kg = order.mass_kg.map_or(possible_kg, |mass_kg| [mass_kg; 2]);
             // With the least ballast it weighs more than this mass.
-            if masses_kg[0] < usual.masses_kg[0] - 5e-4 {
+            if masses_kg[0] < possible_kg[0] - 5e-4 {
                 return None;
             }
-            choose(order.mission, frame, &other.curve, &Limits { masses_kg, ..*limits }).ok()
+            choose(&order.team.recipe.mission, frame, &other.curve, &Limits { masses_kg, ..*limits }).ok()
         },
         &|_| {},
     );

@@ -8,6 +8,7 @@ use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::profile::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
+use sim::recipe::Recipe;
 
 use super::frame::{Ballast, Frame, start_height_m};
 use super::window::{Fall, Onset, Window};
@@ -190,15 +191,36 @@ pub fn choose(
     best(&pairing, landing_kg).map_err(refused)
 }
 
-/// The limits of a mission's frame with a motor: any ballast between two masses, kg, at its centre of gravity; its own
-/// tube; and a start up to the mission's own height.
-pub fn usual_limits(mission: &Mission, frame: &Frame, curve: &ThrustCurve, ballast_kg: [f64; 2]) -> Limits {
-    let without_kg = frame.mass_kg() + curve.total_mass_kg();
-    Limits {
-        masses_kg: ballast_kg.map(|ballast_kg| without_kg + ballast_kg),
-        ballast_station_m: frame.cg_station_m(),
-        start: StartHeight::AtMost(start_height_m(mission)),
-        tube_m: frame.tube_m(),
+/// What a team has, and what it can change whatever the motor.
+#[derive(Debug, Clone)]
+pub struct Team {
+    /// The mission of its airframe, in the world of its flights.
+    pub recipe: Recipe,
+    /// Least and most ballast, kg.
+    pub ballast_kg: [f64; 2],
+    /// Where the ballast is, m above the nozzle; at the centre of gravity of the airframe without its motor if not given.
+    pub ballast_station_m: Option<f64>,
+    pub start: StartHeight,
+    /// Widest motor that fits, m; that of the mission's own motor if not given.
+    pub tube_m: Option<f64>,
+}
+
+impl Team {
+    /// With a start up to the mission's own height.
+    pub fn new(recipe: Recipe, ballast_kg: [f64; 2]) -> Self {
+        let start = StartHeight::AtMost(start_height_m(&recipe.mission));
+        Self { recipe, ballast_kg, ballast_station_m: None, start, tube_m: None }
+    }
+
+    /// What it can change with a motor.
+    pub fn limits(&self, frame: &Frame, curve: &ThrustCurve) -> Limits {
+        let without_kg = frame.mass_kg() + curve.total_mass_kg();
+        Limits {
+            masses_kg: self.ballast_kg.map(|ballast_kg| without_kg + ballast_kg),
+            ballast_station_m: self.ballast_station_m.unwrap_or(frame.cg_station_m()),
+            start: self.start,
+            tube_m: self.tube_m.unwrap_or(frame.tube_m()),
+        }
     }
 }
 

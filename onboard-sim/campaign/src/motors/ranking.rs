@@ -1,11 +1,10 @@
 //! Ranks motors by how well an airframe lands on them, and flies the best ones.
 
-use flight::vehicle::mission::Mission;
-use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::SetUpError;
+use vehicles::mission::MissionError;
 
-use super::choice::{Choice, Limits, Refusal, StartHeight, choose, usual_limits};
+use super::choice::{Choice, Refusal, Team, choose};
 use super::frame::{Changes, Frame, MissionTextError, changed, name_of};
 use super::source::{Candidate, Found, Unusable};
 use crate::row::Row;
@@ -16,21 +15,11 @@ use crate::tally;
 /// What to look for.
 #[derive(Debug, Clone)]
 pub struct Request<'a> {
-    pub mission: &'a Mission,
-    /// Text of the mission.
-    pub mission_toml: &'a str,
-    /// Least and most ballast, kg.
-    pub ballast_kg: [f64; 2],
-    /// Where the ballast is, m above the nozzle; at the centre of gravity of the airframe without its motor if not given.
-    pub ballast_station_m: Option<f64>,
-    pub start: StartHeight,
-    /// Widest motor that fits, m; that of the mission's own motor if not given.
-    pub tube_m: Option<f64>,
+    pub team: &'a Team,
     /// Motors that are flown.
     pub best: usize,
     /// Flights of each.
     pub flights: u64,
-    pub weather: &'a Weather,
 }
 
 /// A motor in its place.
@@ -75,6 +64,8 @@ pub enum RankError {
         source: MissionTextError,
     },
     #[error(transparent)]
+    Mission(#[from] MissionError),
+    #[error(transparent)]
     Fly(#[from] FlyError),
 }
 
@@ -88,13 +79,15 @@ pub fn rank(
     found: Vec<Found>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<Ranked>, RankError> {
-    let frame = Frame::of(request.mission)?;
+    let team = request.team;
+    let mission = &team.recipe.mission;
+    let frame = Frame::of(mission)?;
     let of = found.len();
     let chosen = in_parallel(
         &found,
         |found| {
             let candidate = found.as_ref().ok()?;
-            Some(choose(request.mission, &frame, &candidate.curve, &request.limits(&frame, candidate)))
+            Some(choose(mission, &frame, &candidate.curve, &team.limits(&frame, &candidate.curve)))
         },
         &|done| progress(Progress::Motors(done, of)),
     );
@@ -124,11 +117,8 @@ fn fly_the_best(
     if of == 0 {
         return Ok(());
     }
-    let mut recipes = Vec::with_capacity(best);
-    for landing in &landings[..best] {
-        let text = landing.mission_toml(&request.mission.name, request.mission_toml)?;
-        recipes.push(request.weather.recipe(&text, &landing.candidate.origin)?);
-    }
+    let recipes = landings[..best].iter().map(|landing| landing.recipe(&request.team.recipe));
+    let recipes = recipes.collect::<Result<Vec<_>, _>>()?;
     let flown = fly(&recipes.iter().collect::<Vec<_>>(), request.flights, &|done| {
         progress(Progress::Flights(done, of));
     })?;
@@ -140,53 +130,30 @@ fn fly_the_best(
     Ok(())
 }
 
-impl Request<'_> {
-    /// The limits for a motor.
-    pub fn limits(&self, frame: &Frame, candidate: &Candidate) -> Limits {
-        let usual = usual_limits(self.mission, frame, &candidate.curve, self.ballast_kg);
-        Limits {
-            start: self.start,
-            ballast_station_m: self.ballast_station_m.unwrap_or(usual.ballast_station_m),
-            tube_m: self.tube_m.unwrap_or(usual.tube_m),
-            ..usual
-        }
-    }
-}
-
 impl Landing {
-    /// The text of the mission that lands on this motor, from the name and text of the one it comes from.
+    /// The flights of a recipe with the mission that lands on this motor.
     ///
     /// # Errors
-    /// The text is no mission.
-    pub fn mission_toml(&self, name: &str, mission_toml: &str) -> Result<String, RankError> {
-        let motor = self.candidate.name();
-        let mass = self.choice.mass;
-        let summary = format!(
-            "{name} on the motor {motor}: {:.3} kg, from {:.0} m",
-            mass.loaded_kg, self.choice.start_height_m
-        );
+    /// The recipe's text is no mission.
+    pub fn recipe(&self, of: &Recipe) -> Result<Recipe, RankError> {
+        let Self { candidate, choice, .. } = self;
+        let (name, mass) = (&of.mission.name, choice.mass);
+        let (mass_kg, from_m) = (mass.loaded_kg, choice.start_height_m);
         let changes = Changes {
-            name: &name_of(name, self.candidate.curve.name()),
-            summary: &summary,
-            motor: &self.candidate.motor,
+            name: &name_of(name, candidate.curve.name()),
+            summary: &format!(
+                "{name} on the motor {}: {mass_kg:.3} kg, from {from_m:.0} m",
+                candidate.name()
+            ),
+            motor: &candidate.motor,
             mass,
-            start_height_m: self.choice.start_height_m,
+            start_height_m: from_m,
         };
-        changed(mission_toml, &changes)
-            .map_err(|source| RankError::Text { origin: self.candidate.origin.clone(), source })
+        let mission_toml = changed(&of.mission_toml, &changes)
+            .map_err(|source| RankError::Text { origin: candidate.origin.clone(), source })?;
+        let mission = vehicles::mission::from_toml(&mission_toml, &candidate.origin)?;
+        Ok(Recipe { mission, mission_toml, ..of.clone() })
     }
-}
-
-/// What the flights differ in, beside their mission.
-#[derive(Debug, Clone)]
-pub struct Weather {
-    pub dispersion: Dispersion,
-    /// Its name for a table.
-    pub dispersion_name: String,
-    /// Its text.
-    pub dispersion_toml: String,
-    /// Seed of everything random.
-    pub seed: u64,
 }
 
 /// The outcome of some flights.
@@ -204,38 +171,12 @@ pub struct Flown {
     pub solver_iterations: u64,
 }
 
-/// Why flights cannot be flown.
+/// A flight cannot be set up.
 #[derive(Debug, thiserror::Error)]
-pub enum FlyError {
-    /// The mission's text is wrong.
-    #[error(transparent)]
-    Mission(#[from] vehicles::mission::MissionError),
-    /// A flight cannot be set up.
-    #[error("flight {number}")]
-    Flight {
-        number: u64,
-        #[source]
-        source: SetUpError,
-    },
-}
-
-impl Weather {
-    /// The recipe of the flights of a mission's text; `origin` names it in messages.
-    ///
-    /// # Errors
-    /// The text is no mission.
-    pub fn recipe(&self, mission_toml: &str, origin: &str) -> Result<Recipe, FlyError> {
-        Ok(Recipe {
-            mission: vehicles::mission::from_toml(mission_toml, origin)?,
-            mission_toml: mission_toml.to_owned(),
-            dispersion: self.dispersion,
-            dispersion_name: self.dispersion_name.clone(),
-            dispersion_toml: self.dispersion_toml.clone(),
-            seed: self.seed,
-            controller: flight::guidance::baseline::Controller::Nmpc,
-            faults: Vec::new(),
-        })
-    }
+#[error("flight {number}")]
+pub struct FlyError {
+    number: u64,
+    source: SetUpError,
 }
 
 /// Flies flights 0 to `flights` of each recipe: those of a campaign with the same recipe. `done` is told how many flights
@@ -260,8 +201,7 @@ pub(crate) fn fly_rows(
 ) -> Result<Vec<Row>, FlyError> {
     let flown = in_parallel(tasks, |(recipe, number)| tally::fly(recipe, *number), done);
     let rows = tasks.iter().zip(flown);
-    rows.map(|((_, number), row)| row.map_err(|source| FlyError::Flight { number: *number, source }))
-        .collect()
+    rows.map(|((_, number), row)| row.map_err(|source| FlyError { number: *number, source })).collect()
 }
 
 impl Flown {

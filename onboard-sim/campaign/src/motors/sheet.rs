@@ -55,7 +55,7 @@ impl Card {
         let choice = &self.landing.choice;
         let curve = &self.landing.candidate.curve;
         Sheet {
-            title: format!("Landing card: {}", self.mission.name),
+            title: format!("Landing card: {}", self.recipe.mission.name),
             subtitle: format!(
                 "{}, {:.3} kg, {} m/s of wind, set {}{}. Simulated, not flown.",
                 self.landing.candidate.name(),
@@ -82,9 +82,9 @@ impl Card {
                 format!(
                     "The same flights again: onboard-sim campaign --profile mission.toml --dispersion day.toml --seed {} \
                      --flights {} --out flights",
-                    self.seed, self.winds.today.legs.of
+                    self.recipe.seed, self.winds.today.legs.of
                 ),
-                format!("Distances of people: {}. The fence of the mission ({:.0} m) only decides whether the landing motor may light.", Rule::SOURCE, self.mission.gate.fence_radius_m),
+                format!("Distances of people: {}. The fence of the mission ({:.0} m) only decides whether the landing motor may light.", Rule::SOURCE, self.recipe.mission.gate.fence_radius_m),
                 "A rate is the share of simulated flights that landed within the limits of the legs, with Wilson's 95 % \
                  interval. More flights make it narrower; only flights make it true."
                     .to_owned(),
@@ -126,7 +126,7 @@ impl Card {
                         self.frame.mass_kg()
                     ),
                 ),
-                row("Load", "mission.toml".to_owned(), format!("mission {}", self.mission.name)),
+                row("Load", "mission.toml".to_owned(), format!("mission {}", self.recipe.mission.name)),
             ],
         }
     }
@@ -134,7 +134,7 @@ impl Card {
     fn heights(&self) -> Section {
         let choice = &self.landing.choice;
         let window = &choice.window;
-        let command_m = window.onset_m + self.mission.ignition.delay_s * window.speed_m_s;
+        let command_m = window.onset_m + self.recipe.mission.ignition.delay_s * window.speed_m_s;
         let mut rows = vec![
             row(
                 "Apogee or drop",
@@ -207,7 +207,8 @@ impl Card {
     fn people(&self) -> Section {
         let Hazard { wind_m_s, survey, way, radius, rule } = &self.hazard;
         let high = radius.high_m.map_or_else(|| "no upper end".to_owned(), |high_m| format!("{high_m:.0}"));
-        let from_apogee = self.mission.launch.is_none() && self.mission.start.at == StartPoint::Apogee;
+        let from_apogee =
+            self.recipe.mission.launch.is_none() && self.recipe.mission.start.at == StartPoint::Apogee;
         let not_in_it = if from_apogee { "; the way up to apogee is not in it" } else { "" };
         Section {
             title: "Where people stand",
@@ -224,7 +225,7 @@ impl Card {
                         "{} flights of {}, seed {}: {}, the way of ending that reached farthest",
                         radius.flights,
                         self.set,
-                        self.seed,
+                        self.recipe.seed,
                         way.name()
                     ),
                 ),
@@ -287,7 +288,7 @@ impl Card {
 
     fn checks(&self) -> Vec<String> {
         let choice = &self.landing.choice;
-        let (mission, airframe) = (&self.mission, &self.mission.airframe);
+        let (mission, airframe) = (&self.recipe.mission, &self.recipe.mission.airframe);
         let chute = &airframe.parachute;
         let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
         let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
