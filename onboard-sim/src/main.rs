@@ -1,6 +1,7 @@
 //! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
 
 mod cli;
+mod paper;
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};

@@ -91,7 +91,7 @@ pub fn map_of(
 /// Why there is no map.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// The quantity means nothing to this vehicle or question.
+    /// The quantity means nothing to this vehicle or by.
     #[error("{whose} cannot be mapped over {}; it can over {}", .quantity.name(), names(.possible))]
     Quantity { whose: String, quantity: Quantity, possible: &'static [Quantity] },
     /// Both axes are the same quantity.
@@ -298,16 +298,16 @@ impl fmt::Display for Axis {
     }
 }
 
-/// What a map of a mission asks.
+/// By what a mission lands on a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Question {
-    /// Whether the mission's own guidance lands it, inside the limits of the legs: a simulated flight for each cell.
-    Flown,
-    /// Whether perfect information could ([`crate::attainable`]): an upper bound, in vertical motion alone.
-    Attainable,
+pub enum By {
+    /// Its own guidance, inside the limits of the legs: a simulated flight for each cell.
+    Guidance,
+    /// Perfect information ([`crate::attainable`]): an upper bound, in vertical motion alone.
+    PerfectInformation,
 }
 
-/// What each question can be asked over.
+/// What each can be mapped over.
 const FLOWN: &[Quantity] =
     &[Quantity::IgnitionHeight, Quantity::ThrustScale, Quantity::Wind, Quantity::Tilt, Quantity::Height];
 /// The bound knows no wind and no attitude.
@@ -316,22 +316,22 @@ const ATTAINABLE: &[Quantity] = &[Quantity::IgnitionHeight, Quantity::ThrustScal
 /// Computes a mission's map; `progress` is called with the cells done, from any thread.
 ///
 /// # Errors
-/// The axes do not suit the question, or a cell cannot be flown.
+/// The axes do not suit a mission, or a cell cannot be flown.
 pub fn map(
     recipe: &Recipe,
-    question: Question,
+    by: By,
     axes: [Axis; 2],
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Map, MapError> {
-    let (possible, bound) = match question {
-        Question::Flown => (FLOWN, ""),
-        Question::Attainable => (ATTAINABLE, "what is attainable with "),
+    let (possible, bound) = match by {
+        By::Guidance => (FLOWN, ""),
+        By::PerfectInformation => (ATTAINABLE, "what is attainable with "),
     };
     let whose = format!("{bound}{}", recipe.mission.name);
-    map_of((&whose, possible), axes, progress, |x, y| cell(recipe, question, axes, [x, y]))
+    map_of((&whose, possible), axes, progress, |x, y| cell(recipe, by, axes, [x, y]))
 }
 
-fn cell(recipe: &Recipe, question: Question, axes: [Axis; 2], values: [f64; 2]) -> Result<Cell, SetUpError> {
+fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Cell, SetUpError> {
     /// Any: the draw is the same in all cells.
     const NUMBER: u64 = 0;
     let Recipe { mut mission, mut dispersion, .. } = recipe.clone();
@@ -347,7 +347,7 @@ fn cell(recipe: &Recipe, question: Question, axes: [Axis; 2], values: [f64; 2]) 
         put_into_draw(quantity, value, &mut drawn);
     }
     let mut flight = Sortie::drawn_as(&mission, &dispersion, &drawn, Law::of(recipe.controller, &mission))?;
-    if question == Question::Attainable {
+    if by == By::PerfectInformation {
         let window = onset_window(&mission, flight.drawn(), flight.fell_from());
         // Without a height on an axis the best one is chosen.
         let lands = window.is_some_and(|window| {
@@ -433,9 +433,9 @@ mod tests {
         }
     }
 
-    fn mapped(mission: &str, question: Question, x: &str, y: &str) -> Map {
+    fn mapped(mission: &str, by: By, x: &str, y: &str) -> Map {
         let recipe = Recipe::built_in(mission, "none").unwrap();
-        map(&recipe, question, [x.parse().unwrap(), y.parse().unwrap()], &|_| ()).unwrap()
+        map(&recipe, by, [x.parse().unwrap(), y.parse().unwrap()], &|_| ()).unwrap()
     }
 
     fn findings(map: &Map) -> Vec<Finding> {
@@ -447,7 +447,7 @@ mod tests {
     fn a_mission_in_a_plane_and_one_in_space_are_flown() {
         use Finding::{Lands, Misses};
         for mission in ["mk2", "vlr"] {
-            let map = || mapped(mission, Question::Flown, "thrust-scale=0.5:1:2", "wind=0:30:2");
+            let map = || mapped(mission, By::Guidance, "thrust-scale=0.5:1:2", "wind=0:30:2");
             let flown = |jobs| threads(Some(jobs)).unwrap().install(map);
             let map = flown(2);
             assert_eq!(findings(&map), [Misses, Lands, Misses, Misses], "{mission}");
@@ -460,8 +460,8 @@ mod tests {
     #[test]
     fn val_bound_what_the_guidance_lands_is_attainable() {
         let (x, y) = ("thrust-scale=0.9:1.1:3", "ignition-height=10:70:4");
-        let flown = mapped("mk2", Question::Flown, x, y);
-        let attainable = mapped("mk2", Question::Attainable, x, y);
+        let flown = mapped("mk2", By::Guidance, x, y);
+        let attainable = mapped("mk2", By::PerfectInformation, x, y);
         assert!(flown.count(Finding::Lands) > 0, "{flown:?}");
         for (place, (flown, bound)) in flown.cells.iter().zip(&attainable.cells).enumerate() {
             let lands = flown.finding == Finding::Lands;
@@ -473,20 +473,20 @@ mod tests {
     #[test]
     fn a_quantity_that_means_nothing_is_refused_with_those_that_do() {
         let recipe = Recipe::built_in("mk2", "none").unwrap();
-        let refused = |x: &str, question| {
+        let refused = |x: &str, by| {
             let axes = [x.parse().unwrap(), "thrust-scale=0.9:1.1:2".parse().unwrap()];
-            map(&recipe, question, axes, &|_| ()).unwrap_err().to_string()
+            map(&recipe, by, axes, &|_| ()).unwrap_err().to_string()
         };
         assert_eq!(
-            refused("speed=1:2:2", Question::Flown),
+            refused("speed=1:2:2", By::Guidance),
             "mk2 cannot be mapped over speed; it can over ignition-height, thrust-scale, wind, tilt, height"
         );
         assert_eq!(
-            refused("wind=1:2:2", Question::Attainable),
+            refused("wind=1:2:2", By::PerfectInformation),
             "what is attainable with mk2 cannot be mapped over wind; it can over ignition-height, thrust-scale, height"
         );
         assert_eq!(
-            refused("thrust-scale=1:2:2", Question::Flown),
+            refused("thrust-scale=1:2:2", By::Guidance),
             "both axes vary thrust-scale; choose two quantities"
         );
     }

@@ -77,6 +77,17 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// The order whose results these are, from the texts in the directory.
+    fn order(&self, mission_toml: &str, dispersion_toml: &str) -> Result<Order, Box<dyn core::error::Error>> {
+        let texts = (("mission.toml", mission_toml), (self.dispersion.as_str(), dispersion_toml));
+        let mut recipe = Recipe::from_texts(texts.0, texts.1)?;
+        recipe.mission.steered = self.steered;
+        recipe.seed = self.seed;
+        recipe.controller = self.controller.parse()?;
+        recipe.faults = self.faults.iter().map(|fault| fault.parse()).collect::<Result<_, _>>()?;
+        Ok(Order { recipe, flights: self.flights })
+    }
+
     /// What it holds, in words.
     fn words(&self) -> [(&'static str, String); 12] {
         [
@@ -383,7 +394,6 @@ pub fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
 pub fn merge(
     parts: &[PathBuf],
     out: &Path,
-    order_of: impl FnOnce(&Manifest, &str, &str) -> Result<Order, String>,
 ) -> Result<(Store, Order), StoreError> {
     let nothing = || StoreError::Missing { from: 0, to: 0 };
     let first = parts.first().ok_or_else(nothing)?;
@@ -403,8 +413,9 @@ pub fn merge(
         let path = first.join(name);
         fs::read_to_string(&path).map_err(file_error(&path))
     };
-    let order = order_of(&manifest, &text("mission.toml")?, &text("dispersion.toml")?)
-        .map_err(|message| StoreError::Content { path: first.clone(), message })?;
+    let order = manifest
+        .order(&text("mission.toml")?, &text("dispersion.toml")?)
+        .map_err(|error| StoreError::Content { path: first.clone(), message: error.to_string() })?;
     let store = Store::open(out, &order, &manifest)?;
     for chunk in store.chunks() {
         let mut found: Option<(Vec<u8>, &PathBuf)> = None;

@@ -60,7 +60,7 @@ fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
     let flown: u64 =
         (1..=2).zip(&parts).map(|(index, part)| fly(&order, Shard { index, count: 2 }, 1, part)).sum();
     assert_eq!(flown, FLIGHTS);
-    let (store, merged) = merge(&parts, &at("merged"), |_, _, _| Ok(order.clone())).unwrap();
+    let (store, merged) = merge(&parts, &at("merged")).unwrap();
     publish(&merged, &store).unwrap();
     assert_same(&at("one"), &at("merged"));
 
@@ -141,7 +141,7 @@ fn a_directory_of_another_order_or_in_use_is_refused_with_the_reason() {
     let message = refused(&order_1, "test", Shard::WHOLE);
     assert!(message.contains("its format is `1`, this run's is `2`"), "{message}");
     let parts = [root.path().to_owned()];
-    let error = merge(&parts, &root.path().join("whole"), |_, _, _| Ok(order_1.clone())).unwrap_err();
+    let error = merge(&parts, &root.path().join("whole")).unwrap_err();
     assert!(error.to_string().contains("format 1"), "{error}");
     fs::write(&manifest_json, text).unwrap();
     let message = refused(&order_1, "test", Shard { index: 1, count: 2 });
@@ -182,12 +182,8 @@ fn a_merge_refuses_parts_of_another_campaign_and_missing_flights() {
         let store = Store::open(&at(name), order, &order.manifest("test", half)).unwrap();
         store.write(0, &[]).unwrap();
     }
-    let same = |order: &Order| {
-        let order = order.clone();
-        move |_: &_, _: &str, _: &str| Ok(order)
-    };
-    let error = merge(&[at("one"), at("other")], &at("both"), same(&order_1)).unwrap_err();
+    let error = merge(&[at("one"), at("other")], &at("both")).unwrap_err();
     assert!(error.to_string().contains("its seed is `2`, this run's is `1`"), "{error}");
-    let error = merge(&[at("one")], &at("half"), same(&order_1)).unwrap_err();
+    let error = merge(&[at("one")], &at("half")).unwrap_err();
     assert!(error.to_string().contains("flights 10 to 19"), "{error}");
 }

@@ -9,13 +9,13 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use campaign::map::{self, Question};
+use campaign::map::{self, By};
 use campaign::run::{self, Progress};
 use campaign::scenario::{Expected, Scenario};
-use campaign::store::{Manifest, Order, Shard, Store, merge};
+use campaign::store::{Order, Shard, Store, merge};
 use campaign::summary::to_text;
 use campaign::tally;
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use flight::guidance::baseline::Controller;
 use flight::vehicle::profile::StartPoint;
 use protocol::log::build::build_info;
@@ -23,9 +23,8 @@ use serde_json::json;
 use sha2::Digest as _;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
-use sim::recipe::Recipe;
 
-use super::{MapArguments, mission_text, on_threads, single, text_of};
+use super::{MapArguments, on_threads, recipe, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -81,8 +80,7 @@ pub(crate) struct CampaignArguments {
 
 #[derive(Subcommand)]
 enum CampaignCommand {
-    /// Map where a mission lands, over two quantities: one simulated flight for each cell, or with `--ask attainable` what
-    /// perfect information could land.
+    /// Map where a mission lands, over two quantities: one simulated flight for each cell.
     #[command(after_help = "Example: onboard-sim campaign map --profile mk2 --svg mk2.svg")]
     Map(MapOfMission),
     /// Merge the parts of a campaign that was flown in shards.
@@ -127,9 +125,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
 }
 
 fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
-    let (store, order) = merge(parts, out, |manifest, mission_toml, dispersion_toml| {
-        order_of(manifest, mission_toml, dispersion_toml).map_err(|error| format!("{error:#}"))
-    })?;
+    let (store, order) = merge(parts, out)?;
     let summary = run::publish(&order, &store)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{}", to_text(&summary))?;
@@ -137,53 +133,27 @@ fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Rebuilds the order of a campaign from the texts in its directory.
-fn order_of(manifest: &Manifest, mission_toml: &str, dispersion_toml: &str) -> anyhow::Result<Order> {
-    let mut mission = vehicles::mission::from_toml(mission_toml, "mission.toml")?;
-    mission.steered = manifest.steered;
-    let faults = manifest.faults.iter().map(|fault| fault.parse()).collect::<Result<_, _>>()?;
-    let recipe = Recipe {
-        mission,
-        mission_toml: mission_toml.to_owned(),
-        dispersion: Dispersion::from_toml(dispersion_toml, "dispersion.toml")?,
-        dispersion_name: manifest.dispersion.clone(),
-        dispersion_toml: dispersion_toml.to_owned(),
-        seed: manifest.seed,
-        controller: manifest.controller.parse()?,
-        faults,
-    };
-    Ok(Order { recipe, flights: manifest.flights })
-}
-
 fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
-    let mission_toml = mission_text(&arguments.profile, arguments.start)?;
-    let mut mission = vehicles::mission::from_toml(&mission_toml, &arguments.profile)?;
+    let CampaignArguments { profile, dispersion, controller, .. } = arguments;
+    let mut recipe = recipe(profile, arguments.start, dispersion, arguments.seed)?;
+    let mission = &mut recipe.mission;
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {
-        mission.ignition.fixed_height_m = tally::fixed_height_m(arguments.controller, &mission)?;
+        mission.ignition.fixed_height_m = tally::fixed_height_m(*controller, mission)?;
     }
-    let mut dispersion_toml = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
     if arguments.wire_resolution {
-        dispersion_toml = Dispersion::toml_with_wire_resolution(&dispersion_toml, &arguments.dispersion)?;
+        recipe.dispersion_toml = Dispersion::toml_with_wire_resolution(&recipe.dispersion_toml, dispersion)?;
+        recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, dispersion)?;
     }
-    let mut faults = arguments.faults.clone();
+    recipe.controller = *controller;
+    recipe.faults.clone_from(&arguments.faults);
     let mut expected = None;
     if let Some(path) = &arguments.scenario {
         let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         let scenario = Scenario::from_toml(&text, &path.display().to_string())?;
-        faults.extend(scenario.faults);
+        recipe.faults.extend(scenario.faults);
         expected = scenario.expected;
     }
-    let recipe = Recipe {
-        mission,
-        mission_toml,
-        dispersion: Dispersion::from_toml(&dispersion_toml, &arguments.dispersion)?,
-        dispersion_name: arguments.dispersion.clone(),
-        dispersion_toml,
-        seed: arguments.seed,
-        controller: arguments.controller,
-        faults,
-    };
     Ok((Order { recipe, flights: arguments.flights }, expected))
 }
 
@@ -210,9 +180,10 @@ struct MapOfMission {
     profile: String,
     #[command(flatten)]
     map: MapArguments,
-    /// What the map asks.
-    #[arg(long, default_value = "flown", value_name = "QUESTION")]
-    ask: Ask,
+    /// Map what perfect information could land, instead of the mission's own guidance: an upper bound in vertical motion
+    /// alone, some forty times cheaper. It knows no wind, so it needs --y.
+    #[arg(long, requires = "y")]
+    attainable: bool,
     /// Built-in set of dispersions or TOML file, of which the cells all have the same draw; the quantities on the axes
     /// replace what is drawn for them.
     #[arg(long, default_value = "none", value_name = "NAME|FILE")]
@@ -222,38 +193,17 @@ struct MapOfMission {
     seed: u64,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Ask {
-    /// Does the mission's own guidance land, inside the limits of the legs? One simulated flight for each cell.
-    Flown,
-    /// Could it be landed with perfect information? An upper bound in vertical motion alone, some forty times cheaper.
-    Attainable,
-}
-
 fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
-    let MapOfMission { profile, map, ask, dispersion: set_name, .. } = arguments;
-    anyhow::ensure!(
-        map.y.is_some() || !matches!(ask, Ask::Attainable),
-        "--ask attainable needs --y, as in ignition-height=40:90:26: its bound knows no wind"
-    );
-    let set = text_of(set_name, dispersion::BUILTIN, "set of dispersions")?;
-    // A set that cannot be read is refused by its own name.
-    Dispersion::from_toml(&set, set_name)?;
-    let recipe = Recipe::from_texts((profile, &mission_text(profile, None)?), (set_name, &set))?;
-    let recipe = Recipe { seed: arguments.seed, ..recipe };
-    let (question, asked, how) = match ask {
-        Ask::Flown => {
-            (Question::Flown, "does its own guidance land on its legs?", "one simulated flight for each cell")
-        }
-        Ask::Attainable => (
-            Question::Attainable,
-            "could it be landed with perfect information?",
-            "an upper bound: vertical motion, no wind, no attitude",
-        ),
+    let recipe = recipe(&arguments.profile, None, &arguments.dispersion, arguments.seed)?;
+    let (by, asked, how) = if arguments.attainable {
+        let how = "an upper bound: vertical motion, no wind, no attitude";
+        (By::PerfectInformation, "could it be landed with perfect information?", how)
+    } else {
+        (By::Guidance, "does its own guidance land on its legs?", "one simulated flight for each cell")
     };
     let title = format!("{}: {asked}", recipe.mission.name);
     let default = ["thrust-scale=0.8:1.2:21", "wind=0:10:11"];
-    map.run(default, [&title, how], |axes, progress| map::map(&recipe, question, axes, progress))
+    arguments.map.run(default, [&title, how], |axes, progress| map::map(&recipe, by, axes, progress))
 }
 
 /// Time between two lines of progress: on a terminal, and in a file.

@@ -13,7 +13,7 @@ use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
 use super::fly::WIND_MAX_M_S;
-use super::{in_wind, mission_text, on_threads, refuse_loss, show, text_of, write_file};
+use super::{in_wind, mission_text, on_threads, recipe, refuse_loss, show, write_file};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -93,11 +93,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
     let own = vehicles::mission::from_toml(&mission_text(&arguments.profile, None)?, &arguments.profile)?;
     let start = arguments.start.or_else(|| own.launch.is_some().then_some(StartPoint::Pad));
-    let mission_toml = mission_text(&arguments.profile, start)?;
-    let set = text_of(&arguments.dispersion, dispersion::BUILTIN, "set of dispersions")?;
-    let mission = (arguments.profile.as_str(), mission_toml.as_str());
-    let recipe = Recipe::from_texts(mission, (&arguments.dispersion, &set))?;
-    let recipe = Recipe { seed: arguments.seed, ..recipe };
+    let recipe = recipe(&arguments.profile, start, &arguments.dispersion, arguments.seed)?;
     arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()
 }
 

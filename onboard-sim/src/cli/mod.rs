@@ -20,7 +20,7 @@ use ::campaign::run::threads;
 use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::profile::StartPoint;
-use sim::dispersion::Dispersion;
+use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
 use tempfile::NamedTempFile;
 
@@ -50,6 +50,13 @@ fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<S
         let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
     })
+}
+
+/// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each built in or a file.
+fn recipe(profile: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
+    let mission_toml = mission_text(profile, start)?;
+    let set_toml = text_of(set, dispersion::BUILTIN, "set of dispersions")?;
+    Ok(Recipe { seed, ..Recipe::from_texts((profile, &mission_toml), (set, &set_toml))? })
 }
 
 /// The same flights in another mean wind, m/s.

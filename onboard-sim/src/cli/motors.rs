@@ -20,7 +20,7 @@ use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 
 use super::fly::WIND_MAX_M_S;
-use super::{in_wind, on_threads, refuse_loss, show, text_of, write_file, write_folder};
+use super::{in_wind, on_threads, recipe, refuse_loss, show, write_file, write_folder};
 
 /// Most flights of a motor.
 const FLIGHTS_MAX: u64 = 100_000;
@@ -294,10 +294,7 @@ impl FromStr for Range {
 
 impl Choices {
     fn team(&self) -> anyhow::Result<Team> {
-        let mission_toml = text_of(&self.mission, vehicles::mission::BUILTIN, "mission")?;
-        let set = text_of(&self.dispersion, dispersion::BUILTIN, "set of dispersions")?;
-        let recipe = Recipe::from_texts((&self.mission, &mission_toml), (&self.dispersion, &set))?;
-        let recipe = Recipe { seed: self.seed, ..recipe };
+        let recipe = recipe(&self.mission, None, &self.dispersion, self.seed)?;
         let mission = &recipe.mission;
         Ok(Team {
             ballast_kg: self.ballast_kg(mission),

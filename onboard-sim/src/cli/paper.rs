@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use onboard_sim::paper;
-use onboard_sim::paper::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
-use onboard_sim::paper::figures::{figures, stability_figures};
 
 use super::{MapArguments, write_folder};
+use crate::paper;
+use crate::paper::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
+use crate::paper::figures::{figures, stability_figures};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true)]

@@ -8,7 +8,7 @@ use nmpc::paper::{self, HORIZON};
 
 /// Which of the paper's tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Table {
+pub(crate) enum Table {
     /// Table 3: input weights P.
     InputWeights,
     /// Table 4: initial pitch.
@@ -21,9 +21,10 @@ pub enum Table {
 
 impl Table {
     /// Every table, in the paper's order.
-    pub const ALL: [Self; 4] = [Self::InputWeights, Self::Pitch, Self::LateralVelocity, Self::PitchRate];
+    pub(crate) const ALL: [Self; 4] =
+        [Self::InputWeights, Self::Pitch, Self::LateralVelocity, Self::PitchRate];
 
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         match self {
             Self::InputWeights => "Table 3: input weight P",
             Self::Pitch => "Table 4: initial pitch",
@@ -35,22 +36,22 @@ impl Table {
 
 /// A final state as the paper prints it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PaperRow {
+pub(crate) struct PaperRow {
     /// Horizontal position, m.
-    pub x_m: f64,
+    pub(crate) x_m: f64,
     /// Altitude, m.
-    pub z_m: f64,
-    pub pitch_deg: f64,
+    pub(crate) z_m: f64,
+    pub(crate) pitch_deg: f64,
     /// Axial velocity, m/s.
-    pub u_m_s: f64,
+    pub(crate) u_m_s: f64,
     /// Lateral velocity, m/s.
-    pub w_m_s: f64,
-    pub pitch_rate_deg_s: f64,
+    pub(crate) w_m_s: f64,
+    pub(crate) pitch_rate_deg_s: f64,
 }
 
 impl PaperRow {
     /// The state in SI and radians.
-    pub fn state(&self) -> PlanarState {
+    pub(crate) fn state(&self) -> PlanarState {
         PlanarState {
             x_m: self.x_m,
             z_m: self.z_m,
@@ -64,26 +65,26 @@ impl PaperRow {
 
 /// One experiment. Every one starts at 15 m and -5 m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Case {
+pub(crate) struct Case {
     /// The table in which it appears.
-    pub table: Table,
+    pub(crate) table: Table,
     /// Input weight P.
-    pub input_weight: f64,
+    pub(crate) input_weight: f64,
     /// Initial pitch, degrees.
-    pub pitch_deg: f64,
+    pub(crate) pitch_deg: f64,
     /// Initial lateral velocity, m/s.
-    pub w_m_s: f64,
+    pub(crate) w_m_s: f64,
     /// Initial pitch rate, degrees per second.
-    pub pitch_rate_deg_s: f64,
+    pub(crate) pitch_rate_deg_s: f64,
     /// What the paper reports; it shows P = 5 in Fig. 6 without numbers.
-    pub paper: Option<PaperRow>,
+    pub(crate) paper: Option<PaperRow>,
     /// The J that the paper prints beside it, in Table 3 only.
-    pub paper_cost: Option<f64>,
+    pub(crate) paper_cost: Option<f64>,
 }
 
 impl Case {
     /// What distinguishes it within its table.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         match self.table {
             Table::InputWeights => format!("P = {}", self.input_weight),
             Table::Pitch => format!("theta0 = {} deg", self.pitch_deg),
@@ -93,7 +94,7 @@ impl Case {
     }
 
     /// The paper's own problem: its conditions at the end and no others.
-    pub fn problem(&self) -> Problem {
+    pub(crate) fn problem(&self) -> Problem {
         let start = PlanarState {
             theta_rad: self.pitch_deg.to_radians(),
             w_m_s: self.w_m_s,
@@ -104,7 +105,7 @@ impl Case {
     }
 
     /// Upright, without lateral velocity or rate, P = 1: the row that every table repeats.
-    pub fn is_nominal(&self) -> bool {
+    pub(crate) fn is_nominal(&self) -> bool {
         *self == Self { table: self.table, paper: self.paper, paper_cost: self.paper_cost, ..NOMINAL }
     }
 }

@@ -17,21 +17,18 @@ use world::{Actuators, Truth, World};
 use super::PaperError;
 
 /// The paper gives no height for its fall. This is the apogee of our missions with its airframe.
-pub const HEIGHT_M: f64 = 300.0;
+pub(crate) const HEIGHT_M: f64 = 300.0;
 /// Centre of gravity above the nozzle (Table 1: `X_CG - X_THR`), m.
-pub const CG_STATION_M: f64 = 0.52;
+pub(crate) const CG_STATION_M: f64 = 0.52;
 /// The same by the other reading of "25 % of the rocket's length, as the engine represents the large majority of the total
 /// mass": a quarter of the length from the nozzle, m. Table 1 has it a quarter from the nose.
-pub const HEAVY_TAIL_STATION_M: f64 = 0.175;
-/// Sea level, kg/m^3, and standard gravity, m/s^2.
-const DENSITY_KG_M3: f64 = 1.225;
-const GRAVITY_M_S2: f64 = 9.806_65;
+pub(crate) const HEAVY_TAIL_STATION_M: f64 = 0.175;
 /// Steps between two samples.
 const SAMPLE_STEPS: u64 = 20;
 
 /// The paper's vehicle: Table 1 and section 2.1.
 #[derive(Debug, Clone)]
-pub struct Vehicle {
+pub(crate) struct Vehicle {
     airframe: Airframe,
     /// It is never lit; its mass is part of the vehicle's.
     motor: ThrustCurve,
@@ -39,15 +36,15 @@ pub struct Vehicle {
 
 /// One moment of a fall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
-    pub time_s: f64,
+pub(crate) struct Moment {
+    pub(crate) time_s: f64,
     /// Centre of gravity, height above the ground under the feet's contact, m.
-    pub position_m: Vector3<f64>,
-    pub velocity_m_s: Vector3<f64>,
+    pub(crate) position_m: Vector3<f64>,
+    pub(crate) velocity_m_s: Vector3<f64>,
     /// Angle between the tail and the velocity: 0 in a straight tail-first fall, pi nose first, rad.
-    pub angle_to_wind_rad: f64,
+    pub(crate) angle_to_wind_rad: f64,
     /// Angle between the nose and the vertical, rad.
-    pub tilt_rad: f64,
+    pub(crate) tilt_rad: f64,
 }
 
 impl Vehicle {
@@ -56,7 +53,7 @@ impl Vehicle {
     ///
     /// # Errors
     /// A built-in file is missing: a defect of the build.
-    pub fn new() -> Result<Self, PaperError> {
+    pub(crate) fn new() -> Result<Self, PaperError> {
         let mut airframe = vehicles::airframe::builtin("mk2-h53")?;
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
@@ -67,20 +64,14 @@ impl Vehicle {
 
     /// The same vehicle with its centre of gravity at another station, m above the nozzle.
     #[must_use]
-    pub fn with_cg_at(mut self, station_m: f64) -> Self {
+    pub(crate) fn with_cg_at(mut self, station_m: f64) -> Self {
         self.airframe.mass.loaded_cg_station_m = station_m;
         self
     }
 
     /// Its airframe.
-    pub fn airframe(&self) -> &Airframe {
+    pub(crate) fn airframe(&self) -> &Airframe {
         &self.airframe
-    }
-
-    /// Terminal speed of a straight fall at sea level, m/s.
-    pub fn terminal_speed_m_s(&self, opening_rad: f64) -> f64 {
-        let area_m2 = self.airframe.drag_area_m2(opening_rad);
-        libm::sqrt(2.0 * self.airframe.mass.loaded_kg * GRAVITY_M_S2 / (DENSITY_KG_M3 * area_m2))
     }
 
     /// The fall from rest in still air, from [`HEIGHT_M`] to the ground, with the nose turned away from the vertical:
@@ -88,7 +79,7 @@ impl Vehicle {
     ///
     /// # Errors
     /// The world cannot be built: a defect of the build.
-    pub fn fall(
+    pub(crate) fn fall(
         &self,
         opening_rad: f64,
         [pitch_rad, yaw_rad]: [f64; 2],
@@ -132,18 +123,18 @@ fn moment(world: &World) -> Moment {
 }
 
 /// Directions of the tilt about the body's axis, degrees.
-pub const ROLLS_DEG: [f64; 4] = [0.0, 45.0, 90.0, 135.0];
+pub(crate) const ROLLS_DEG: [f64; 4] = [0.0, 45.0, 90.0, 135.0];
 /// Tilts at the start, degrees.
-pub const TILTS_DEG: [f64; 14] =
+pub(crate) const TILTS_DEG: [f64; 14] =
     [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0, 26.0, 28.0];
 /// Openings of the fins, degrees: 0 closed, 90 fully open.
-pub const OPENINGS_DEG: [f64; 10] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0];
+pub(crate) const OPENINGS_DEG: [f64; 10] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0];
 /// Angles to the wind at which the static margin is given, degrees.
-pub const ANGLES_DEG: [f64; 6] = [1.0, 4.0, 8.0, 12.0, 16.0, 20.0];
+pub(crate) const ANGLES_DEG: [f64; 6] = [1.0, 4.0, 8.0, 12.0, 16.0, 20.0];
 
 /// How the falls of a cell end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
+pub(crate) enum Fate {
     /// Whatever the direction of the tilt, the tail ends nearer to the wind than it began.
     Settles,
     /// In some directions only.
@@ -154,10 +145,10 @@ pub enum Fate {
 
 impl Fate {
     /// All of them, in their order.
-    pub const ALL: [Self; 3] = [Self::Settles, Self::DependsOnRoll, Self::Flips];
+    pub(crate) const ALL: [Self; 3] = [Self::Settles, Self::DependsOnRoll, Self::Flips];
 
     /// For tables and legends.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Settles => "settles",
             Self::DependsOnRoll => "depends on the direction",
@@ -166,7 +157,7 @@ impl Fate {
     }
 
     /// One character, for maps of text.
-    pub fn sign(self) -> char {
+    pub(crate) fn sign(self) -> char {
         match self {
             Self::Settles => '#',
             Self::DependsOnRoll => 'o',
@@ -177,14 +168,14 @@ impl Fate {
 
 /// The map and the margins.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stability {
+pub(crate) struct Stability {
     /// Centre of gravity, m above the nozzle.
-    pub cg_station_m: f64,
+    pub(crate) cg_station_m: f64,
     /// Row by row: a row for each of [`OPENINGS_DEG`], a column for each of [`TILTS_DEG`].
-    pub fates: Vec<Fate>,
+    pub(crate) fates: Vec<Fate>,
     /// Centre of pressure above the centre of gravity, m, positive is stable: for each of [`OPENINGS_DEG`] and
     /// [`ANGLES_DEG`], the least and the most over the direction of the angle.
-    pub margins_m: Vec<[[f64; 2]; ANGLES_DEG.len()]>,
+    pub(crate) margins_m: Vec<[[f64; 2]; ANGLES_DEG.len()]>,
 }
 
 impl Stability {
@@ -192,7 +183,7 @@ impl Stability {
     ///
     /// # Errors
     /// The vehicle cannot be built.
-    pub fn new(cg_station_m: f64) -> Result<Self, PaperError> {
+    pub(crate) fn new(cg_station_m: f64) -> Result<Self, PaperError> {
         let vehicle = Vehicle::new()?.with_cg_at(cg_station_m);
         let cells: Vec<(f64, f64)> =
             OPENINGS_DEG.iter().flat_map(|opening| TILTS_DEG.iter().map(|tilt| (*opening, *tilt))).collect();
@@ -208,12 +199,12 @@ impl Stability {
     }
 
     /// Number of cells with this fate.
-    pub fn count(&self, fate: Fate) -> usize {
+    pub(crate) fn count(&self, fate: Fate) -> usize {
         self.fates.iter().filter(|found| **found == fate).count()
     }
 
     /// The fate from a tilt with an opening, each by its place.
-    pub fn fate(&self, opening: usize, tilt: usize) -> Fate {
+    pub(crate) fn fate(&self, opening: usize, tilt: usize) -> Fate {
         self.fates[opening * TILTS_DEG.len() + tilt]
     }
 }
@@ -249,6 +240,12 @@ fn margin_m(balance: &Balance, opening_deg: f64, angle_deg: f64, cg_station_m: f
 mod tests {
     use super::*;
 
+    /// Terminal speed of a straight fall at sea level under standard gravity, m/s.
+    fn terminal_speed_m_s(vehicle: &Vehicle, opening_rad: f64) -> f64 {
+        let area_m2 = vehicle.airframe.drag_area_m2(opening_rad);
+        libm::sqrt(2.0 * vehicle.airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2))
+    }
+
     /// The paper's Fig. 5: fins fully open, 2 degrees of pitch and 1 degree of yaw: passively stable, and slow.
     #[test]
     fn val_paper_fig_5_the_fall_settles_and_approaches_the_terminal_speed() {
@@ -261,7 +258,7 @@ mod tests {
         let worst_rad = late.map(|now| now.angle_to_wind_rad).fold(0.0, f64::max);
         assert!(worst_rad < 0.4 * first.angle_to_wind_rad, "{worst_rad}");
         // 39.4 m/s by hand from the drag areas of Eq. 3 and 8.
-        let terminal_m_s = vehicle.terminal_speed_m_s(FRAC_PI_2);
+        let terminal_m_s = terminal_speed_m_s(&vehicle, FRAC_PI_2);
         assert!((terminal_m_s - 39.4).abs() < 0.05, "{terminal_m_s}");
         assert!((last.velocity_m_s.z / -terminal_m_s - 0.995).abs() < 0.01, "{last:?}");
     }
@@ -269,7 +266,7 @@ mod tests {
     /// Eq. 8 with `C_xb = 1` by hand; the paper's CFD says "around 80 m/s".
     #[test]
     fn val_paper_eq_8_closed_fins_fall_at_106_m_s() {
-        let terminal_m_s = Vehicle::new().unwrap().terminal_speed_m_s(0.0);
+        let terminal_m_s = terminal_speed_m_s(&Vehicle::new().unwrap(), 0.0);
         assert!((terminal_m_s - 105.7).abs() < 0.1, "{terminal_m_s}");
     }
 

@@ -18,7 +18,7 @@ const CROSSES: &str = "the paper's final position";
 ///
 /// # Errors
 /// The fall of Fig. 5 cannot be set up, or a figure not be drawn.
-pub fn figures(rows: &[Row]) -> Result<Vec<(&'static str, String)>, PaperError> {
+pub(crate) fn figures(rows: &[Row]) -> Result<Vec<(&'static str, String)>, PaperError> {
     let of_table = |table, file, title: &str| -> Result<_, PaperError> {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.case.table == table).collect();
         Ok((file, lines_svg(title, &[path_panel(&rows)], 1, Some(CROSSES))?))
@@ -36,7 +36,7 @@ pub fn figures(rows: &[Row]) -> Result<Vec<(&'static str, String)>, PaperError> 
 ///
 /// # Errors
 /// A figure cannot be drawn.
-pub fn stability_figures(stability: &Stability) -> Result<Vec<(&'static str, String)>, PaperError> {
+pub(crate) fn stability_figures(stability: &Stability) -> Result<Vec<(&'static str, String)>, PaperError> {
     Ok(vec![("stability.svg", fates(stability)?), ("static-margin.svg", margins(stability)?)])
 }
 

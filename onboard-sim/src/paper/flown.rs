@@ -89,30 +89,30 @@ const MAX_ITERATIONS: usize = 1000;
 
 /// Results of the printed numbers and equations.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AsPrinted {
+pub(crate) struct AsPrinted {
     /// Printed thrust, N.
-    pub thrust_n: f64,
+    pub(crate) thrust_n: f64,
     /// The slowest touchdown that is possible with it, m/s: upright under full thrust all the way.
-    pub best_touchdown_speed_m_s: f64,
+    pub(crate) best_touchdown_speed_m_s: f64,
     /// The slowest touchdown that counts as a landing, m/s.
-    pub limit_m_s: f64,
+    pub(crate) limit_m_s: f64,
     /// Energy gained or lost in one second of coasting from a tilted attitude without thrust or drag, J/kg: by the
     /// printed equations, and by the corrected ones.
-    pub energy_error_j_kg: [f64; 2],
+    pub(crate) energy_error_j_kg: [f64; 2],
     /// The landing that a solver with the printed equations and the printed thrust predicts.
-    pub promised: PlanarState,
+    pub(crate) promised: PlanarState,
     /// Its vertical velocity there by the printed equations, whose frames are their own, m/s.
-    pub promised_vertical_m_s: f64,
+    pub(crate) promised_vertical_m_s: f64,
     /// The lowest altitude on the way there, m.
-    pub promised_lowest_m: f64,
+    pub(crate) promised_lowest_m: f64,
     /// Whether that solve converged.
-    pub promise_converged: bool,
+    pub(crate) promise_converged: bool,
     /// The contact that the true vehicle makes when it flies that plan; `None` if it does not come down in time.
-    pub happens: Option<PlanarState>,
+    pub(crate) happens: Option<PlanarState>,
 }
 
 /// Solves and flies the landing with the equations as printed.
-pub fn as_printed() -> AsPrinted {
+pub(crate) fn as_printed() -> AsPrinted {
     let of_kind = |kind| PlanarModel { kind, ..model() };
     let in_truth = Problem { thrust_n: vec![PRINTED_THRUST_N; HORIZON], ..problem(start(), HORIZON) };
     let mut believed = Problem { model: of_kind(ModelKind::AsPrinted), ..in_truth.clone() };

@@ -24,7 +24,7 @@ const POSSIBLE: &[Quantity] = &[
 ///
 /// # Errors
 /// The axes do not suit the paper's vehicle.
-pub fn map(axes: [Axis; 2], progress: &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> {
+pub(crate) fn map(axes: [Axis; 2], progress: &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> {
     map_of(("the paper's vehicle", POSSIBLE), axes, progress, |x, y| Ok(cell(axes, [x, y])))
 }
 

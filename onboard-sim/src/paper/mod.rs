@@ -12,8 +12,8 @@
 //! * [`fall`]: the fall of its Fig. 5, in space, and from which tilts that vehicle settles.
 
 mod cases;
-pub mod fall;
-pub mod figures;
+pub(crate) mod fall;
+pub(crate) mod figures;
 mod flown;
 mod map;
 mod objective;
@@ -26,48 +26,48 @@ use vehicles::motors::MotorError;
 use world::world::WorldError;
 
 use campaign::figure::FigureError;
-pub use cases::{Case, PaperRow, Table};
-pub use flown::{AsPrinted, as_printed};
-pub use map::map;
-pub use objective::{Definition, Objective};
-pub use text::{to_json, write_stability, write_tables};
+pub(crate) use cases::{Case, Table};
+pub(crate) use flown::{AsPrinted, as_printed};
+pub(crate) use map::map;
+pub(crate) use objective::Objective;
+pub(crate) use text::{to_json, write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// The experiment.
-    pub case: Case,
+    pub(crate) case: Case,
     /// The paper's final state by its own Table 2; `None` where it reports none.
-    pub paper_landed: Option<bool>,
+    pub(crate) paper_landed: Option<bool>,
     /// The plan's end, solved once from the start.
-    pub open_loop: Finish,
+    pub(crate) open_loop: Finish,
     /// The end of the closed-loop flight.
-    pub closed_loop: Finish,
+    pub(crate) closed_loop: Finish,
 }
 
 /// How one landing ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Finish {
+pub(crate) struct Finish {
     /// The state at the end of the burn.
-    pub state: PlanarState,
+    pub(crate) state: PlanarState,
     /// The limits of the paper's Table 2 that it breaks, in words.
-    pub broken: Vec<String>,
+    pub(crate) broken: Vec<String>,
     /// Cost: of the plan, or of the first plan of a closed loop.
-    pub cost: f64,
+    pub(crate) cost: f64,
     /// Whether the plan, or every plan of a closed loop, met the optimality conditions to the tolerance.
-    pub converged: bool,
+    pub(crate) converged: bool,
     /// The way there, from ignition on, once a sample.
-    pub path: Vec<Sample>,
+    pub(crate) path: Vec<Sample>,
 }
 
 /// One moment of a landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Time since ignition, s.
-    pub time_s: f64,
-    pub state: PlanarState,
+    pub(crate) time_s: f64,
+    pub(crate) state: PlanarState,
     /// Gimbal angle that led here, rad.
-    pub gimbal_rad: f64,
+    pub(crate) gimbal_rad: f64,
 }
 
 impl Finish {
@@ -78,29 +78,29 @@ impl Finish {
     }
 
     /// Whether it ends inside Table 2.
-    pub fn landed(&self) -> bool {
+    pub(crate) fn landed(&self) -> bool {
         self.broken.is_empty()
     }
 }
 
 /// All of the paper's experiments.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Experiments {
+pub(crate) struct Experiments {
     /// Table by table.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// What Table 3's J could be.
-    pub objective: Objective,
+    pub(crate) objective: Objective,
 }
 
 /// All of the paper's experiments.
-pub fn experiments() -> Experiments {
+pub(crate) fn experiments() -> Experiments {
     let rows: Vec<Row> = cases::all().into_iter().map(experiment).collect();
     Experiments { objective: Objective::new(&rows), rows }
 }
 
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
-pub enum PaperError {
+pub(crate) enum PaperError {
     #[error(transparent)]
     Airframe(#[from] AirframeError),
     #[error(transparent)]

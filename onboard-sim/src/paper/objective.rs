@@ -10,22 +10,22 @@ use super::{Row, Table};
 
 /// What a definition makes of one landing.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Definition {
-    pub name: &'static str,
+pub(crate) struct Definition {
+    pub(crate) name: &'static str,
     /// Its value for each of [`Objective::weights`].
-    pub values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// All definitions, and the paper's column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Objective {
+pub(crate) struct Objective {
     /// The weights P.
-    pub weights: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
     /// The paper's J for each of them; it prints none for 5.
-    pub paper: Vec<Option<f64>>,
+    pub(crate) paper: Vec<Option<f64>>,
     /// The same of Eq. 28 at the paper's own final states, the gimbal at its centre.
-    pub at_paper_finals: Vec<Option<f64>>,
-    pub definitions: Vec<Definition>,
+    pub(crate) at_paper_finals: Vec<Option<f64>>,
+    pub(crate) definitions: Vec<Definition>,
 }
 
 /// The states' and the input's part of a cost.

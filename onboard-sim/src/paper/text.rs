@@ -14,7 +14,11 @@ use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn write_tables(out: &mut impl Write, experiments: &Experiments, printed: &AsPrinted) -> io::Result<()> {
+pub(crate) fn write_tables(
+    out: &mut impl Write,
+    experiments: &Experiments,
+    printed: &AsPrinted,
+) -> io::Result<()> {
     let rows = &experiments.rows;
     writeln!(out, "Final states: the landing paper's, and ours with its cost, conditions and start")?;
     writeln!(out, "(consistent equations, T = 33.3 N). Verdict by the paper's Table 2.")?;
@@ -183,7 +187,7 @@ fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
 ///
 /// # Errors
 /// The output cannot be written.
-pub fn write_stability(
+pub(crate) fn write_stability(
     out: &mut impl Write,
     stability: &Stability,
     heavy_tail: &Stability,
@@ -247,7 +251,7 @@ pub fn write_stability(
 }
 
 /// Everything as one JSON value; units in the names, angles in degrees as in the paper.
-pub fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
+pub(crate) fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
     json!({
         "rows": experiments.rows.iter().map(row_json).collect::<Vec<_>>(),
         "objective": objective_json(&experiments.objective),
