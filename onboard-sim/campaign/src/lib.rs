@@ -3,7 +3,7 @@
 //! * [`store`]: everything that a campaign's results depend on, and its directory.
 //! * [`tally`]: flies one flight of a campaign and collects the values of its [`row`].
 //! * [`run`]: the same work on many things, on several threads; flies the missing flights and writes the results.
-//! * [`statistics`], [`summary`], [`picture`]: percentiles, texts and pictures from the rows; [`figure`] draws.
+//! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`map`]: where a vehicle lands, over two quantities.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
@@ -18,7 +18,6 @@ pub mod figure;
 pub mod hazard;
 pub mod map;
 pub mod motors;
-pub mod picture;
 pub mod row;
 pub mod run;
 pub mod scenario;

@@ -13,10 +13,9 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use sim::sortie::SetUpError;
 
 use crate::figure::FigureError;
-use crate::picture::{PICTURES, pictures};
 use crate::row::{Row, to_csv, to_parquet};
 use crate::store::{Order, Store, StoreError};
-use crate::summary::{Summary, to_markdown};
+use crate::summary::{PICTURES, Summary, pictures, to_markdown};
 use crate::tally;
 
 /// So many threads, or as many as there are processors, for all work inside their `install`.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
 use sim::recipe::Recipe;
 
-use crate::picture::PICTURES;
+use crate::summary::PICTURES;
 use crate::row::{self, Row};
 
 /// A campaign's order.

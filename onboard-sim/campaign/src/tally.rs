@@ -15,6 +15,7 @@ use world::{RestOutcome, Touchdown};
 
 use crate::attainable;
 use crate::row::Row;
+use crate::statistics::golden_section;
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
@@ -235,8 +236,6 @@ fn rest_name(rest: RestOutcome) -> &'static str {
 const SPAN_SHARE: f64 = 0.08;
 /// Flights of the search; they give the height to a centimetre or two.
 const FLIGHTS: usize = 14;
-/// The golden section.
-const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The ignition height, m, from which a baseline touches down most slowly with nominal data, found by simulated
 /// flights. `None` for the pilot, which decides in flight.
@@ -255,23 +254,6 @@ pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Optio
         let outcome = flight.run();
         Ok(outcome.touchdown.map_or(f64::INFINITY, |touchdown| touchdown.vertical_m_s.abs()))
     };
-    let (mut low_m, mut high_m) = (guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE));
-    let inside =
-        |low_m: f64, high_m: f64| [high_m - GOLDEN * (high_m - low_m), low_m + GOLDEN * (high_m - low_m)];
-    let [mut left_m, mut right_m] = inside(low_m, high_m);
-    let (mut left_m_s, mut right_m_s) = (speed_m_s(left_m)?, speed_m_s(right_m)?);
-    for _ in 2..FLIGHTS {
-        if left_m_s < right_m_s {
-            high_m = right_m;
-            (right_m, right_m_s) = (left_m, left_m_s);
-            left_m = inside(low_m, high_m)[0];
-            left_m_s = speed_m_s(left_m)?;
-        } else {
-            low_m = left_m;
-            (left_m, left_m_s) = (right_m, right_m_s);
-            right_m = inside(low_m, high_m)[1];
-            right_m_s = speed_m_s(right_m)?;
-        }
-    }
-    Ok(Some(if left_m_s < right_m_s { left_m } else { right_m }))
+    let range_m = [guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE)];
+    golden_section(range_m, FLIGHTS, speed_m_s).map(Some)
 }

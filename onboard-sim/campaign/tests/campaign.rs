@@ -157,7 +157,7 @@ fn a_directory_of_another_order_or_in_use_is_refused_with_the_reason() {
 fn files_that_no_campaign_wrote_are_never_overwritten() {
     let order = order(1);
     let manifest = order.manifest("test", Shard::WHOLE);
-    let picture = campaign::picture::PICTURES[0].0;
+    let picture = campaign::summary::PICTURES[0].0;
     for name in ["mission.toml", "flights.csv", "summary.md", picture] {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(name);

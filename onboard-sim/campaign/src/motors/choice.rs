@@ -3,6 +3,8 @@
 //! A lighter vehicle stands a weaker motor, a heavier one a stronger one. So the scatter that it stands rises with the mass
 //! up to one mass and falls beyond it, and a grid with a golden section around its best place finds that mass.
 
+use core::convert::Infallible;
+
 use flight::vehicle::airframe::{BadValue, Mass};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
@@ -10,6 +12,7 @@ use flight::vehicle::profile::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::recipe::Recipe;
 
+use crate::statistics::golden_section;
 use super::frame::{Ballast, Frame, start_height_m};
 use super::window::{Fall, Onset, Window};
 
@@ -238,7 +241,6 @@ const MASS_STEP: f64 = 1.03;
 const MASSES: [f64; 2] = [0.1, 4.0];
 /// Steps of the golden section: a step of the grid becomes 0.1 % of the mass.
 const SECTIONS: usize = 7;
-const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Rounds in which height and speed of the onset are made to agree.
 const ROUNDS: usize = 8;
 /// A scatter must be larger by this for more ballast.
@@ -381,36 +383,16 @@ fn place_at(pairing: &Pairing<'_>, mass_kg: f64) -> Tried {
 }
 
 /// The best mass between two, kg, around a good one.
-fn golden(pairing: &Pairing<'_>, good: Place, [mut low_kg, mut high_kg]: [f64; 2]) -> Place {
+fn golden(pairing: &Pairing<'_>, good: Place, range_kg: [f64; 2]) -> Place {
     let mut best = good;
-    let mut scatter_at = |mass_kg: f64| match place_at(pairing, mass_kg) {
-        Tried::Lands(place) => {
-            let scatter = place.scatter;
-            if scatter > best.scatter {
-                best = place;
-            }
-            scatter
+    let Ok(_) = golden_section(range_kg, 2 + SECTIONS, |mass_kg| {
+        let Tried::Lands(place) = place_at(pairing, mass_kg) else { return Ok::<_, Infallible>(0.0) };
+        let scatter = place.scatter;
+        if scatter > best.scatter {
+            best = place;
         }
-        _ => 0.0,
-    };
-    let inside = |low_kg: f64, high_kg: f64| {
-        [high_kg - GOLDEN * (high_kg - low_kg), low_kg + GOLDEN * (high_kg - low_kg)]
-    };
-    let [mut left_kg, mut right_kg] = inside(low_kg, high_kg);
-    let (mut left, mut right) = (scatter_at(left_kg), scatter_at(right_kg));
-    for _ in 0..SECTIONS {
-        if left >= right {
-            high_kg = right_kg;
-            (right_kg, right) = (left_kg, left);
-            left_kg = inside(low_kg, high_kg)[0];
-            left = scatter_at(left_kg);
-        } else {
-            low_kg = left_kg;
-            (left_kg, left) = (right_kg, right);
-            right_kg = inside(low_kg, high_kg)[1];
-            right = scatter_at(right_kg);
-        }
-    }
+        Ok(-scatter)
+    });
     best
 }
 
