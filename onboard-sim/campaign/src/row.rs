@@ -44,65 +44,33 @@ impl Value<'_> {
     }
 }
 
-/// The type of a column's cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// [`Value::Count`].
-    Count,
-    /// [`Value::Real`].
-    Real,
-    /// [`Value::Maybe`].
-    Maybe,
-    /// [`Value::Flag`].
-    Flag,
-    /// [`Value::Word`].
-    Word,
-}
-
-/// A type that a column can have.
-trait Cell {
-    const KIND: Kind;
-
-    fn value(&self) -> Value<'_>;
-}
-
-impl Cell for u64 {
-    const KIND: Kind = Kind::Count;
-
-    fn value(&self) -> Value<'_> {
-        Value::Count(*self)
+impl<'a> From<&'a u64> for Value<'a> {
+    fn from(count: &'a u64) -> Self {
+        Self::Count(*count)
     }
 }
 
-impl Cell for f64 {
-    const KIND: Kind = Kind::Real;
-
-    fn value(&self) -> Value<'_> {
-        Value::Real(*self)
+impl<'a> From<&'a f64> for Value<'a> {
+    fn from(real: &'a f64) -> Self {
+        Self::Real(*real)
     }
 }
 
-impl Cell for Option<f64> {
-    const KIND: Kind = Kind::Maybe;
-
-    fn value(&self) -> Value<'_> {
-        Value::Maybe(*self)
+impl<'a> From<&'a Option<f64>> for Value<'a> {
+    fn from(maybe: &'a Option<f64>) -> Self {
+        Self::Maybe(*maybe)
     }
 }
 
-impl Cell for bool {
-    const KIND: Kind = Kind::Flag;
-
-    fn value(&self) -> Value<'_> {
-        Value::Flag(*self)
+impl<'a> From<&'a bool> for Value<'a> {
+    fn from(flag: &'a bool) -> Self {
+        Self::Flag(*flag)
     }
 }
 
-impl Cell for String {
-    const KIND: Kind = Kind::Word;
-
-    fn value(&self) -> Value<'_> {
-        Value::Word(self)
+impl<'a> From<&'a String> for Value<'a> {
+    fn from(word: &'a String) -> Self {
+        Self::Word(word)
     }
 }
 
@@ -110,8 +78,6 @@ impl Cell for String {
 pub struct Column {
     /// The name, with its unit.
     pub name: &'static str,
-    /// The type of its cells.
-    pub kind: Kind,
     /// The cell of a row.
     pub value: for<'a> fn(&'a Row) -> Value<'a>,
 }
@@ -119,14 +85,14 @@ pub struct Column {
 macro_rules! row {
     ($($(#[$documentation:meta])* $name:ident: $kind:ty,)*) => {
         /// A flight in a table.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
         pub struct Row {
             $($(#[$documentation])* pub $name: $kind,)*
         }
 
         /// Every column, in order.
         pub const COLUMNS: &[Column] =
-            &[$(Column { name: stringify!($name), kind: <$kind as Cell>::KIND, value: |row| row.$name.value() },)*];
+            &[$(Column { name: stringify!($name), value: |row| Value::from(&row.$name) },)*];
     };
 }
 
@@ -322,12 +288,13 @@ pub fn to_parquet(rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
 }
 
 fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
-    let (physical, logical, repetition) = match column.kind {
-        Kind::Count => (Physical::INT64, None, Repetition::REQUIRED),
-        Kind::Real => (Physical::DOUBLE, None, Repetition::REQUIRED),
-        Kind::Maybe => (Physical::DOUBLE, None, Repetition::OPTIONAL),
-        Kind::Flag => (Physical::BOOLEAN, None, Repetition::REQUIRED),
-        Kind::Word => (Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::REQUIRED),
+    // Every row has cells of one type in a column.
+    let (physical, logical, repetition) = match (column.value)(&Row::default()) {
+        Value::Count(_) => (Physical::INT64, None, Repetition::REQUIRED),
+        Value::Real(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
+        Value::Maybe(_) => (Physical::DOUBLE, None, Repetition::OPTIONAL),
+        Value::Flag(_) => (Physical::BOOLEAN, None, Repetition::REQUIRED),
+        Value::Word(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::REQUIRED),
     };
     let field = Type::primitive_type_builder(column.name, physical)
         .with_logical_type(logical)
@@ -342,8 +309,8 @@ fn write_column(
     cells: &mut SerializedColumnWriter<'_>,
 ) -> Result<(), ParquetError> {
     let values = rows.iter().map(|row| (column.value)(row));
-    match column.kind {
-        Kind::Count => {
+    match (column.value)(&Row::default()) {
+        Value::Count(_) => {
             let counts: Vec<i64> = values
                 .filter_map(
                     |value| if let Value::Count(count) = value { i64::try_from(count).ok() } else { None },
@@ -351,20 +318,20 @@ fn write_column(
                 .collect();
             cells.typed::<Int64Type>().write_batch(&counts, None, None)?;
         }
-        Kind::Real => {
+        Value::Real(_) => {
             let reals: Vec<f64> = values.filter_map(|value| value.number()).collect();
             cells.typed::<DoubleType>().write_batch(&reals, None, None)?;
         }
-        Kind::Maybe => {
+        Value::Maybe(_) => {
             let levels: Vec<i16> = values.clone().map(|value| i16::from(value.number().is_some())).collect();
             let reals: Vec<f64> = values.filter_map(|value| value.number()).collect();
             cells.typed::<DoubleType>().write_batch(&reals, Some(&levels), None)?;
         }
-        Kind::Flag => {
+        Value::Flag(_) => {
             let flags: Vec<bool> = values.map(|value| value == Value::Flag(true)).collect();
             cells.typed::<BoolType>().write_batch(&flags, None, None)?;
         }
-        Kind::Word => {
+        Value::Word(_) => {
             let words: Vec<ByteArray> = values
                 .filter_map(
                     |value| if let Value::Word(word) = value { Some(ByteArray::from(word)) } else { None },
