@@ -10,8 +10,7 @@ pub(crate) mod paper;
 mod single;
 pub(crate) mod world;
 
-use std::fs::File;
-use std::io::{BufWriter, IsTerminal as _, Write as _};
+use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -95,54 +94,47 @@ fn is_device(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
-/// Writes under a hidden temporary name first, so that a file with the final name is always complete.
+/// Writes what a function writes as a file.
 fn write_file(
     path: &Path,
     force: bool,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
+    write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>,
 ) -> anyhow::Result<()> {
-    refuse_loss(path, force)?;
-    let cannot = || format!("cannot write {}", path.display());
-    if is_device(path) {
-        let mut out = BufWriter::new(File::options().write(true).open(path).with_context(cannot)?);
-        return write(&mut out).and_then(|()| out.flush()).with_context(cannot);
-    }
-    let unfinished = unfinished_beside(path).with_context(cannot)?;
-    fill(&unfinished, write).with_context(cannot)?;
-    keep(unfinished, path, force)
+    let mut bytes = Vec::new();
+    write(&mut bytes)?;
+    write_all(&[(path.to_owned(), bytes)], force)
 }
 
-/// Writes texts as the files of a folder, which is made if it is not there: all of them or none.
+/// Writes texts as the files of a folder, which is made if it is not there.
 fn write_folder(folder: &Path, files: &[(&str, String)], force: bool) -> anyhow::Result<()> {
-    for (name, _) in files {
-        refuse_loss(&folder.join(name), force)?;
-    }
+    let files = files.iter().map(|(name, text)| (folder.join(name), text.clone().into_bytes()));
+    let files: Vec<_> = files.collect();
+    files.iter().try_for_each(|(path, _)| refuse_loss(path, force))?;
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    write_all(&files, force)
+}
+
+/// Writes all files or none, under hidden temporary names first, so that a file with the final name is always complete.
+fn write_all(files: &[(PathBuf, Vec<u8>)], force: bool) -> anyhow::Result<()> {
     let mut complete = Vec::with_capacity(files.len());
-    for (name, text) in files {
-        let path = folder.join(name);
+    for (path, bytes) in files {
+        refuse_loss(path, force)?;
         let cannot = || format!("cannot write {}", path.display());
-        let unfinished = unfinished_beside(&path).with_context(cannot)?;
-        fill(&unfinished, |out| out.write_all(text.as_bytes())).with_context(cannot)?;
+        if is_device(path) {
+            std::fs::write(path, bytes).with_context(cannot)?;
+            continue;
+        }
+        let mut unfinished = unfinished_beside(path).with_context(cannot)?;
+        unfinished.write_all(bytes).and_then(|()| unfinished.as_file().sync_all()).with_context(cannot)?;
         complete.push((unfinished, path));
     }
-    complete.into_iter().try_for_each(|(unfinished, path)| keep(unfinished, &path, force))
-}
-
-fn fill(
-    unfinished: &NamedTempFile,
-    write: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    let mut out = BufWriter::new(unfinished.reopen()?);
-    write(&mut out)?;
-    out.flush()?;
-    out.get_ref().sync_all()
-}
-
-fn keep(unfinished: NamedTempFile, path: &Path, force: bool) -> anyhow::Result<()> {
-    let kept = if force { unfinished.persist(path) } else { unfinished.persist_noclobber(path) };
-    kept.map(drop).map_err(|error| error.error).with_context(|| format!("cannot write {}", path.display()))
+    complete.into_iter().try_for_each(|(unfinished, path)| {
+        let kept = if force { unfinished.persist(path) } else { unfinished.persist_noclobber(path) };
+        kept.map(drop)
+            .map_err(|error| error.error)
+            .with_context(|| format!("cannot write {}", path.display()))
+    })
 }
 
 /// A file that disappears unless it is kept.
