@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use campaign::order::{Order, Shard};
-use campaign::store::Store;
+use campaign::store::{Order, Shard, Store};
 use prost::Message as _;
 use protocol::log::flight_v1::PilotTick;
 use quick_xml::events::Event as Xml;
@@ -226,8 +225,8 @@ fn a_campaign_is_flown_again_from_its_order() {
     let order = Order { recipe, flights: 3 };
     let manifest = order.manifest("test", Shard::WHOLE);
     let store = Store::open(&campaign, &order, &manifest).unwrap();
-    campaign::run::run(&order, &store, 1, &|_| {}).unwrap();
-    campaign::results::publish(&order, &store).unwrap();
+    campaign::run::run(&order, &store, &|_| {}).unwrap();
+    campaign::run::publish(&order, &store).unwrap();
     drop(store);
     let (code, stdout, stderr) = gate(&campaign, &baseline, &["--accept"]);
     assert!(code == 0 && stdout.contains("3 new"), "{stdout}{stderr}");
