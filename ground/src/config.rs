@@ -94,11 +94,10 @@ impl Config {
                 file.parse::<LogChoice>().map_err(|error| format!("{key}: {error}"))?;
             }
         }
-        if config.alarm_command.as_ref().is_some_and(|command| command.trim().is_empty()) {
-            return Err("alarm_command is empty; give a command or \"none\"".to_owned());
-        }
-        if config.voice.as_ref().is_some_and(|command| command.trim().is_empty()) {
-            return Err("voice is empty; give a command or \"none\"".to_owned());
+        for (key, command) in [("alarm_command", &config.alarm_command), ("voice", &config.voice)] {
+            if command.as_ref().is_some_and(|command| command.trim().is_empty()) {
+                return Err(format!("{key} is empty; give a command or \"none\""));
+            }
         }
         Ok(config)
     }
@@ -108,6 +107,9 @@ impl Config {
         fn parsed<T: std::str::FromStr>(value: Option<&String>) -> Option<T> {
             value.and_then(|value| value.parse().ok())
         }
+        fn fill<T>(flag: &mut Option<T>, set: Option<T>) {
+            *flag = flag.take().or(set);
+        }
         // Only a daemon takes links from the settings: a bare `ground` must always be the demonstration.
         let is_daemon = matches!(cli.command, Some(Command::Daemon));
         if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
@@ -115,33 +117,19 @@ impl Config {
         }
         // A replay shows the vehicle in the log, whatever the settings say.
         if cli.replay.is_none() {
-            cli.sysid = cli.sysid.or(self.sysid);
-            cli.vehicle_sysid = cli.vehicle_sysid.or(self.vehicle_sysid);
+            fill(&mut cli.sysid, self.sysid);
+            fill(&mut cli.vehicle_sysid, self.vehicle_sysid);
         }
-        if cli.key.is_none() && !cli.connect.is_empty() {
-            cli.key.clone_from(&self.key);
+        if !cli.connect.is_empty() {
+            fill(&mut cli.key, self.key.clone());
+            fill(&mut cli.crew, self.crew.clone());
+            fill(&mut cli.mission, self.mission.clone());
+            fill(&mut cli.checklist, self.checklist.clone());
         }
-        if cli.crew.is_none() && !cli.connect.is_empty() {
-            cli.crew.clone_from(&self.crew);
-        }
-        if cli.mission.is_none() && !cli.connect.is_empty() {
-            cli.mission.clone_from(&self.mission);
-        }
-        if cli.checklist.is_none() && !cli.connect.is_empty() {
-            cli.checklist.clone_from(&self.checklist);
-        }
-        if cli.operator.is_none() {
-            cli.operator.clone_from(&self.operator);
-        }
-        if cli.log.is_none() {
-            cli.log = parsed(self.log.as_ref());
-        }
-        if cli.tlog.is_none() {
-            cli.tlog = parsed(self.tlog.as_ref());
-        }
-        if cli.socket.is_none() {
-            cli.socket.clone_from(&self.socket);
-        }
+        fill(&mut cli.operator, self.operator.clone());
+        fill(&mut cli.log, parsed(self.log.as_ref()));
+        fill(&mut cli.tlog, parsed(self.tlog.as_ref()));
+        fill(&mut cli.socket, self.socket.clone());
     }
 
     /// What is called out.

@@ -63,7 +63,14 @@ pub async fn session(
     while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
         live = told == ToScreen::Live;
-        take(&mut model, told, at, viewer)?;
+        if let ToScreen::Hello(hello) = &told {
+            let (ours, theirs) = (VERSION, hello.version);
+            anyhow::ensure!(
+                ours == theirs,
+                "the station has version {theirs}, this screen has {ours}; update the older one"
+            );
+        }
+        take(&mut model, told, at, viewer);
     }
     let mut output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
@@ -99,7 +106,7 @@ pub async fn session(
                 }
                 if let Some((told, at)) = told {
                     times.heard(at, clock.now());
-                    take_live(&mut model, told, at, viewer)
+                    take(&mut model, told, at, viewer)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // If the lost station was repeating an abort, the next station must send it.
@@ -130,12 +137,17 @@ pub async fn session(
                 Vec::new()
             }
             _ = ticks.tick() => {
-                pass_replay(&mut again, &mut model, &mut output, clock.now(), times.theirs(clock.now()));
+                again.pass(&mut model, &mut output, clock.now(), times.theirs(clock.now()));
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
             }
             () = clock.sleep_until(redraw_at) => Vec::new(),
         };
-        start_or_end_replay(&actions, &mut again, &mut model, &mut output, times.theirs(clock.now()));
+        if actions.contains(&Action::ReplayFlight) {
+            again.begin(&mut model, times.theirs(clock.now()));
+        }
+        if actions.iter().any(|action| matches!(action, Action::Alarm(_))) {
+            again.leave(&mut output);
+        }
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let now = clock.now();
         let (shown, shown_now) = again.shown().unwrap_or((&model, times.theirs(now)));
@@ -158,34 +170,6 @@ async fn open_first(named: Option<&Path>, viewer: &Viewer) -> anyhow::Result<Sta
     StationConnection::open(&path, viewer).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
     })
-}
-
-/// Lets a replay on this screen go on.
-fn pass_replay(again: &mut Again, model: &mut Model, output: &mut Output, now: Duration, theirs: Duration) {
-    match again.pass(model, now) {
-        Ok(true) => output.mark_changed(),
-        Ok(false) => {}
-        Err(why) => model.info(theirs, format!("no replay: {why}")),
-    }
-}
-
-/// Begins a replay that was asked for; an alarm ends it.
-fn start_or_end_replay(
-    actions: &[Action],
-    again: &mut Again,
-    model: &mut Model,
-    output: &mut Output,
-    theirs: Duration,
-) {
-    if actions.contains(&Action::ReplayFlight)
-        && let Some(log) = model.settings.log_path.clone()
-        && let Err(why) = again.begin(Path::new(&log))
-    {
-        model.info(theirs, format!("no replay: {why}"));
-    }
-    if actions.iter().any(|action| matches!(action, Action::Alarm(_))) && again.leave() {
-        output.mark_changed();
-    }
 }
 
 /// Does the actions that are a screen's own. Returns whether to quit.
@@ -270,47 +254,20 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 
-fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> anyhow::Result<()> {
+/// Takes what the station tells. Returns what this screen does about it: the station does the other actions.
+fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
     match told {
-        ToScreen::Hello(hello) => {
-            let (ours, theirs) = (VERSION, hello.version);
-            anyhow::ensure!(
-                ours == theirs,
-                "the station has version {theirs}, this screen has {ours}; update the older one"
-            );
-            model.settings = settings(&hello, viewer);
-        }
+        ToScreen::Hello(hello) => model.settings = settings(&hello, viewer),
         ToScreen::Live => model.history_ends(),
-        // The station has already done these actions.
-        ToScreen::Msg(msg) => drop(update(model, msg, at)),
+        ToScreen::Msg(msg) => {
+            let mut actions = update(model, msg, at);
+            actions.retain(|action| matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_)));
+            return actions;
+        }
         // A screen does not ask for these.
         ToScreen::Status(_) | ToScreen::Stopping { .. } => {}
     }
-    Ok(())
-}
-
-fn take_live(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
-    match told {
-        ToScreen::Hello(hello) => {
-            model.settings = settings(&hello, viewer);
-            Vec::new()
-        }
-        ToScreen::Live => {
-            model.history_ends();
-            Vec::new()
-        }
-        ToScreen::Msg(msg) => {
-            let actions = update(model, msg, at);
-            // The station does the actions; a screen only rings the bell and talks.
-            actions.into_iter().filter(stays_here).collect()
-        }
-        ToScreen::Status(_) | ToScreen::Stopping { .. } => Vec::new(),
-    }
-}
-
-/// The station does the other actions.
-fn stays_here(action: &Action) -> bool {
-    matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_))
+    Vec::new()
 }
 
 /// The station's settings with the screen's own.

@@ -23,6 +23,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
+use super::output::print;
 use super::wire::Wire;
 use crate::cli::Cli;
 use crate::exit::Exit;
@@ -268,15 +269,17 @@ pub(in crate::app) async fn run_download(
             Some(Word::Done(path)) => {
                 shown.end();
                 wire.save_timestamps();
-                writeln!(std::io::stdout(), "log {}", path.display())
-                    .context("writing to standard output")?;
+                print(format!("log {}\n", path.display()).as_bytes())?;
                 return Ok(Exit::Landed);
             }
             Some(Word::Failed(error)) => {
                 shown.end();
                 return Err(error);
             }
-            Some(Word::Goes(words)) if !shown.in_place => print_line(&words),
+            Some(Word::Goes(words)) if !shown.in_place => {
+                // Nobody may read it.
+                let _ = writeln!(std::io::stderr(), "{words}");
+            }
             Some(Word::Goes(_)) | None => {}
         }
         if shown.in_place && now >= shown.at + SHOW_EVERY {
@@ -306,11 +309,6 @@ impl Shown {
             let _ = writeln!(std::io::stderr());
         }
     }
-}
-
-fn print_line(words: &str) {
-    // Nobody may read it.
-    let _ = writeln!(std::io::stderr(), "{words}");
 }
 
 // The thread that has the files of a download. Nothing else waits for the disk: a disk that hangs must not hold up an abort.

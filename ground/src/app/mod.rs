@@ -14,7 +14,7 @@ pub mod stations;
 pub mod wire;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
-use std::io::{IsTerminal as _, Write as _};
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log};
-use output::Output;
+use output::{Output, print};
 use replaying::Again;
 use server::{Server, Watchers, hello};
 use station::Station;
@@ -170,8 +170,10 @@ async fn start(
     };
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
+    let capacity = wire.endpoints().next().and_then(LinkAddress::capacity_bytes_s);
     let mut model = Model::new(Settings {
-        link_capacity_bytes_s: capacity_of(&wire),
+        // With several links, each has its own.
+        link_capacity_bytes_s: if links.len() == 1 { capacity } else { None },
         vehicle_name: demo.as_ref().map(|_| cli.demonstration().profile.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
@@ -204,7 +206,8 @@ async fn start(
             model.warn(clock.now(), text);
         }
     }
-    if let Some(place) = newest_place(recorder_folder(recorder.as_ref()), start_unix_s) {
+    let folder = recorder.as_ref().and_then(|recorder| recorder.path().parent());
+    if let Some(place) = newest_place(folder, start_unix_s) {
         model.place = Some(place);
         model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
     }
@@ -245,11 +248,6 @@ async fn start(
     Ok((station, model, wire))
 }
 
-/// The capacity of the link; with several links, each has its own.
-fn capacity_of(wire: &Wire) -> Option<u32> {
-    wire.endpoints().next().filter(|_| wire.endpoints().count() == 1).and_then(LinkAddress::capacity_bytes_s)
-}
-
 /// A random number other than 0: the standard library's hash keys differ in every process.
 fn drawn_session() -> u32 {
     (RandomState::new().build_hasher().finish() as u32).max(1)
@@ -262,11 +260,6 @@ fn announce(model: &mut Model, auto: bool, now: Duration) {
         let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
         model.info(now, text);
     }
-}
-
-/// The folder of the log.
-fn recorder_folder(recorder: Option<&Recorder>) -> Option<&std::path::Path> {
-    recorder.and_then(|recorder| recorder.path().parent())
 }
 
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
@@ -350,8 +343,7 @@ pub fn print_config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> 
 pub fn print_completions(shell: clap_complete::Shell) -> anyhow::Result<Exit> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "ground", &mut script);
-    print(&script)?;
-    Ok(Exit::Landed)
+    print(&script).map(|()| Exit::Landed)
 }
 
 /// The manual page, from the same definition as the command line itself.
@@ -361,13 +353,7 @@ pub fn print_completions(shell: clap_complete::Shell) -> anyhow::Result<Exit> {
 pub fn print_manual() -> anyhow::Result<Exit> {
     let mut page = Vec::new();
     clap_mangen::Man::new(Cli::command()).render(&mut page).context("writing the manual page")?;
-    print(&page)?;
-    Ok(Exit::Landed)
-}
-
-fn print(bytes: &[u8]) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(bytes).and_then(|()| out.flush()).context("writing to standard output")
+    print(&page).map(|()| Exit::Landed)
 }
 
 // Finds the name of the person at this screen.

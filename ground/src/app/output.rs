@@ -117,7 +117,7 @@ impl Lines {
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
         }
         self.seen = model.events.total();
-        self.closed = print_all(&text).is_err();
+        self.closed = print(text.as_bytes()).is_err();
     }
 }
 
@@ -154,7 +154,7 @@ pub fn closing(
         let _ = writeln!(text, "log: {}", path.display());
     }
     // The exit code is decided even if nobody reads this.
-    let _ = print_all(&text);
+    let _ = print(text.as_bytes());
 }
 
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
@@ -174,8 +174,11 @@ fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
     text
 }
 
-fn print_all(text: &str) -> std::io::Result<()> {
+/// Writes to standard output.
+///
+/// # Errors
+/// It cannot be written.
+pub(super) fn print(bytes: &[u8]) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()
+    out.write_all(bytes).and_then(|()| out.flush()).context("writing to standard output")
 }

@@ -9,15 +9,14 @@ use anyhow::Context as _;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
-use super::output;
-use super::output::Lines;
+use super::output::{self, Lines, Output};
 use super::screen::Screen;
 use crate::cli::{Cli, ReplayFrom};
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::key::Key;
-use crate::model::{Model, Role, Settings, words};
+use crate::model::{Bindings, Model, Role, Settings, words};
 use crate::replay::Player;
 use crate::replay::recording::{Progress, Recording};
 use crate::update::{Action, Msg};
@@ -51,32 +50,16 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
     let vehicle = cli.vehicle_sysid.map(|_| cli.vehicle());
     let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
     let damage = recording.damage.clone();
-    let name = path.display().to_string();
-    let settings = Settings {
-        log_path: Some(name.clone()),
-        role: Role::Replaying,
-        keys: config.keys.clone(),
-        ..Settings::on_screen(name)
-    };
-    let mut player = Player::new(recording, settings);
+    let mut player = Player::new(recording, settings(&path.display().to_string(), &config.keys));
     match cli.from {
         None => {}
         Some(ReplayFrom::Time(at)) => player.seek(at),
         Some(ReplayFrom::Phase(phase)) => {
             let found = player.seek_phase(phase);
-            anyhow::ensure!(
-                found,
-                "{} has no phase {}; it has {}",
-                path.display(),
-                words::phase(phase),
-                player
-                    .recording()
-                    .phases
-                    .iter()
-                    .map(|(phase, _)| words::phase(*phase))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            );
+            let has = player.recording().phases.iter().map(|(phase, _)| words::phase(*phase));
+            let (path, phase, has) =
+                (path.display(), words::phase(phase), has.collect::<Vec<_>>().join(", "));
+            anyhow::ensure!(found, "{path} has no phase {phase}; it has {has}");
         }
     }
     if let Some(damage) = damage {
@@ -90,6 +73,16 @@ pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool)
     }
     output::closing(&player.model, interactive, Ok(&None), player.position());
     Ok(exit::decide(&player.model.outcome, interactive && std::io::stdout().is_terminal()))
+}
+
+/// The settings of a screen that shows this recording.
+fn settings(log: &str, keys: &Bindings) -> Settings {
+    Settings {
+        log_path: Some(log.to_owned()),
+        role: Role::Replaying,
+        keys: keys.clone(),
+        ..Settings::on_screen(log)
+    }
 }
 
 /// Reports every tenth of the progress while a large log is read.
@@ -162,7 +155,7 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
 #[derive(Default)]
 pub(super) struct Again {
     /// A log is being read.
-    loading: Option<(PathBuf, Receiver<Result<Recording, String>>)>,
+    loading: Option<(String, Receiver<Result<Recording, String>>)>,
     playing: Option<Box<Player>>,
     /// Until when the replay has been moved on.
     then: Duration,
@@ -170,28 +163,40 @@ pub(super) struct Again {
 
 impl Again {
     /// Reads the log in a thread of its own: a long one must not delay the link.
-    pub(super) fn begin(&mut self, path: &Path) -> Result<(), String> {
+    pub(super) fn begin(&mut self, model: &mut Model, now: Duration) {
+        let Some(path) = model.settings.log_path.clone() else { return };
         let (tell, told) = sync_channel(1);
-        let log = path.to_owned();
-        std::thread::Builder::new()
-            .name("replay".to_owned())
-            .spawn(move || {
-                let loaded = Recording::load(&log, None, &mut |_| {}).map_err(|error| error.to_string());
-                // The screen may have ended.
-                let _ = tell.send(loaded);
-            })
-            .map_err(|error| error.to_string())?;
-        self.loading = Some((path.to_owned(), told));
-        Ok(())
+        let log = path.clone();
+        let started = std::thread::Builder::new().name("replay".to_owned()).spawn(move || {
+            let loaded = Recording::load(log.as_ref(), None, &mut |_| {}).map_err(|error| error.to_string());
+            // The screen may have ended.
+            let _ = tell.send(loaded);
+        });
+        match started {
+            Ok(_) => self.loading = Some((path, told)),
+            Err(error) => model.warn(now, format!("no replay: {error}")),
+        }
+    }
+
+    /// Lets time pass; `model_now` is the same moment on the model's clock.
+    pub(super) fn pass(
+        &mut self,
+        model: &mut Model,
+        output: &mut Output,
+        now: Duration,
+        model_now: Duration,
+    ) {
+        match self.moved(model, now) {
+            Ok(true) => output.mark_changed(),
+            Ok(false) => {}
+            Err(why) => model.warn(model_now, format!("no replay: {why}")),
+        }
     }
 
     /// Lets time pass. Returns whether the screen has to be drawn.
-    ///
-    /// # Errors
-    /// The log cannot be shown.
-    pub(super) fn pass(&mut self, model: &Model, now: Duration) -> Result<bool, String> {
+    fn moved(&mut self, model: &Model, now: Duration) -> Result<bool, String> {
         if model.is_at_risk() {
-            return Ok(self.leave());
+            return Ok(self.end());
         }
         let passed = now.saturating_sub(std::mem::replace(&mut self.then, now));
         if let Some(player) = &mut self.playing {
@@ -199,22 +204,23 @@ impl Again {
             player.pass(passed);
             return Ok(player.position() != before);
         }
-        let Some((path, told)) = &self.loading else { return Ok(false) };
+        let Some((name, told)) = &self.loading else { return Ok(false) };
         let Ok(loaded) = told.try_recv() else { return Ok(false) };
-        let name = path.display().to_string();
+        let settings = settings(name, &model.settings.keys);
         self.loading = None;
-        let settings = Settings {
-            log_path: Some(name.clone()),
-            role: Role::Replaying,
-            keys: model.settings.keys.clone(),
-            ..Settings::on_screen(name)
-        };
         self.playing = Some(Box::new(Player::new(loaded?, settings)));
         Ok(true)
     }
 
+    /// The live screen comes back.
+    pub(super) fn leave(&mut self, output: &mut Output) {
+        if self.end() {
+            output.mark_changed();
+        }
+    }
+
     /// Ends the replay. Returns whether there was one.
-    pub(super) fn leave(&mut self) -> bool {
+    fn end(&mut self) -> bool {
         self.loading = None;
         self.playing.take().is_some()
     }
@@ -232,7 +238,7 @@ impl Again {
             _ => return (Vec::new(), Some(msg)),
         };
         if typed.contains(&Key::CtrlX) {
-            self.leave();
+            self.end();
         }
         let Some(player) = &mut self.playing else { return (Vec::new(), Some(msg)) };
         // Held or pasted keys count only if they scroll or move the time.
@@ -240,7 +246,7 @@ impl Again {
         let keys = typed.into_iter().filter(|key| !several || key.scrolls());
         let actions: Vec<Action> = keys.flat_map(|key| player.on_key(key)).collect();
         if actions.contains(&Action::Quit) {
-            self.leave();
+            self.end();
         }
         let screens = |action: &Action| matches!(action, Action::Redraw | Action::NextTheme);
         (actions.into_iter().filter(screens).collect(), None)

@@ -96,7 +96,8 @@ impl Station {
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
                 _ = ticks.tick() => {
-                    self.pass_replay(model);
+                    let now = self.clock.now();
+                    self.again.pass(model, &mut self.output, now, now);
                     self.tick_msgs(model)
                 }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
@@ -214,11 +215,8 @@ impl Station {
     }
 
     fn record_operator(&mut self, kind: &str, who: &str, detail: String) {
-        if let Some(recorder) = &self.recorder {
-            let at_ns = self.log_time.now_ns();
-            let action = OperatorAction { time_s: 0.0, kind: kind.to_owned(), detail: detail.clone() };
-            recorder.try_record(timed(Record::OperatorAction(action), at_ns), at_ns);
-        }
+        let action = OperatorAction { time_s: 0.0, kind: kind.to_owned(), detail: detail.clone() };
+        self.record(Record::OperatorAction(action));
         self.enter(&BookLine { kind: kind.to_owned(), who: who.to_owned(), text: detail });
     }
 
@@ -228,10 +226,8 @@ impl Station {
             // Reported once, because it would fail again.
             let text = format!("the alarm command cannot be started: {error}");
             self.alarm_command = None;
-            if let Some(recorder) = &self.recorder {
-                let event = Event { level: EventLevel::Warning, name: "ground".to_owned(), message: text };
-                recorder.try_record(Record::Event(event), self.log_time.now_ns());
-            }
+            let event = Event { level: EventLevel::Warning, name: "ground".to_owned(), message: text };
+            self.record(Record::Event(event));
         }
     }
 
@@ -255,16 +251,12 @@ impl Station {
     fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
         let now = self.clock.now();
         let mut next = Next::Go;
-        if let Some(server) = &mut self.server {
-            server.publish(&msg, now);
-        }
+        self.publish(&msg, now);
         for action in update(model, msg, now) {
             match action {
                 Action::Send(message) => {
                     let sent = wire.send(&message, boot_of(model));
-                    if let Some(server) = &mut self.server {
-                        server.publish(&sent, now);
-                    }
+                    self.publish(&sent, now);
                     // Only updates counters; it returns no actions.
                     update(model, sent, now);
                 }
@@ -272,19 +264,12 @@ impl Station {
                     if matches!(record, Record::Event(_)) {
                         self.output.mark_changed();
                     }
-                    if let Some(recorder) = &self.recorder {
-                        let at_ns = self.log_time.now_ns();
-                        recorder.try_record(timed(record, at_ns), at_ns);
-                    }
+                    self.record(record);
                 }
                 Action::KeepPlace(place) => self.keep_place(model, &place, now),
                 Action::Enter(line) => self.enter(&line),
                 Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
-                Action::RefuseSignature(why) => {
-                    if let Some(server) = &mut self.server {
-                        server.publish(&Msg::SignRefused(why), now);
-                    }
-                }
+                Action::RefuseSignature(why) => self.publish(&Msg::SignRefused(why), now),
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
                         recorder.sync_soon();
@@ -296,18 +281,16 @@ impl Station {
                     }
                 }
                 Action::Alarm(words) => {
-                    self.leave_replay();
+                    self.again.leave(&mut self.output);
                     self.tell_alarm(&words);
                 }
-                Action::ReplayFlight => self.replay(model, now),
+                Action::ReplayFlight => self.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
                 Action::FetchLog => self.fetch_log(model, now),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(request) => {
-                    if let Some(server) = &mut self.server {
-                        server.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
-                    }
+                    self.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),
                 Action::Quit => next = Next::Quit,
@@ -327,29 +310,6 @@ impl Station {
             self.output.act(&action);
         }
         rest.into_iter().collect()
-    }
-
-    fn replay(&mut self, model: &mut Model, now: Duration) {
-        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
-        if let Some(Err(why)) = log.map(|log| self.again.begin(&log)) {
-            model.warn(now, format!("no replay: {why}"));
-        }
-    }
-
-    fn pass_replay(&mut self, model: &mut Model) {
-        let now = self.clock.now();
-        match self.again.pass(model, now) {
-            Ok(true) => self.output.mark_changed(),
-            Ok(false) => {}
-            Err(why) => model.warn(now, format!("no replay: {why}")),
-        }
-    }
-
-    /// The live screen comes back.
-    fn leave_replay(&mut self) {
-        if self.again.leave() {
-            self.output.mark_changed();
-        }
     }
 
     fn write_report(&mut self, model: &mut Model, now: Duration) {
@@ -417,8 +377,8 @@ impl Station {
 
     /// Tells every screen the place that is kept from before this run.
     pub(super) fn publish_place(&mut self, model: &Model, now: Duration) {
-        if let (Some(server), Some(place)) = (&mut self.server, model.place) {
-            server.publish(&Msg::Place(Box::new(place)), now);
+        if let Some(place) = model.place {
+            self.publish(&Msg::Place(Box::new(place)), now);
         }
     }
 
@@ -477,9 +437,23 @@ impl Station {
         }
     }
 
-    fn record(&self, record: Record) {
-        if let Some(recorder) = &self.recorder {
-            recorder.try_record(record, self.log_time.now_ns());
+    /// Writes a record into the log, with the present time inside it too.
+    fn record(&self, mut record: Record) {
+        let Some(recorder) = &self.recorder else { return };
+        let at_ns = self.log_time.now_ns();
+        let at_s = at_ns as f64 * 1e-9;
+        match &mut record {
+            Record::Telemetry(telemetry) => telemetry.time_s = at_s,
+            Record::OperatorAction(action) => action.time_s = at_s,
+            _ => {}
+        }
+        recorder.try_record(record, at_ns);
+    }
+
+    /// Tells every screen.
+    fn publish(&mut self, msg: &Msg, now: Duration) {
+        if let Some(server) = &mut self.server {
+            server.publish(msg, now);
         }
     }
 
@@ -493,8 +467,8 @@ impl Station {
 
     /// Tells every screen the checklist.
     pub(super) fn publish_checklist(&mut self, model: &Model, now: Duration) {
-        if let (Some(server), Some(list)) = (&mut self.server, &model.checklist) {
-            server.publish(&Msg::Checklist(Box::new(list.clone())), now);
+        if let Some(list) = &model.checklist {
+            self.publish(&Msg::Checklist(Box::new(list.clone())), now);
         }
     }
 
@@ -517,17 +491,6 @@ impl Station {
 /// The boot that the screens show; 0 if the vehicle has told none.
 fn boot_of(model: &Model) -> u32 {
     model.vehicle.boot.number().unwrap_or(0)
-}
-
-/// Sets the time inside a record to its time stamp.
-fn timed(mut record: Record, at_ns: u64) -> Record {
-    let at_s = at_ns as f64 * 1e-9;
-    match &mut record {
-        Record::Telemetry(telemetry) => telemetry.time_s = at_s,
-        Record::OperatorAction(action) => action.time_s = at_s,
-        _ => {}
-    }
-    record
 }
 
 async fn server_hears(server: &mut Option<Server>) -> ServerEvent {

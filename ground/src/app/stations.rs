@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io;
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,6 +10,7 @@ use anyhow::Context as _;
 use protocol::transport::LinkAddress;
 use tokio::io::AsyncWriteExt as _;
 
+use super::output::print;
 use super::server::read_one;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
 use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
@@ -209,7 +210,7 @@ fn kind_and_port(link: &str) -> String {
 pub async fn list() -> anyhow::Result<Exit> {
     let found = stations().await.context("looking for ground stations")?;
     let text = if found.is_empty() { "no ground station of yours runs\n".to_owned() } else { listed(&found) };
-    print(&text)?;
+    print(text.as_bytes())?;
     Ok(Exit::Landed)
 }
 
@@ -227,15 +228,10 @@ pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow
     anyhow::ensure!(stops, "refused: {words}");
     for _ in 0..ENDS_WITHIN.as_millis() / LOOK_AGAIN_AFTER.as_millis() {
         if socket::connect(&path).await.is_err() {
-            print(&format!("the station has ended; {words}\n"))?;
+            print(format!("the station has ended; {words}\n").as_bytes())?;
             return Ok(Exit::Landed);
         }
         tokio::time::sleep(LOOK_AGAIN_AFTER).await;
     }
     anyhow::bail!("{} was told to end but has not within {} s", path.display(), ENDS_WITHIN.as_secs())
-}
-
-fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("writing to standard output")
 }

@@ -393,7 +393,7 @@ fn quantity_names() -> String {
 }
 
 /// An entry of the list of signatures.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Deserialize, Serialize)]
 struct WrittenEntry {
     checklist: String,
     unix_s: u64,
@@ -404,7 +404,7 @@ struct WrittenEntry {
     found: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum What {
     Signed,
@@ -466,25 +466,28 @@ impl WrittenEntry {
 
 /// The text of an entry, to be added at the end of the list.
 pub fn entry_text(hash: &str, entry: &ChecklistEntry) -> String {
-    let (what, unix_s, step) = match entry {
-        ChecklistEntry::Signed { step, signature } => ("signed", signature.unix_s, Some((step, signature))),
-        ChecklistEntry::Voided { step, signature } => ("voided", signature.unix_s, Some((step, signature))),
-        ChecklistEntry::Flown { unix_s } => ("flown", *unix_s, None),
+    let (what, unix_s, signed) = match entry {
+        ChecklistEntry::Signed { step, signature } => {
+            (What::Signed, signature.unix_s, Some((step, signature)))
+        }
+        ChecklistEntry::Voided { step, signature } => {
+            (What::Voided, signature.unix_s, Some((step, signature)))
+        }
+        ChecklistEntry::Flown { unix_s } => (What::Flown, *unix_s, None),
     };
-    let mut text = format!("\n{ENTRY}\nchecklist = \"{hash}\"\nunix_s = {unix_s}\nwhat = \"{what}\"\n");
-    if let Some((step, signature)) = step {
-        let by = toml::Value::String(signature.by.clone());
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "step = {}\nby = {by}", step + 1);
-        if let Some(role) = signature.role {
-            let _ = writeln!(text, "role = \"{}\"", role_word(role));
-        }
-        if let Some(found) = signature.found.filter(|found| found.is_finite()) {
-            let _ = writeln!(text, "found = {found:?}");
-        }
-    }
-    text.truncate(text.trim_end().len());
-    text + END
+    let (step, signature) = signed.unzip();
+    let entry = WrittenEntry {
+        checklist: hash.to_owned(),
+        unix_s,
+        what,
+        step: step.map(|step| step + 1),
+        by: signature.map(|signature| signature.by.clone()),
+        role: signature.and_then(|signature| signature.role).map(|role| role_word(role).to_owned()),
+        found: signature.and_then(|signature| signature.found).filter(|found| found.is_finite()),
+    };
+    // Numbers and texts are always TOML.
+    let text = toml::to_string(&entry).unwrap_or_default();
+    format!("\n{ENTRY}\n{}{END}", text.trim_end())
 }
 
 /// As in the crew file.

@@ -300,25 +300,18 @@ pub fn why_not_here(model: &Model) -> Option<String> {
 
 /// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
-    if let Some(why) = why_not_reached(model, now) {
-        return Some(why);
-    }
-    if model.vehicle.is_armed() {
-        return Some("armed already".to_owned());
-    }
-    if !model.link.uplink.is_proven(now) {
-        let why = model.link.uplink.why_unheard();
-        return Some(format!("the uplink is not proven: {why}"));
-    }
-    let why = why_no_key(model).or_else(|| why_other_mission(model)).or_else(|| model.why_checklist(now));
-    if why.is_some() {
-        return why;
-    }
-    let Some(phase) = model.vehicle.phase_now() else {
-        return Some("the phase is unknown".to_owned());
-    };
-    // Last: it is the only reason that the crew can overrule.
-    if is_on_pad(phase) { model.why_no_log(now) } else { Some(format!("phase {}", words::phase(phase))) }
+    let uplink = &model.link.uplink;
+    why_not_reached(model, now)
+        .or_else(|| model.vehicle.is_armed().then(|| "armed already".to_owned()))
+        .or_else(|| {
+            (!uplink.is_proven(now)).then(|| format!("the uplink is not proven: {}", uplink.why_unheard()))
+        })
+        .or_else(|| why_no_key(model))
+        .or_else(|| why_other_mission(model))
+        .or_else(|| model.why_checklist(now))
+        .or_else(|| why_not_in(model, is_on_pad))
+        // Last: it is the only reason that the crew can overrule.
+        .or_else(|| model.why_no_log(now))
 }
 
 /// Whether this reason is that the station's log is unfit, so that the crew may go on without it.
@@ -328,22 +321,19 @@ pub fn is_only_the_log(model: &Model, why: &str, now: Duration) -> bool {
 
 /// Why the ground does not command to start the countdown.
 pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
-    if let Some(why) = why_not_reached(model, now) {
-        return Some(why);
+    why_not_reached(model, now)
+        .or_else(|| (!model.vehicle.is_armed()).then(|| "not armed".to_owned()))
+        .or_else(|| why_no_key(model))
+        .or_else(|| why_not_in(model, |phase| phase == TdPhase::TD_PHASE_PAD_ARMED))
+        .or_else(|| model.why_no_log(now))
+}
+
+/// Why the phase is none of these.
+fn why_not_in(model: &Model, fits: fn(TdPhase) -> bool) -> Option<String> {
+    match model.vehicle.phase_now() {
+        None => Some("the phase is unknown".to_owned()),
+        Some(phase) => (!fits(phase)).then(|| format!("phase {}", words::phase(phase))),
     }
-    if !model.vehicle.is_armed() {
-        return Some("not armed".to_owned());
-    }
-    if let Some(why) = why_no_key(model) {
-        return Some(why);
-    }
-    let Some(phase) = model.vehicle.phase_now() else {
-        return Some("the phase is unknown".to_owned());
-    };
-    if phase != TdPhase::TD_PHASE_PAD_ARMED {
-        return Some(format!("phase {}", words::phase(phase)));
-    }
-    model.why_no_log(now)
 }
 
 /// Why the ground does not confirm this ask.
@@ -360,34 +350,18 @@ pub fn why_not_confirm(model: &Model, ask: &Ask, now: Duration) -> Option<String
 
 /// Why the ground asks for no check of the vehicle, and tests no radio.
 pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
-    if let Some(why) = why_not_reached(model, now) {
-        return Some(why);
-    }
-    if model.vehicle.is_armed() {
-        return Some("armed: disarm first".to_owned());
-    }
-    if let Some(why) = why_no_key(model) {
-        return Some(why);
-    }
-    let phase = model.vehicle.phase_now();
-    match phase {
-        None => Some("the phase is unknown".to_owned()),
-        Some(phase) => (!is_on_pad(phase)).then(|| format!("phase {}", words::phase(phase))),
-    }
+    why_not_reached(model, now)
+        .or_else(|| model.vehicle.is_armed().then(|| "armed: disarm first".to_owned()))
+        .or_else(|| why_no_key(model))
+        .or_else(|| why_not_in(model, is_on_pad))
 }
 
 /// Why the ground does not take command.
 pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
-    if let Some(why) = why_not_reached(model, now) {
-        return Some(why);
-    }
-    if !model.vehicle.is_armed() {
-        return Some("not armed".to_owned());
-    }
-    if model.link.uplink.armed_by_us {
-        return Some("this station commands already".to_owned());
-    }
-    why_no_key(model)
+    why_not_reached(model, now)
+        .or_else(|| (!model.vehicle.is_armed()).then(|| "not armed".to_owned()))
+        .or_else(|| model.link.uplink.armed_by_us.then(|| "this station commands already".to_owned()))
+        .or_else(|| why_no_key(model))
 }
 
 /// Why a vehicle with operators would refuse everything that this station asks.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::{
     HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdPhase,
+    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase,
 };
 use protocol::mission::MissionHash;
 
@@ -69,10 +69,17 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         MavMessage::TD_DESCENT(data) => vehicle.descent = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_CONTROLLER(data) => vehicle.controller = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
-            vehicle.prediction = Some(Sample::new(prediction(data), now));
+            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
+            let touchdown = touchdown(state, data.limits_violated);
+            let time_to_go_s = f64::from(data.time_to_go_ms) / 1_000.0;
+            vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s, touchdown }, now));
         }
         MavMessage::TD_PREDICTED_PATH(data) => vehicle.path = Some(Sample::new(path(data), now)),
-        MavMessage::TD_LANDING_VERDICT(data) => vehicle.verdict = Some(Sample::new(verdict(data), now)),
+        MavMessage::TD_LANDING_VERDICT(data) => {
+            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
+            let touchdown = touchdown(state, data.limits_violated);
+            vehicle.verdict = Some(Sample::new(Verdict { landed: data.landed == 1, touchdown }, now));
+        }
         MavMessage::TD_CREW(data) => vehicle.crew = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_OPERATOR(data) => {
             vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
@@ -173,40 +180,16 @@ fn deflection(commanded_cdeg: i16, measured_cdeg: i16) -> Deflection {
     Deflection { commanded_rad: radians(commanded_cdeg), measured_rad: radians(measured_cdeg) }
 }
 
-fn prediction(data: &TD_TOUCHDOWN_PREDICTION_DATA) -> Prediction {
-    Prediction {
-        time_to_go_s: f64::from(data.time_to_go_ms) / 1_000.0,
-        touchdown: Touchdown {
-            x_m: f64::from(data.x_m),
-            altitude_m: f64::from(data.altitude_m),
-            pitch_rad: f64::from(data.pitch_rad),
-            u_m_s: f64::from(data.u_m_s),
-            w_m_s: f64::from(data.w_m_s),
-            q_rad_s: f64::from(data.q_rad_s),
-            violated: data.limits_violated,
-        },
-    }
-}
-
 fn path(data: &TD_PREDICTED_PATH_DATA) -> Vec<(f64, f64)> {
     let metres = |cm: i16| f64::from(cm) / 100.0;
     let points = data.x.iter().zip(&data.altitude).map(|(x, altitude)| (metres(*x), metres(*altitude)));
     points.take(usize::from(data.count)).collect()
 }
 
-fn verdict(data: &TD_LANDING_VERDICT_DATA) -> Verdict {
-    Verdict {
-        landed: data.landed == 1,
-        touchdown: Touchdown {
-            x_m: f64::from(data.x_m),
-            altitude_m: f64::from(data.altitude_m),
-            pitch_rad: f64::from(data.pitch_rad),
-            u_m_s: f64::from(data.u_m_s),
-            w_m_s: f64::from(data.w_m_s),
-            q_rad_s: f64::from(data.q_rad_s),
-            violated: data.limits_violated,
-        },
-    }
+/// Distance, altitude, pitch, axial and lateral speed and pitch rate at touchdown, as both messages tell them.
+fn touchdown(state: [f32; 6], violated: TdLimit) -> Touchdown {
+    let [x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = state.map(f64::from);
+    Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated }
 }
 
 /// The text of a field of characters, without what a terminal would act on.

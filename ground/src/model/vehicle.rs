@@ -64,6 +64,13 @@ pub struct Deflection {
     pub measured_rad: f64,
 }
 
+impl Deflection {
+    /// How far it is from where it was commanded, degrees.
+    pub fn error_deg(&self) -> f64 {
+        (self.commanded_rad - self.measured_rad).abs().to_degrees()
+    }
+}
+
 /// Gimbal in both planes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gimbal {
@@ -152,11 +159,7 @@ impl Vehicle {
         let heartbeat = self.heartbeat.and_then(|heartbeat| {
             heartbeat.value.phase.map(|phase| Sample::new(phase, heartbeat.received_at))
         });
-        match (status, heartbeat) {
-            (Some(status), Some(heartbeat)) if heartbeat.received_at > status.received_at => Some(heartbeat),
-            (Some(status), _) => Some(status),
-            (None, heartbeat) => heartbeat,
-        }
+        better(status, heartbeat, Duration::ZERO)
     }
 
     /// The phase without its age.
@@ -235,13 +238,7 @@ impl Vehicle {
 
     /// Position and velocity, from the better of its two sources.
     pub fn best_motion(&self) -> Option<Sample<Motion>> {
-        match (self.motion, self.hud) {
-            (Some(motion), Some(hud)) if hud.received_at.saturating_sub(motion.received_at) > STALE_AFTER => {
-                Some(hud)
-            }
-            (Some(motion), _) => Some(motion),
-            (None, hud) => hud,
-        }
+        better(self.motion, self.hud, STALE_AFTER)
     }
 
     /// Height above the pad, m: from the position while it is fresh, otherwise from `TD_DESCENT`. Every part of the
@@ -261,28 +258,25 @@ impl Vehicle {
         of_descent: fn(&TD_DESCENT_DATA) -> f32,
     ) -> Option<Sample<f64>> {
         let motion = self.best_motion().map(|motion| motion.map(of_motion));
-        let descent = self.descent.as_ref().map(|descent| Sample {
-            value: f64::from(of_descent(&descent.value)),
-            received_at: descent.received_at,
-        });
-        let descent = descent.filter(|sample| sample.value.is_finite());
-        match (motion, descent) {
-            (Some(motion), Some(descent))
-                if descent.received_at.saturating_sub(motion.received_at) > STALE_AFTER =>
-            {
-                Some(descent)
-            }
-            (Some(motion), _) => Some(motion),
-            (None, descent) => descent,
-        }
+        better(motion, self.of_descent(of_descent), STALE_AFTER)
+    }
+
+    /// A number of `TD_DESCENT`, while it is known.
+    pub fn of_descent(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
+        let descent = self.descent.as_ref()?;
+        let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
+        Some(sample).filter(|sample| sample.value.is_finite())
+    }
+
+    /// The angle between nose and vertical, degrees.
+    pub fn tilt_deg(&self) -> Option<Sample<f64>> {
+        self.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()))
     }
 
     /// Time from now until the landing motor is to be lit, s. It keeps counting between two messages. `None` if the
     /// motor will not be lit, or the time has passed.
     pub fn ignition_in_s(&self, now: Duration) -> Option<Sample<f64>> {
-        let descent = self.descent.as_ref().filter(|_| self.may_light())?;
-        let told_s = f64::from(descent.value.time_to_ignition_s);
-        count_down(Sample { value: told_s, received_at: descent.received_at }, now)
+        count_down(self.of_descent(|d| d.time_to_ignition_s).filter(|_| self.may_light())?, now)
     }
 
     /// Time from now until the predicted touchdown, s; it also keeps counting.
@@ -307,6 +301,14 @@ impl Vehicle {
     pub fn planned(&self) -> &[(f64, f64)] {
         let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
         self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
+    }
+}
+
+/// The first of two sources, unless the other is later than it by more than this.
+fn better<T>(first: Option<Sample<T>>, other: Option<Sample<T>>, by: Duration) -> Option<Sample<T>> {
+    match (first, other) {
+        (Some(first), Some(other)) if other.received_at.saturating_sub(first.received_at) > by => Some(other),
+        (first, other) => first.or(other),
     }
 }
 

@@ -102,13 +102,9 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
     if rebooted {
         vehicle_changes::on_reboot(model, now);
-        vehicle_changes::forget_kept(model);
     }
-    vehicle_changes::on_change(
-        model,
-        if rebooted { vehicle_changes::Announced::default() } else { before },
-        now,
-    );
+    let before = if rebooted { vehicle_changes::Announced::default() } else { before };
+    vehicle_changes::on_change(model, before, now);
     vehicle_changes::enter_crew_changes(model, &crew_before);
     pad::enter_check(model, now);
     commands::observe(model, now);

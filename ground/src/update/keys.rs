@@ -96,12 +96,6 @@ fn on_rest_of_word(model: &mut Model, key: Key, now: Duration) -> bool {
     true
 }
 
-/// A request is refused: the word that the crew would have typed is swallowed.
-fn refuse(model: &mut Model, words: &[&'static str], why: String, now: Duration) {
-    model.warn(now, why.clone());
-    model.rest_of_word = Some(RestOfWord::refused(words, why, now));
-}
-
 /// Keys that arrive too fast and mean nothing here: a paste.
 pub(super) fn drop_run(model: &mut Model, now: Duration) {
     model.key_timing.drop_run();
@@ -291,16 +285,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
-        Act::Arm => match why_not_arm(model, now) {
-            None => open(model, Prompt::Arm, now),
-            Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
-            Some(why) => refuse(model, &words(model, Prompt::Arm), format!("cannot arm: {why}"), now),
-        },
-        Act::Start => match why_not_start(model, now) {
-            None => open(model, Prompt::Start, now),
-            Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
-            Some(why) => refuse(model, &words(model, Prompt::Start), format!("cannot start: {why}"), now),
-        },
+        Act::Arm => climb(model, Prompt::Arm, "arm", why_not_arm(model, now), now),
+        Act::Start => climb(model, Prompt::Start, "start", why_not_start(model, now), now),
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
             None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
@@ -311,12 +297,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
         Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
-        Act::TakeCommand => match why_not_take(model, now) {
-            None => open(model, Prompt::TakeCommand, now),
-            Some(why) => {
-                refuse(model, &words(model, Prompt::TakeCommand), format!("cannot take command: {why}"), now);
-            }
-        },
+        Act::TakeCommand => {
+            climb(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
+        }
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
             Standing::JustEnded => {
@@ -372,13 +355,27 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
+/// Opens the dialog of a rung of the ladder, or the one that goes on without a log if only that is in the way. If it is
+/// refused, the word that the crew would have typed is swallowed.
+fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
+    match why_not {
+        None => open(model, prompt, now),
+        Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
+        Some(why) => {
+            let why = format!("cannot {verb}: {why}");
+            model.warn(now, why.clone());
+            model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
+        }
+    }
+}
+
 fn open(model: &mut Model, prompt: Prompt, now: Duration) {
     model.dialog = Some(prompt.open(now));
 }
 
 /// The words that the crew may type after a key: its own, or the one that confirms what a second person asks.
 fn words(model: &Model, prompt: Prompt) -> Vec<&'static str> {
-    let confirmed = model.people() == Some(2) && prompt != Prompt::TakeCommand;
+    let confirmed = model.people() == Some(2) && matches!(prompt, Prompt::Arm | Prompt::Start);
     prompt.word().into_iter().chain(confirmed.then_some(CONFIRM_WORD)).collect()
 }
 
@@ -386,11 +383,7 @@ fn words(model: &Model, prompt: Prompt) -> Vec<&'static str> {
 /// moment both ask: the vehicle takes the first ask, and the other one is told of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
-    match why_not_confirm(model, &ask, now) {
-        None => open(model, Prompt::Confirm(ask), now),
-        Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
-        Some(why) => refuse(model, &[CONFIRM_WORD], format!("cannot confirm: {why}"), now),
-    }
+    climb(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
     true
 }
 
@@ -648,20 +641,16 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
 fn perform_entry(model: &mut Model, does: Does, now: Duration) {
     match does {
         // Enter has chosen it, and a held Enter would confirm it.
-        Does::Act(act @ (Act::Disarm | Act::HoldCountdown)) => {
-            let key = model.settings.keys.name(act);
-            let does = if act == Act::Disarm { "disarm" } else { "hold" };
-            model.info(now, format!("press {key}, then Enter: only these keys {does}"));
+        Does::Act(act) => {
+            let keys = match act {
+                Act::Disarm => ", then Enter: only these keys disarm",
+                Act::HoldCountdown => ", then Enter: only these keys hold",
+                Act::SignStep | Act::VoidStep => ", then Enter: only these keys sign or void",
+                Act::Tap => ": only this key taps",
+                _ => return perform(model, act, now),
+            };
+            model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
         }
-        Does::Act(act @ (Act::SignStep | Act::VoidStep)) => {
-            let key = model.settings.keys.name(act);
-            model.info(now, format!("press {key}, then Enter: only these keys sign or void"));
-        }
-        Does::Act(act @ Act::Tap) => {
-            let key = model.settings.keys.name(act);
-            model.info(now, format!("press {key}: only this key taps"));
-        }
-        Does::Act(act) => perform(model, act, now),
         Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
         Does::Plot(quantity) => {
             model.pages.plotted = quantity;

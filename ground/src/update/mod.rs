@@ -170,10 +170,12 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.info(now, model.crew.words());
         }
         Msg::Checklist(list) => model.checklist = Some(*list),
-        Msg::Report(written) => on_report(model, written, now),
-        Msg::Download(told) => on_download(model, told, now),
+        Msg::Report(Ok(path)) => model.info(now, format!("the report is written: {path}")),
+        Msg::Report(Err(why)) => model.warn(now, format!("the report is not written: {why}")),
+        Msg::Download(Ok(words)) => model.info(now, words),
+        Msg::Download(Err(why)) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
         Msg::Place(place) => model.place = Some(*place),
-        Msg::Book { head, is_signed } => vehicle_changes::on_head(model, head, is_signed),
+        Msg::Book { head, is_signed } => (model.book.head, model.book.is_signed) = (Some(head), is_signed),
         Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
@@ -324,22 +326,16 @@ pub(super) fn replay_flight(model: &mut Model, now: Duration) {
 
 /// Has the report written, by the station.
 pub(super) fn write_report(model: &mut Model, now: Duration) {
-    match (why_nothing_flown(model), model.settings.role) {
-        (Some(why), _) => model.info(now, format!("no report: {why}")),
-        (None, Role::Attached) => model.outbox.push(Action::Request(Request::Report)),
-        (None, Role::Station) => {
+    let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
+    match why_nothing_flown(model).or(watches) {
+        Some(why) => model.info(now, format!("no report: {why}")),
+        None if model.settings.role == Role::Attached => {
+            model.outbox.push(Action::Request(Request::Report));
+        }
+        None => {
             model.info(now, "the report is being written");
             model.outbox.push(Action::WriteReport);
         }
-        (None, Role::Watching | Role::Replaying) => model.info(now, "no report: this screen only watches"),
-    }
-}
-
-/// The report is written, or is not.
-pub(super) fn on_report(model: &mut Model, written: Result<String, String>, now: Duration) {
-    match written {
-        Ok(path) => model.info(now, format!("the report is written: {path}")),
-        Err(why) => model.warn(now, format!("the report is not written: {why}")),
     }
 }
 
@@ -349,11 +345,9 @@ pub(super) fn fetch_log(model: &mut Model, now: Duration) {
     let why = match model.settings.role {
         Role::Replaying => Some("this is a replay"),
         Role::Watching => Some("this screen only watches"),
-        Role::Station | Role::Attached if model.is_at_risk() => Some("the vehicle is armed or in flight"),
-        Role::Station | Role::Attached if model.vehicle.heartbeat.is_none() => {
-            Some("no vehicle has been heard")
-        }
-        Role::Station | Role::Attached => None,
+        _ if model.is_at_risk() => Some("the vehicle is armed or in flight"),
+        _ if model.vehicle.heartbeat.is_none() => Some("no vehicle has been heard"),
+        _ => None,
     };
     match (why, model.settings.role) {
         (Some(why), _) => model.info(now, format!("no download: {why}")),
@@ -362,13 +356,5 @@ pub(super) fn fetch_log(model: &mut Model, now: Duration) {
             model.info(now, "the vehicle is asked for its log");
             model.outbox.push(Action::FetchLog);
         }
-    }
-}
-
-/// The log is on its way, is here, or does not come.
-pub(super) fn on_download(model: &mut Model, told: Result<String, String>, now: Duration) {
-    match told {
-        Ok(words) => model.info(now, words),
-        Err(why) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
     }
 }

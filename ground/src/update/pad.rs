@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdPadCheckState};
+use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckState};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request};
+use super::{Action, Request, tick};
 use crate::model::{
     ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker, role_name,
     shown, why_not_check, words,
@@ -176,12 +176,7 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     let question = test.pass(counts, now);
     let ended = test.found.map(|found| (found, test.by.clone()));
     if let Some(ts1) = question {
-        model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
-            tc1: 0,
-            ts1,
-            target_system: model.settings.vehicle.system_id,
-            target_component: model.settings.vehicle.component_id,
-        })));
+        tick::ask_time(model, ts1);
     }
     if let Some((found, by)) = ended {
         let level = if found.passed() { EventLevel::Info } else { EventLevel::Warning };

@@ -37,13 +37,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let often = seems_old || !model.link.uplink.is_told();
     let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
     if known && is_due(&mut model.due.timesync, timesync_every, now) {
-        let ts1 = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
-        model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
-            tc1: 0,
-            ts1,
-            target_system: model.settings.vehicle.system_id,
-            target_component: model.settings.vehicle.component_id,
-        })));
+        ask_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
     }
     for text in model.texts.expire(now) {
         frames::add_vehicle_text(model, &text, now);
@@ -79,6 +73,16 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         model.info(now, why);
         model.outbox.push(Action::Quit);
     }
+}
+
+/// Asks the vehicle for its time; the answer repeats this stamp, ns.
+pub(super) fn ask_time(model: &mut Model, stamp: i64) {
+    model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
+        tc1: 0,
+        ts1: stamp,
+        target_system: model.settings.vehicle.system_id,
+        target_component: model.settings.vehicle.component_id,
+    })));
 }
 
 /// Counts from the time that was due, so that late ticks do not lower the rate.

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use protocol::book::SignedHead;
 use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TdAct, TdHold, TdPhase};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
@@ -53,6 +52,8 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
     model.link.content = protocol::link_stats::ContentAge::default();
+    // A vehicle that was switched on again has a new log, which keeps nothing yet.
+    model.book.kept = 0;
     model.alarms.vehicle_rebooted(now);
     model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
     // An open dialog was opened for the former boot.
@@ -162,11 +163,6 @@ fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
 /// How often the end is sent at most.
 const SENT_EVERY: Duration = Duration::from_secs(2);
 
-/// The station has signed a new end.
-pub(super) fn on_head(model: &mut Model, head: SignedHead, is_signed: bool) {
-    (model.book.head, model.book.is_signed) = (Some(head), is_signed);
-}
-
 /// Sends the end again while the vehicle is heard and has not confirmed it.
 pub(super) fn send_book_end(model: &mut Model, now: Duration) {
     let Some(head) = model.book.head.filter(|signed| signed.head.entries > model.book.kept) else { return };
@@ -187,11 +183,6 @@ pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
     if model.settings.us.accepts(target) && ours {
         model.book.kept = model.book.kept.max(kept.entries);
     }
-}
-
-/// A vehicle that was switched on again has a new log, which keeps nothing yet.
-pub(super) fn forget_kept(model: &mut Model) {
-    model.book.kept = 0;
 }
 
 /// What the vehicle says of its crew and its mission, as far as the book has it.

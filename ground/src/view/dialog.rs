@@ -8,8 +8,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Clear};
 
-use super::draw_lines;
-use super::theme::{TextRole, Theme};
+use super::{TextRole, Theme, draw_lines};
 use crate::model::{
     AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
     role_name, why_not_here, words,

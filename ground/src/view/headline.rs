@@ -8,13 +8,12 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use tui_big_text::{BigText, PixelSize};
 
-use super::draw_line;
-use super::theme::{TextRole, Theme};
-use super::widgets::{STALE_MARK, age_mark, fixed};
+use super::top_lines::readiness;
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed};
 use crate::model::{
     Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
-    hold_words, is_on_pad, why_nothing_moves, why_other_mission,
+    hold_words, is_on_pad,
 };
 
 /// Columns between two items.
@@ -228,16 +227,10 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     if vehicle.is_armed() {
         return word("ARMED", TextRole::Alarm);
     }
-    let other_mission = why_other_mission(model).is_some() || why_nothing_moves(model, now).is_some();
-    let unsigned = model.why_checklist(now).is_some() || model.why_no_log(now).is_some();
-    if other_mission
-        || unsigned
-        || !status.value.checks_failed.is_empty()
-        || !model.link.uplink.is_proven(now)
-    {
-        return word("NO-GO", TextRole::Caution);
+    match readiness(model, now) {
+        Some((_, TextRole::Good)) => word("GO", TextRole::Good),
+        _ => word("NO-GO", TextRole::Caution),
     }
-    word("GO", TextRole::Good)
 }
 
 /// After a loss of the link in flight: the predicted height instead of an old one, its error, and the silence.

@@ -5,9 +5,7 @@ use std::time::Duration;
 use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
 
-use super::CUT_MARK;
-use super::theme::{TextRole, Theme};
-use super::widgets::fixed;
+use super::{CUT_MARK, TextRole, Theme, fixed};
 use crate::model::{Act, Event, Mark, Model, Step, StepState, TextEntry, role_name};
 
 /// Columns before the text of an event: time, speaker and mark.
@@ -48,7 +46,12 @@ fn chosen(
             };
             let head = format!("{:>7.1} {:<7} ", event.at.as_secs_f64(), event.speaker.name());
             let mark = event.mark();
-            let mut pieces = wrap(&event.text, text_columns).into_iter();
+            let pieces = if text_columns < WRAP_COLUMNS_MIN {
+                vec![event.text.clone()]
+            } else {
+                wrap(&event.text, text_columns)
+            };
+            let mut pieces = pieces.into_iter();
             let first = pieces.next().unwrap_or_default();
             let first = Line::from(vec![theme.label(head), theme.span(format!("{mark}{first}"), role)]);
             let rest = pieces.map(move |piece| {
@@ -81,10 +84,7 @@ fn newest_lines(mut events: Vec<Vec<Line<'static>>>, columns: usize, rows: usize
 }
 
 /// Breaks a text at spaces; a word longer than a line is broken at the end of the line.
-fn wrap(text: &str, columns: usize) -> Vec<String> {
-    if columns < WRAP_COLUMNS_MIN {
-        return vec![text.to_owned()];
-    }
+pub fn wrap(text: &str, columns: usize) -> Vec<String> {
     let mut lines = Vec::new();
     let (mut line, mut used) = (String::new(), 0);
     for word in text.split(' ') {
@@ -186,7 +186,7 @@ fn step_rows(
         format!(" {found} {}", limits.quantity.unit)
     });
     let room = columns.saturating_sub(FRONT_COLUMNS + value.chars().count()).max(1);
-    let mut parts = wrapped(&step.words, room).into_iter();
+    let mut parts = wrap(&step.words, room).into_iter();
     let first = parts.next().unwrap_or_default();
     let mark = if is_chosen { ">" } else { " " };
     let words_style = theme.style(if is_chosen { TextRole::Title } else { TextRole::Plain });
@@ -197,28 +197,6 @@ fn step_rows(
     ]);
     let more = parts.map(|part| Line::styled(format!("{:FRONT_COLUMNS$}{part}", ""), words_style));
     std::iter::once(front).chain(more).collect()
-}
-
-/// The words on lines of at most this many columns; only a longer word is split.
-pub fn wrapped(words: &str, room: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in words.split_whitespace() {
-        for part in word.chars().collect::<Vec<_>>().chunks(room) {
-            let part: String = part.iter().collect();
-            let line = lines
-                .last_mut()
-                .filter(|line| line.is_empty() || line.chars().count() + 1 + part.chars().count() <= room);
-            match line {
-                Some(line) if line.is_empty() => line.push_str(&part),
-                Some(line) => {
-                    line.push(' ');
-                    line.push_str(&part);
-                }
-                None => lines.push(part),
-            }
-        }
-    }
-    lines
 }
 
 /// Who signs the step, or who did.

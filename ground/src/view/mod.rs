@@ -19,12 +19,14 @@ pub mod widgets;
 use std::time::Duration;
 
 use ratatui::Frame;
+use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
 use crate::model::{Act, CommandKind, LookBack, Model, Page, TextEntry};
-use theme::{TextRole, Theme};
+pub use theme::{Ink, TextRole, Theme};
+use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;
@@ -61,6 +63,22 @@ fn draw_lines(frame: &mut Frame, area: Rect, lines: &[Line]) {
     }
 }
 
+/// Splits an area into columns.
+fn side_by_side<const N: usize>(area: Rect, columns: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::horizontal(columns))
+}
+
+/// Splits an area into rows.
+fn stacked<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::vertical(rows))
+}
+
+/// The pieces of a line, with its style.
+fn styled(line: Line<'static>) -> impl Iterator<Item = Span<'static>> {
+    let style = line.style;
+    line.spans.into_iter().map(move |span| span.patch_style(style))
+}
+
 /// Draws one line.
 fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
     draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
@@ -79,19 +97,21 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
     let past_rows = u16::from(past.is_some());
     let pinned_rows = u16::from(!model.pages.pinned.is_empty());
-    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] =
-        area.layout(&Layout::vertical([
-            Constraint::Length(1),
-            Constraint::Length(1),
-            Constraint::Length(1),
-            Constraint::Length(1),
-            Constraint::Length(past_rows),
-            Constraint::Length(pinned_rows),
-            Constraint::Fill(1),
-            Constraint::Length(bar_rows),
-            Constraint::Length(1),
-            Constraint::Length(1),
-        ]));
+    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] = stacked(
+        area,
+        [
+            Length(1),
+            Length(1),
+            Length(1),
+            Length(1),
+            Length(past_rows),
+            Length(pinned_rows),
+            Fill(1),
+            Length(bar_rows),
+            Length(1),
+            Length(1),
+        ],
+    );
     top_lines::draw_identity(model, theme, now, frame, identity);
     draw_status(model, theme, now, frame, status);
     draw_line(frame, abort, top_lines::abort(model, theme, now));
@@ -112,13 +132,8 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 }
 
 fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [phase, armed, countdown, link, abort] = area.layout(&Layout::horizontal([
-        Constraint::Length(14),
-        Constraint::Length(11),
-        Constraint::Length(11),
-        Constraint::Fill(1),
-        Constraint::Length(20),
-    ]));
+    let [phase, armed, countdown, link, abort] =
+        side_by_side(area, [Length(14), Length(11), Length(11), Fill(1), Length(20)]);
     draw_line(frame, phase, top_lines::phase(model, theme, now).into());
     draw_line(frame, armed, top_lines::armed(model, theme, now).into());
     draw_line(frame, countdown, top_lines::countdown(model, theme, now).into());
@@ -189,7 +204,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     if open.is_none() || area.height >= DIALOG_ROWS {
         let mut line = vec![top_lines::countdown(model, theme, now), Span::raw(" ")];
         let link = top_lines::link(model, theme, now);
-        line.extend(link.spans.into_iter().map(|span| span.patch_style(link.style)));
+        line.extend(styled(link));
         lines.push(Line::from(line));
     }
     lines.push(compact_abort(model, theme, now));

@@ -5,8 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus};
 use ratatui::text::{Line, Span};
 
-use super::theme::{TextRole, Theme};
-use super::widgets::{age_mark, fixed, row, seconds, shortest};
+use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
 use crate::model::{
     Attitude, BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, are_of_legs,
     dead_reckoning::{Basis, is_unheard, predict_position},

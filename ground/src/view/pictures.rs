@@ -7,14 +7,13 @@ use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::Fill;
+use ratatui::layout::Rect;
 use ratatui::style::Color;
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
-use super::theme::{Ink, TextRole, Theme};
-use super::widgets::{STALE_MARK, age_mark, fixed, shortest};
-use super::{draw_lines, widgets};
+use super::{Ink, STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, shortest, side_by_side, widgets};
 use crate::model::{
     Attitude, Deflection, Model, Motion, NorthEastUp, dead_reckoning::predict_position, quantity::Quantity,
 };
@@ -70,7 +69,7 @@ pub fn side_views(area: Rect) -> Vec<(Viewpoint, &'static str, Rect)> {
     if area.width < 2 * PICTURE_COLUMNS {
         return vec![(Viewpoint::East, "From east", area)];
     }
-    let [east, south] = area.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
+    let [east, south] = side_by_side(area, [Fill(1), Fill(1)]);
     vec![(Viewpoint::East, "From east", east), (Viewpoint::South, "From south", south)]
 }
 
@@ -357,7 +356,7 @@ pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
             for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
                 let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
                 arm(context, (east, north), fin, theme.ink(Ink::Planned), theme.ink(Ink::Ground));
-                let apart = (fin.commanded_rad - fin.measured_rad).abs().to_degrees() > APART_DEG;
+                let apart = fin.error_deg() > APART_DEG;
                 let degrees = fixed(fin.measured_rad.to_degrees(), 0);
                 let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
                 // A label extends outwards.

@@ -9,9 +9,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
-use super::draw_line;
-use super::theme::{TextRole, Theme};
-use super::widgets::{STALE_MARK, age_mark, fixed, shortest};
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest};
 use crate::model::{
     Alarm, GRAVITY_M_S2, Model, Playback, RADIO_FRESH, Role, Vehicle, is_on_pad, latch_cause, words,
 };

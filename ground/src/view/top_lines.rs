@@ -4,12 +4,11 @@ use std::time::Duration;
 
 use protocol::identity::Address;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::theme::{TextRole, Theme};
-use super::widgets::{STALE_MARK, age_mark, shortest};
-use super::{draw_line, status_lines};
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
     Acknowledgement, CommandKind, Foreign, LinkState, Model, Role, Standing, TrackedCommand, abort_too_late,
     dead_reckoning::may_have_left, hold_words, standing, unheard_hints, why_nothing_moves, why_other_mission,
@@ -26,12 +25,10 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     let vehicle = vehicle(model, theme, now);
     let crew = crew(model, theme, now);
     let crew_columns = CREW_COLUMNS.max(crew.width() as u16);
-    let [mode_area, vehicle_area, station_area, crew_area] = area.layout(&Layout::horizontal([
-        Constraint::Length(MODE_COLUMNS),
-        Constraint::Length(vehicle.width() as u16 + 1),
-        Constraint::Fill(1),
-        Constraint::Length(crew_columns),
-    ]));
+    let [mode_area, vehicle_area, station_area, crew_area] = side_by_side(
+        area,
+        [Length(MODE_COLUMNS), Length(vehicle.width() as u16 + 1), Fill(1), Length(crew_columns)],
+    );
     draw_line(frame, mode_area, mode(model, theme).into());
     draw_line(frame, vehicle_area, vehicle.into());
     let Address { system_id, component_id } = model.settings.us;
@@ -399,24 +396,16 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     if status.is_stale(now) {
         return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
     }
-    if let Some(why) = why_nothing_moves(model, now) {
-        return Some((format!("NO-GO: {why}"), TextRole::Caution));
-    }
     let failing = words::failed_checks(status.value.checks_failed);
-    if !failing.is_empty() {
-        return Some((format!("NO-GO: {}", failing.join(", ")), TextRole::Caution));
-    }
-    if !model.link.uplink.is_proven(now) {
-        return Some(("NO-GO: uplink not proven, every other check passes".to_owned(), TextRole::Caution));
-    }
-    if let Some(why) = why_other_mission(model) {
-        return Some((format!("NO-GO: {why}"), TextRole::Caution));
-    }
-    if let Some(why) = model.why_checklist(now) {
-        return Some((format!("NO-GO: {why}"), TextRole::Caution));
-    }
-    if let Some(why) = model.why_no_log(now) {
-        return Some((format!("NO-GO: {why}"), TextRole::Caution));
-    }
-    Some(("GO: every arming check passes".to_owned(), TextRole::Good))
+    let uplink = || "uplink not proven, every other check passes".to_owned();
+    let why = why_nothing_moves(model, now)
+        .or_else(|| (!failing.is_empty()).then(|| failing.join(", ")))
+        .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
+        .or_else(|| why_other_mission(model))
+        .or_else(|| model.why_checklist(now))
+        .or_else(|| model.why_no_log(now));
+    Some(match why {
+        Some(why) => (format!("NO-GO: {why}"), TextRole::Caution),
+        None => ("GO: every arming check passes".to_owned(), TextRole::Good),
+    })
 }

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Sparkline;
 
-use super::draw_line;
-use super::theme::{TextRole, Theme};
+use super::{TextRole, Theme, draw_line, stacked};
 pub use crate::model::words::{fixed, shortest};
 use crate::model::{
     Model, Sample,
@@ -198,7 +198,7 @@ pub fn draw_sparkline(
     frame: &mut Frame,
     area: Rect,
 ) {
-    let [heading, bars] = area.layout(&Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]));
+    let [heading, bars] = stacked(area, [Length(1), Fill(1)]);
     let columns = usize::from(bars.width.saturating_sub(2));
     let values = resampled(quantity, model, now, columns);
     let known = || values.iter().flatten().copied();

@@ -10,8 +10,7 @@ use crate::model::{
     Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeFound, RangeTest, Spot, Standing,
     dead_reckoning::may_have_left, shown, standing,
 };
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{fixed, seconds};
+use crate::view::{TextRole, Theme, fixed, seconds};
 
 /// The surfaces, by the number of their first item.
 const SURFACES: [(&str, u32); 6] =

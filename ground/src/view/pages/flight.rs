@@ -4,15 +4,17 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use super::{is_roomy, titled};
 use crate::model::{Model, Motion, Sample, words};
 use crate::view::pictures::FlightPart;
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{age_mark, fixed, row, text_row};
-use crate::view::{draw_line, draw_lines, headline, panels, pictures, status_lines, widgets};
+use crate::view::{
+    TextRole, Theme, age_mark, draw_line, draw_lines, fixed, headline, panels, pictures, row, side_by_side,
+    stacked, status_lines, text_row, widgets,
+};
 
 /// Columns of the height gauge and of the values at 80 columns, and on a larger screen. At 80 columns they are those of
 /// the landing page: what stands in the same place costs a slow line nothing at ignition.
@@ -34,11 +36,8 @@ pub fn draw_flying(
     let roomy = is_roomy(area);
     let area = headline::draw_headline(&headline::flight_headline(model, now), theme, frame, area);
     let [gauge_columns, value_columns] = if roomy { ROOMY_COLUMNS } else { NARROW_COLUMNS };
-    let [gauge_area, middle, right] = area.layout(&Layout::horizontal([
-        Constraint::Length(gauge_columns),
-        Constraint::Length(value_columns),
-        Constraint::Fill(1),
-    ]));
+    let [gauge_area, middle, right] =
+        side_by_side(area, [Length(gauge_columns), Length(value_columns), Fill(1)]);
     let inside = titled("Height, m", theme, frame, gauge_area);
     draw_lines(frame, inside, &widgets::gauge_lines(model, theme, now, usize::from(inside.height)));
     let title = if panels::is_lost(model, now) { "PREDICTED, not heard" } else { title };
@@ -56,12 +55,12 @@ fn draw_values(
     area: Rect,
 ) {
     let rows = u16::try_from(values.len() + 1).unwrap_or(u16::MAX).min(area.height);
-    let [numbers, below] = area.layout(&Layout::vertical([Constraint::Length(rows), Constraint::Fill(1)]));
+    let [numbers, below] = stacked(area, [Length(rows), Fill(1)]);
     let inside = titled(title, theme, frame, numbers);
     values.truncate(usize::from(inside.height));
     draw_lines(frame, inside, &values);
     if roomy {
-        let [link, lines] = below.layout(&Layout::vertical([Constraint::Length(2), Constraint::Fill(1)]));
+        let [link, lines] = stacked(below, [Length(2), Fill(1)]);
         draw_line(frame, link, status_lines::link_line(model, theme, now, usize::from(link.width)));
         let names = ["vertical speed", "height", "tilt", "horizontal speed", "distance", "link rate"];
         widgets::draw_sparklines(&names, model, theme, now, frame, lines);
@@ -69,13 +68,10 @@ fn draw_values(
 }
 
 fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [upper, sides] = area.layout(&Layout::vertical([
-        if with_fins { Constraint::Length(pictures::FIN_PICTURE_ROWS + 1) } else { Constraint::Length(0) },
-        Constraint::Fill(1),
-    ]));
+    let [upper, sides] =
+        stacked(area, [if with_fins { Length(pictures::FIN_PICTURE_ROWS + 1) } else { Length(0) }, Fill(1)]);
     if with_fins {
-        let [fin_area, above] =
-            upper.layout(&Layout::horizontal([Constraint::Length(FIN_COLUMNS), Constraint::Fill(1)]));
+        let [fin_area, above] = side_by_side(upper, [Length(FIN_COLUMNS), Fill(1)]);
         let inside = titled(&pictures::fins_title(model, now), theme, frame, fin_area);
         pictures::draw_fins(model, theme, now, frame, inside);
         let inside = titled("From above", theme, frame, above);
@@ -85,13 +81,6 @@ fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, fr
         let inside = titled(title, theme, frame, area);
         pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
     }
-}
-
-/// A field of TD_DESCENT, while it is known.
-pub fn of_descent(model: &Model, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
-    let descent = model.vehicle.descent.as_ref()?;
-    let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
-    Some(sample).filter(|sample| sample.value.is_finite())
 }
 
 /// Adds height and vertical speed before the second value. After the loss of the link the prediction shows them.
@@ -121,13 +110,12 @@ pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'sta
 fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = panels::lost_rows(model, theme, now);
     let motion = model.vehicle.best_motion();
-    let of = |pick| of_descent(model, pick);
+    let of = |pick| model.vehicle.of_descent(pick);
     lines.push(motor(model, theme, now));
     lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
     lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
-    let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
-    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
-    lines.push(booster(model.vehicle.descent.as_ref(), theme, now));
+    lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
+    lines.push(booster(model, theme, now));
     let horizontal = motion.map(|motion| motion.map(Motion::horizontal_m_s));
     let distance = motion.map(|motion| motion.map(Motion::distance_m));
     lines.push(row(theme, "horizontal", horizontal, 1, "m/s", now));
@@ -151,18 +139,31 @@ fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     theme.line(format!("{mark}{text}"), role)
 }
 
-fn booster(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = descent else {
-        return text_row(theme, "booster", " ", "no data", TextRole::Label, "");
-    };
-    let (mark, stale) = age_mark(descent, now);
-    let text = words::lower_case(&descent.value.booster, "TD_BOOSTER_");
+fn booster(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = model.vehicle.descent.as_ref() else { return no_state("booster", theme) };
     let role = match descent.value.booster {
         TdBooster::TD_BOOSTER_SEPARATING => TextRole::Caution,
         TdBooster::TD_BOOSTER_SEPARATED => TextRole::Good,
         TdBooster::TD_BOOSTER_NONE | TdBooster::TD_BOOSTER_ATTACHED => TextRole::Plain,
     };
-    text_row(theme, "booster", mark, &text, if stale == TextRole::Stale { stale } else { role }, "")
+    let text = words::lower_case(&descent.value.booster, "TD_BOOSTER_");
+    state_row("booster", descent, &text, role, theme, now)
+}
+
+fn no_state(label: &str, theme: Theme) -> Line<'static> {
+    text_row(theme, label, " ", "no data", TextRole::Label, "")
+}
+
+fn state_row(
+    label: &str,
+    descent: &Sample<TD_DESCENT_DATA>,
+    text: &str,
+    role: TextRole,
+    theme: Theme,
+    now: Duration,
+) -> Line<'static> {
+    let (mark, stale) = age_mark(descent, now);
+    text_row(theme, label, mark, text, if stale == TextRole::Stale { stale } else { role }, "")
 }
 
 // The descent page: height gauge with the ignition band, values of the descent, fins from above, side view.
@@ -183,7 +184,7 @@ pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'st
 fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = panels::lost_rows(model, theme, now);
     let motion = model.vehicle.best_motion();
-    let of = |pick| of_descent(model, pick);
+    let of = |pick| model.vehicle.of_descent(pick);
     let of_motion = |pick: fn(&Motion) -> f64| {
         motion.map(|motion| motion.map(pick)).filter(|sample| !sample.value.is_nan())
     };
@@ -193,13 +194,13 @@ fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
     lines.push(band(model.vehicle.descent.as_ref(), theme, now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
-    lines.push(chute(model.vehicle.descent.as_ref(), theme, now));
-    let tilt = model.vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
+    lines.push(chute(model, theme, now));
     lines.push(row(theme, "distance", of_motion(Motion::distance_m), 1, "m", now));
     lines.push(row(theme, "horizontal", of_motion(Motion::horizontal_m_s), 1, "m/s", now));
-    lines.push(row(theme, "tilt", tilt, 1, "deg", now));
-    lines.push(row(theme, "wind", wind_speed(model.vehicle.descent.as_ref()), 1, "m/s", now));
-    lines.push(row(theme, "wind from", wind_from(model.vehicle.descent.as_ref()), 0, "deg", now));
+    lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
+    let (wind, from) = wind(model);
+    lines.push(row(theme, "wind", wind, 1, "m/s", now));
+    lines.push(row(theme, "wind from", from, 0, "deg", now));
     lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
     lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
@@ -252,28 +253,22 @@ fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
     out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
 }
 
-fn chute(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = descent else { return text_row(theme, "chute", " ", "no data", TextRole::Label, "") };
-    let (mark, stale) = age_mark(descent, now);
-    let text = words::lower_case(&descent.value.chute, "TD_CHUTE_");
+fn chute(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(descent) = model.vehicle.descent.as_ref() else { return no_state("chute", theme) };
     let role = match descent.value.chute {
         TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => TextRole::Caution,
         _ => TextRole::Plain,
     };
-    text_row(theme, "chute", mark, &text, if stale == TextRole::Stale { stale } else { role }, "")
+    state_row("chute", descent, &words::lower_case(&descent.value.chute, "TD_CHUTE_"), role, theme, now)
 }
 
-fn wind_speed(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
-    let descent = descent?;
-    let speed = libm::hypot(f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
-    speed.is_finite().then(|| Sample::new(speed, descent.received_at))
-}
-
-/// The direction that the wind comes from, as in weather reports: 0 is north, 90 is east.
-fn wind_from(descent: Option<&Sample<TD_DESCENT_DATA>>) -> Option<Sample<f64>> {
-    let descent = descent?;
-    let (north, east) = (f64::from(descent.value.wind_x_m_s), f64::from(descent.value.wind_y_m_s));
-    let from_deg = libm::atan2(-east, -north).to_degrees().rem_euclid(360.0);
-    let known = from_deg.is_finite() && (north != 0.0 || east != 0.0);
-    known.then(|| Sample::new(from_deg, descent.received_at))
+/// The wind's speed, and the direction that it comes from, as in weather reports: 0 is north, 90 is east.
+fn wind(model: &Model) -> (Option<Sample<f64>>, Option<Sample<f64>>) {
+    let (north, east) =
+        (model.vehicle.of_descent(|d| d.wind_x_m_s), model.vehicle.of_descent(|d| d.wind_y_m_s));
+    let Some((north, Sample { value: east, received_at })) = north.zip(east) else { return (None, None) };
+    let from_deg = libm::atan2(-east, -north.value).to_degrees().rem_euclid(360.0);
+    let speed = libm::hypot(north.value, east);
+    let sample = |value| Sample { value, received_at };
+    (Some(sample(speed)), (speed > 0.0).then(|| sample(from_deg)))
 }

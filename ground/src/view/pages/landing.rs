@@ -3,14 +3,16 @@
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::{is_roomy, panel, plots, titled};
 use crate::model::{BodySpeed, Model, Motion, RED_AFTER, Sample, words};
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{STALE_MARK, fixed, row};
-use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};
+use crate::view::{
+    STALE_MARK, TextRole, Theme, draw_lines, fixed, headline, lists, panels, pictures, row, side_by_side,
+    stacked, status_lines, styled, top_lines,
+};
 
 /// Rows of the panels, with their title.
 const PANEL_ROWS: u16 = 9;
@@ -34,23 +36,19 @@ pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     let roomy = is_roomy(area);
     let area = headline::draw_headline(&first, theme, frame, area);
     let (left, right) = if roomy {
-        let [panels, below] =
-            area.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS + 1), Constraint::Fill(1)]));
-        let [flight, landing, actuators] = panels.layout(&Layout::horizontal([Constraint::Fill(1); 3]));
+        let [panels, below] = stacked(area, [Length(PANEL_ROWS + 1), Fill(1)]);
+        let [flight, landing, actuators] = side_by_side(panels, [Fill(1); 3]);
         draw_flight(model, theme, now, frame, flight);
         draw_touchdown(model, theme, now, frame, landing);
         draw_actuators(model, theme, now, frame, actuators);
-        let [events, right] = below.layout(&Layout::horizontal([Constraint::Fill(2), Constraint::Fill(3)]));
+        let [events, right] = side_by_side(below, [Fill(2), Fill(3)]);
         // On a middling screen the newest are enough: a change of page should not fill a slow line.
         let rows = if events.height < TALL_ROWS { EVENT_ROWS } else { events.height };
         (Rect { height: events.height.min(rows), ..events }, right)
     } else {
-        let [left, right] =
-            area.layout(&Layout::horizontal([Constraint::Length(LEFT_COLUMNS), Constraint::Fill(1)]));
-        let [panels, events] =
-            left.layout(&Layout::vertical([Constraint::Length(PANEL_ROWS), Constraint::Fill(1)]));
-        let [landing, flight] =
-            panels.layout(&Layout::horizontal([Constraint::Length(TOUCHDOWN_COLUMNS), Constraint::Fill(1)]));
+        let [left, right] = side_by_side(area, [Length(LEFT_COLUMNS), Fill(1)]);
+        let [panels, events] = stacked(left, [Length(PANEL_ROWS), Fill(1)]);
+        let [landing, flight] = side_by_side(panels, [Length(TOUCHDOWN_COLUMNS), Fill(1)]);
         draw_touchdown(model, theme, now, frame, landing);
         draw_essentials(model, theme, now, frame, flight);
         (events, right)
@@ -99,8 +97,7 @@ fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let inside = titled("Steering", theme, frame, area);
     let mut lines: Vec<Line> = panels::controller_rows(model, theme, now).into_iter().take(1).collect();
     let vehicle = &model.vehicle;
-    let tilt = vehicle.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()));
-    lines.push(row(theme, "tilt", tilt, 2, "deg", now));
+    lines.push(row(theme, "tilt", vehicle.tilt_deg(), 2, "deg", now));
     let motion = vehicle.best_motion();
     lines.push(row(theme, "horizontal", motion.map(|m| m.map(Motion::horizontal_m_s)), 2, "m/s", now));
     lines.push(row(theme, "distance", motion.map(|m| m.map(Motion::distance_m)), 1, "m", now));
@@ -109,7 +106,7 @@ fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 }
 
 fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [fins, gimbal] = area.layout(&Layout::vertical([Constraint::Length(FIN_ROWS), Constraint::Fill(1)]));
+    let [fins, gimbal] = stacked(area, [Length(FIN_ROWS), Fill(1)]);
     panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, fins);
     panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, gimbal);
 }
@@ -135,10 +132,7 @@ pub fn landing_lines(
     lines.push(attitude(model, theme, now));
     let (title, touchdown) = panels::touchdown_panel(model, theme, now);
     let mut verdict = theme.line(format!(" {title}: "), TextRole::Label);
-    verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(|line| {
-        let style = line.style;
-        line.spans.into_iter().map(move |span| span.patch_style(style))
-    }));
+    verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(styled));
     lines.push(verdict);
     lines.extend(panels::controller_rows(model, theme, now).into_iter().take(2));
     // The numbers of each plane, without its bar.
@@ -175,11 +169,9 @@ fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 }
 
 fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let vehicle = &model.vehicle;
-    let (body, attitude) = (vehicle.body_speed(), vehicle.attitude);
-    let axial = body.map(|body| body.map(|b| b.u_m_s));
-    let mut spans = value(theme, "tilt", attitude.map(|a| a.map(|a| a.tilt_rad.to_degrees())), 1, now);
-    spans.extend(value(theme, "u", axial, 1, now));
+    let body = model.vehicle.body_speed();
+    let mut spans = value(theme, "tilt", model.vehicle.tilt_deg(), 1, now);
+    spans.extend(value(theme, "u", body.map(|body| body.map(|b| b.u_m_s)), 1, now));
     spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
     Line::from(spans)
 }
@@ -213,10 +205,8 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         lines.truncate(usize::from(area.height));
         return draw_lines(frame, area, &lines);
     }
-    let [table, pictures] =
-        area.layout(&Layout::vertical([Constraint::Length(TABLE_ROWS), Constraint::Fill(1)]));
-    let [left, right] =
-        table.layout(&Layout::horizontal([Constraint::Length(TABLE_COLUMNS), Constraint::Fill(1)]));
+    let [table, pictures] = stacked(area, [Length(TABLE_ROWS), Fill(1)]);
+    let [left, right] = side_by_side(table, [Length(TABLE_COLUMNS), Fill(1)]);
     draw_lines(frame, left, &lines);
     let inside = titled("Events", theme, frame, right);
     let events = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
@@ -259,12 +249,9 @@ fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -
             let line = left.next().unwrap_or_default();
             let gap = columns.saturating_sub(line.width() + 1);
             let mut spans = vec![Span::raw(" ")];
-            let style = line.style;
-            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            spans.extend(styled(line));
             spans.push(Span::raw(" ".repeat(gap)));
-            let line = right.next().unwrap_or_default();
-            let style = line.style;
-            spans.extend(line.spans.into_iter().map(|span| span.patch_style(style)));
+            spans.extend(styled(right.next().unwrap_or_default()));
             Line::from(spans)
         })
         .collect()

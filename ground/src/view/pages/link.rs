@@ -9,10 +9,8 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::{LinkReport, LinkState, Model, STALE_AFTER, refusal};
-use crate::view::lists;
 use crate::view::status_lines::{link_line, percent};
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{STALE_MARK, seconds};
+use crate::view::{STALE_MARK, TextRole, Theme, lists, seconds};
 
 /// A loss above this share is marked.
 const LOSS_MARKED: f64 = 0.05;

@@ -6,10 +6,8 @@ use ratatui::text::Line;
 
 use super::window;
 use crate::model::{ABORT_WORDS, Act, DEFINITIONS, Model, Role};
-use crate::view::lists;
 use crate::view::status_lines::{AlarmState, alarm_state, cut};
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{seconds, shortest};
+use crate::view::{TextRole, Theme, lists, seconds, shortest};
 
 /// Columns of `ended alarm: ` and shorter words.
 const WORD_COLUMNS: usize = 13;

@@ -15,8 +15,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Borders};
 
-use super::draw_lines;
-use super::theme::{TextRole, Theme};
+use super::{TextRole, Theme, draw_lines};
 use crate::model::{Model, Page};
 
 /// Draws the present page between the top lines and the alarm line.

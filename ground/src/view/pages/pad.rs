@@ -4,16 +4,19 @@ use std::time::Duration;
 
 use protocol::dialect::{TdCheck, TdInterlock, TdPhase};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use super::{is_roomy, panel, titled};
 use crate::model::{
-    Act, CommandKind, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here, words,
+    Act, CommandKind, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints,
+    why_not_here, words,
 };
-use crate::view::theme::{TextRole, Theme};
-use crate::view::widgets::{STALE_MARK, age_mark, fixed};
-use crate::view::{draw_lines, headline, lists, panels, pictures, status_lines, top_lines};
+use crate::view::{
+    STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, panels, pictures,
+    side_by_side, stacked, status_lines, top_lines,
+};
 
 /// Columns of the checks at 80 columns.
 const CHECK_COLUMNS: u16 = 47;
@@ -37,27 +40,21 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let upper_rows = if lists_steps { CHECK_ROWS } else { rows.min(CHECK_ROWS) };
     let (checks_area, ladder_area, events) = if is_roomy(area) {
         let area = headline::draw_headline(&foremost, theme, frame, area);
-        let [upper, below] = area
-            .layout(&Layout::vertical([Constraint::Length(upper_rows.max(NOW_ROWS)), Constraint::Fill(1)]));
-        let [left, middle, right] = upper.layout(&Layout::horizontal([
-            Constraint::Length(CHECK_COLUMNS + 4),
-            Constraint::Length(LADDER_COLUMNS),
-            Constraint::Fill(1),
-        ]));
+        let [upper, below] = stacked(area, [Length(upper_rows.max(NOW_ROWS)), Fill(1)]);
+        let [left, middle, right] =
+            side_by_side(upper, [Length(CHECK_COLUMNS + 4), Length(LADDER_COLUMNS), Fill(1)]);
         draw_now(model, theme, now, frame, right);
         let shares = if model.checklist.is_some() { [4, 4, 3] } else { [3, 0, 2] };
-        let [events, list, picture] = below.layout(&Layout::horizontal(shares.map(Constraint::Fill)));
+        let [events, list, picture] = side_by_side(below, shares.map(Fill));
         if model.checklist.is_some() {
             draw_checklist(model, theme, now, frame, list);
         }
         draw_rehearsal(model, theme, now, frame, picture);
         (left, middle, events)
     } else {
-        let [upper, events] =
-            area.layout(&Layout::vertical([Constraint::Length(upper_rows), Constraint::Fill(1)]));
-        let [left, right] =
-            upper.layout(&Layout::horizontal([Constraint::Length(CHECK_COLUMNS), Constraint::Fill(1)]));
-        let [go, below] = right.layout(&Layout::vertical([Constraint::Length(go_rows), Constraint::Fill(1)]));
+        let [upper, events] = stacked(area, [Length(upper_rows), Fill(1)]);
+        let [left, right] = side_by_side(upper, [Length(CHECK_COLUMNS), Fill(1)]);
+        let [go, below] = stacked(right, [Length(go_rows), Fill(1)]);
         if go_rows > 0 {
             let inside = titled("Now", theme, frame, go);
             headline::draw_headline(&foremost, theme, frame, inside);
@@ -130,7 +127,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
         let hints = unheard_hints(model, now).unwrap_or_default();
-        let wrapped = |words: String| lists::wrapped(&words, usize::from(CHECK_COLUMNS - 2));
+        let wrapped = |words: String| lists::wrap(&words, usize::from(CHECK_COLUMNS - 2));
         let lines = hints.into_iter().flat_map(wrapped);
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
@@ -218,17 +215,10 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_PIN => yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"),
         TdCheck::TD_CHECK_TILT => number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"),
         TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"),
-        TdCheck::TD_CHECK_SPEED => {
-            let speed = vehicle.motion.map(|m| m.value.speed_m_s());
-            number(speed, 2, "m/s")
-        }
+        TdCheck::TD_CHECK_SPEED => number(vehicle.motion.map(|m| m.value.speed_m_s()), 2, "m/s"),
         TdCheck::TD_CHECK_FINS => {
-            let error = vehicle.fins.map(|fins| {
-                let apart = |fin: &crate::model::Deflection| {
-                    (fin.commanded_rad - fin.measured_rad).abs().to_degrees()
-                };
-                fins.value.iter().map(apart).fold(0.0, f64::max)
-            });
+            let error =
+                vehicle.fins.map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
             number(error, 1, "deg")
         }
         TdCheck::TD_CHECK_CONTROLLER_WARM => vehicle.controller.as_ref().map_or_else(String::new, |c| {

@@ -3,21 +3,22 @@
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Rect;
 use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
-use super::flight::of_descent;
 use super::{is_roomy, panel, titled};
 use crate::model::{
     Act, Model, Motion, is_on_pad,
     quantity::{self, ALL, Quantity},
 };
 use crate::view::pictures::{FlightPart, Viewpoint};
-use crate::view::theme::{Ink, TextRole, Theme};
-use crate::view::widgets::{age_mark, fixed, row};
-use crate::view::{draw_line, draw_lines, panels, pictures, widgets};
+use crate::view::{
+    Ink, TextRole, Theme, age_mark, draw_line, draw_lines, fixed, panels, pictures, row, side_by_side,
+    stacked, widgets,
+};
 
 /// Columns of the list of quantities.
 const LIST_COLUMNS: u16 = 24;
@@ -27,13 +28,12 @@ const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
 
 /// Draws the list of quantities and the plot of the chosen one.
 pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [list, right] =
-        area.layout(&Layout::horizontal([Constraint::Length(LIST_COLUMNS), Constraint::Fill(1)]));
+    let [list, right] = side_by_side(area, [Length(LIST_COLUMNS), Fill(1)]);
     let quantity = model.pages.plotted;
     let inside = titled("Up Down choose", theme, frame, list);
     draw_lines(frame, inside, &names(model, theme, usize::from(inside.height)));
     let inside = titled(&format!("{} over time", quantity.name), theme, frame, right);
-    let [head, plot] = inside.layout(&Layout::vertical([Constraint::Length(1), Constraint::Fill(1)]));
+    let [head, plot] = stacked(inside, [Length(1), Fill(1)]);
     draw_line(frame, head, present(quantity, model, theme, now));
     draw_plot(quantity, model, theme, now, frame, plot);
 }
@@ -128,13 +128,12 @@ const ROWS_FOR_TWO: u16 = 30;
 
 /// Draws the three views: side by side, or on a high screen the view from above below the two others.
 pub fn draw_path(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [pictures, legend] = area.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Length(1)]));
-    let thirds = || Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1), Constraint::Fill(1)]);
+    let [pictures, legend] = stacked(area, [Fill(1), Length(1)]);
     let [east, south, above] = if area.height < ROWS_FOR_TWO {
-        pictures.layout(&thirds())
+        side_by_side(pictures, [Fill(1); 3])
     } else {
-        let [left, above] = pictures.layout(&Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]));
-        let [east, south] = left.layout(&Layout::vertical([Constraint::Fill(1), Constraint::Fill(1)]));
+        let [left, above] = side_by_side(pictures, [Fill(1), Fill(1)]);
+        let [east, south] = stacked(left, [Fill(1), Fill(1)]);
         [east, south, above]
     };
     for (from, title, at) in [
@@ -195,16 +194,15 @@ const PANEL_COLUMNS: u16 = 30;
 pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let roomy = is_roomy(area);
     let (panels, lines) = if roomy {
-        let [panels, lines] =
-            area.layout(&Layout::horizontal([Constraint::Length(3 * PANEL_COLUMNS), Constraint::Fill(1)]));
+        let [panels, lines] = side_by_side(area, [Length(3 * PANEL_COLUMNS), Fill(1)]);
         (panels, lines)
     } else {
         (area, Rect::default())
     };
-    let [left, middle, right] = panels.layout(&Layout::horizontal([Constraint::Fill(1); 3]));
-    let half = Constraint::Length(CONTROLLER_ROWS);
-    let [flight_area, below_flight] = left.layout(&Layout::vertical([half, Constraint::Fill(1)]));
-    let [controller_area, below_controller] = middle.layout(&Layout::vertical([half, Constraint::Fill(1)]));
+    let [left, middle, right] = side_by_side(panels, [Fill(1); 3]);
+    let half = Length(CONTROLLER_ROWS);
+    let [flight_area, below_flight] = stacked(left, [half, Fill(1)]);
+    let [controller_area, below_controller] = stacked(middle, [half, Fill(1)]);
     let lost = panels::is_lost(model, now);
     let (title, rows) = if lost {
         ("PREDICTED, not heard", panels::lost_rows(model, theme, now))
@@ -242,7 +240,7 @@ pub fn values_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'sta
 
 /// The estimates behind the descent.
 fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let of = |pick| of_descent(model, pick);
+    let of = |pick| model.vehicle.of_descent(pick);
     let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
     let mut rows = vec![
         line("band high", of(|d| d.band_high_m), 1, "m"),
