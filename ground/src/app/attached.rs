@@ -63,13 +63,7 @@ pub async fn session(
     while !live && let Some((told, at)) = link.told.recv().await {
         times.heard(at, clock.now());
         live = told == ToScreen::Live;
-        if let ToScreen::Hello(hello) = &told {
-            let (ours, theirs) = (VERSION, hello.version);
-            anyhow::ensure!(
-                ours == theirs,
-                "the station has version {theirs}, this screen has {ours}; update the older one"
-            );
-        }
+        check_version(&told)?;
         take(&mut model, told, at, viewer);
     }
     let mut output = Output::open(interactive, config)?;
@@ -158,6 +152,17 @@ pub async fn session(
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
+}
+
+fn check_version(told: &ToScreen) -> anyhow::Result<()> {
+    if let ToScreen::Hello(hello) = told {
+        let (ours, theirs) = (VERSION, hello.version);
+        anyhow::ensure!(
+            ours == theirs,
+            "the station has version {theirs}, this screen has {ours}; update the older one"
+        );
+    }
+    Ok(())
 }
 
 /// Connects to the feed, or to the station of this machine.

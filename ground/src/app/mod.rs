@@ -206,9 +206,8 @@ async fn start(
             model.warn(clock.now(), text);
         }
     }
-    let folder = recorder.as_ref().and_then(|recorder| recorder.path().parent());
-    if let Some(place) = newest_place(folder, start_unix_s) {
-        model.place = Some(place);
+    model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
+    if model.place.is_some() {
         model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
     }
     let server = serve(cli, &mut model, interactive, &clock).await?;
@@ -243,8 +242,7 @@ async fn start(
         report_at: Duration::ZERO,
     };
     station.open_book(&model, book_key);
-    station.publish_checklist(&model, clock.now());
-    station.publish_place(&model, clock.now());
+    station.publish_kept(&model, clock.now());
     Ok((station, model, wire))
 }
 

@@ -39,7 +39,7 @@ impl Output {
     }
 
     pub(super) fn redraw_at(&self) -> Option<Duration> {
-        self.screen.as_ref().map(|screen| screen.redraw_at())
+        self.screen.as_ref().map(|screen| screen.pace.redraw_at())
     }
 
     /// The next input of the person at the terminal; waits for ever without one.
@@ -52,13 +52,13 @@ impl Output {
 
     pub(super) fn mark_message(&mut self, msg: &Msg, model: &Model) {
         if let Some(screen) = &mut self.screen {
-            screen.mark_message(msg, model);
+            screen.pace.mark_message(msg, model);
         }
     }
 
     pub(super) fn mark_changed(&mut self) {
         if let Some(screen) = &mut self.screen {
-            screen.mark_changed();
+            screen.pace.mark_changed();
         }
     }
 

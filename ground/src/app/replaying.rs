@@ -10,7 +10,6 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
 use super::output::{self, Lines, Output};
-use super::screen::Screen;
 use crate::cli::{Cli, ReplayFrom};
 use crate::config::Config;
 use crate::exit;
@@ -100,52 +99,53 @@ fn tell(path: &Path, Progress { read, total }: Progress, told: &mut u64) {
 
 async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
     let clock = Clock::start();
-    let mut screen = Screen::open(config)?;
+    let mut output = Output::open(true, config)?;
     let mut signals = Signals::listen()?;
     let mut steps = interval(STEP);
     steps.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut then = clock.now();
     loop {
-        let redraw_at = screen.redraw_at();
+        let redraw_at = output.redraw_at();
         tokio::select! {
             biased;
             _ = signals.next() => return Ok(()),
-            msg = screen.input() => match msg {
-                Msg::Key(key) => {
-                    for action in player.on_key(key) {
-                        match action {
-                            Action::Redraw => screen.clear(),
-                            Action::NextTheme => screen.next_theme(),
-                            Action::Quit => return Ok(()),
-                            // What the ground did is part of the recording.
-                            _ => {}
-                        }
-                    }
-                    screen.mark_changed();
+            msg = output.input() => {
+                output.mark_changed();
+                let actions = typed(player, &msg);
+                if actions.contains(&Action::Quit) || matches!(msg, Msg::Terminate(_)) {
+                    return Ok(());
                 }
-                // Held or pasted keys count only if they scroll or move the time.
-                Msg::Keys(keys) => {
-                    for key in keys.into_iter().filter(|key| key.scrolls()) {
-                        player.on_key(key);
-                    }
-                    screen.mark_changed();
+                for action in actions {
+                    output.act(&action);
                 }
-                Msg::Terminate(_) => return Ok(()),
-                _ => screen.mark_changed(),
-            },
+            }
             _ = steps.tick() => {
                 let now = clock.now();
                 let before = player.position();
                 player.pass(now.saturating_sub(then));
                 then = now;
                 if player.position() != before {
-                    screen.mark_changed();
+                    output.mark_changed();
                 }
             }
-            () = clock.sleep_until(Some(redraw_at)) => {}
+            () = clock.sleep_until(redraw_at) => {}
         }
-        screen.show(&player.model, clock.now(), player.position()).context("drawing on the terminal")?;
+        output.show(&player.model, clock.now(), player.position())?;
     }
+}
+
+/// Gives a replay what was typed. Returns what the screen has to do: what the ground did is part of the recording. Held or
+/// pasted keys count only if they scroll or move the time.
+fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
+    let mut actions = match msg {
+        Msg::Key(key) => player.on_key(*key),
+        Msg::Keys(keys) => {
+            keys.iter().filter(|key| key.scrolls()).flat_map(|key| player.on_key(*key)).collect()
+        }
+        _ => Vec::new(),
+    };
+    actions.retain(|action| matches!(action, Action::Redraw | Action::NextTheme | Action::Quit));
+    actions
 }
 
 // The flight just flown, again on the screen of a running station. The link, the log and the alarms go on; an alarm, the
@@ -231,25 +231,22 @@ impl Again {
         if self.playing.is_none() {
             return (Vec::new(), Some(msg));
         }
-        let typed = match &msg {
-            Msg::Key(key) => vec![*key],
-            Msg::Keys(keys) => keys.clone(),
-            Msg::Pasted => Vec::new(),
+        let aborts = match &msg {
+            Msg::Key(key) => *key == Key::CtrlX,
+            Msg::Keys(keys) => keys.contains(&Key::CtrlX),
+            Msg::Pasted => false,
             _ => return (Vec::new(), Some(msg)),
         };
-        if typed.contains(&Key::CtrlX) {
+        if aborts {
             self.end();
         }
         let Some(player) = &mut self.playing else { return (Vec::new(), Some(msg)) };
-        // Held or pasted keys count only if they scroll or move the time.
-        let several = matches!(msg, Msg::Keys(_));
-        let keys = typed.into_iter().filter(|key| !several || key.scrolls());
-        let actions: Vec<Action> = keys.flat_map(|key| player.on_key(key)).collect();
+        let mut actions = typed(player, &msg);
         if actions.contains(&Action::Quit) {
             self.end();
+            actions.retain(|action| *action != Action::Quit);
         }
-        let screens = |action: &Action| matches!(action, Action::Redraw | Action::NextTheme);
-        (actions.into_iter().filter(screens).collect(), None)
+        (actions, None)
     }
 
     /// What is shown instead of the live model, and its time.

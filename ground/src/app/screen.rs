@@ -64,7 +64,7 @@ pub struct Screen {
     theme: Theme,
     bell: bool,
     voice: Option<Voice>,
-    pace: Pace,
+    pub pace: Pace,
     /// Whether the next frame is written completely.
     whole: bool,
     /// A message that arrived after the keys that are passed on first.
@@ -98,28 +98,13 @@ impl Screen {
         })
     }
 
-    /// Something visible has changed, and a person waits for it.
-    pub fn mark_changed(&mut self) {
-        self.pace.mark_changed();
-    }
-
-    /// A message was taken into the model; its kind decides how soon it must be drawn.
-    pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        self.pace.mark_message(msg, model);
-    }
-
-    /// When the next frame is due.
-    pub fn redraw_at(&self) -> Duration {
-        self.pace.redraw_at()
-    }
-
     /// Draws if a frame is due. `model_now` is the same moment on the model's clock.
     ///
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
         self.pace.check_urgent(model);
-        if now < self.redraw_at() {
+        if now < self.pace.redraw_at() {
             return Ok(());
         }
         if self.writer.is_busy()? {
@@ -142,7 +127,7 @@ impl Screen {
     /// Forgets what the terminal shows, so that the next frame is written completely.
     pub fn clear(&mut self) {
         self.whole = true;
-        self.mark_changed();
+        self.pace.mark_changed();
     }
 
     /// Calls a text out. Returns why nothing can be called out any more, once.
@@ -155,7 +140,7 @@ impl Screen {
     /// Changes to the next theme.
     pub fn next_theme(&mut self) {
         self.theme.palette = self.theme.palette.next();
-        self.mark_changed();
+        self.pace.mark_changed();
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.

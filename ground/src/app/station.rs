@@ -375,8 +375,9 @@ impl Station {
         }
     }
 
-    /// Tells every screen the place that is kept from before this run.
-    pub(super) fn publish_place(&mut self, model: &Model, now: Duration) {
+    /// Tells every screen what is kept from before this run: the checklist, and the last place.
+    pub(super) fn publish_kept(&mut self, model: &Model, now: Duration) {
+        self.publish_checklist(model, now);
         if let Some(place) = model.place {
             self.publish(&Msg::Place(Box::new(place)), now);
         }
@@ -466,7 +467,7 @@ impl Station {
     }
 
     /// Tells every screen the checklist.
-    pub(super) fn publish_checklist(&mut self, model: &Model, now: Duration) {
+    fn publish_checklist(&mut self, model: &Model, now: Duration) {
         if let Some(list) = &model.checklist {
             self.publish(&Msg::Checklist(Box::new(list.clone())), now);
         }

@@ -66,11 +66,15 @@ pub async fn connect(path: &Path) -> io::Result<UnixStream> {
 /// # Errors
 /// It belongs to another user, or the system does not tell.
 pub fn check_peer(stream: &UnixStream) -> io::Result<()> {
-    let other = stream.peer_cred()?.uid();
+    check_user(stream.peer_cred()?.uid(), "the other end")
+}
+
+/// Checks that something belongs to this user.
+fn check_user(other: u32, what: &str) -> io::Result<()> {
     match own_user() {
         Some(user) if user != other => Err(io::Error::new(
             io::ErrorKind::PermissionDenied,
-            format!("the other end belongs to user {other}, not to user {user}"),
+            format!("{what} belongs to user {other}, not to user {user}"),
         )),
         _ => Ok(()),
     }
@@ -78,14 +82,7 @@ pub fn check_peer(stream: &UnixStream) -> io::Result<()> {
 
 /// Checks the owner of the directory, because anybody could create it below `/tmp`.
 fn check_owner(directory: &Path) -> io::Result<()> {
-    let owner = std::fs::metadata(directory)?.uid();
-    match own_user() {
-        Some(user) if user != owner => Err(io::Error::new(
-            io::ErrorKind::PermissionDenied,
-            format!("{} belongs to user {owner}, not to user {user}", directory.display()),
-        )),
-        _ => Ok(()),
-    }
+    check_user(std::fs::metadata(directory)?.uid(), &directory.display().to_string())
 }
 
 /// Listens on a path and replaces a socket that nobody listens on any more.

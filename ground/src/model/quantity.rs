@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_CONTROLLER_DATA, TD_DESCENT_DATA};
+use protocol::dialect::TD_CONTROLLER_DATA;
 
-use super::{Attitude, BodySpeed, Model, Motion, Sample, Vehicle};
+use super::{BodySpeed, Model, Motion, Sample, Vehicle};
 
 /// A number of the telemetry or of the link, in the unit of the screen.
 pub struct Quantity {
@@ -59,15 +59,15 @@ const fn quantity(
 pub static ALL: [Quantity; COUNT] = [
     quantity("height", "m", 1, |model, _| model.vehicle.height_m()),
     quantity("vertical speed", "m/s", 1, |model, _| model.vehicle.vertical_m_s()),
-    quantity("horizontal speed", "m/s", 1, |m, _| motion(m, Motion::horizontal_m_s)),
-    quantity("distance", "m", 1, |m, _| motion(m, Motion::distance_m)),
-    quantity("north", "m", 1, |m, _| motion(m, |motion| motion.x_m)),
-    quantity("east", "m", 1, |m, _| motion(m, |motion| motion.y_m)),
+    quantity("horizontal speed", "m/s", 1, |m, _| m.vehicle.of_motion(Motion::horizontal_m_s)),
+    quantity("distance", "m", 1, |m, _| m.vehicle.of_motion(Motion::distance_m)),
+    quantity("north", "m", 1, |m, _| m.vehicle.of_motion(|motion| motion.x_m)),
+    quantity("east", "m", 1, |m, _| m.vehicle.of_motion(|motion| motion.y_m)),
     quantity("axial speed", "m/s", 2, |m, _| body(m, |body| body.u_m_s)),
     quantity("lateral speed", "m/s", 2, |m, _| body(m, BodySpeed::lateral_m_s)),
-    quantity("tilt", "deg", 1, |m, _| attitude(m, |a| a.tilt_rad.to_degrees())),
-    quantity("pitch", "deg", 1, |m, _| attitude(m, |a| a.pitch_rad.to_degrees())),
-    quantity("turn rate", "deg/s", 1, |m, _| attitude(m, |a| a.turn_rate_rad_s().to_degrees())),
+    quantity("tilt", "deg", 1, |m, _| m.vehicle.tilt_deg()),
+    quantity("pitch", "deg", 1, |m, _| m.vehicle.of_attitude(|a| a.pitch_rad.to_degrees())),
+    quantity("turn rate", "deg/s", 1, |m, _| m.vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees())),
     quantity("gimbal pitch", "deg", 2, |m, _| {
         m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees()))
     }),
@@ -78,14 +78,14 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
     quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
     quantity("fin 4", "deg", 1, |m, _| fin(&m.vehicle, 3)),
-    quantity("apogee", "m", 0, |m, _| descent(m, |d| d.apogee_m)),
-    quantity("ignition height", "m", 1, |m, _| descent(m, |d| d.chosen_height_m)),
-    quantity("commit height", "m", 1, |m, _| descent(m, |d| d.commit_height_m)),
+    quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m)),
+    quantity("ignition height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.chosen_height_m)),
+    quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
-    quantity("wind", "m/s", 1, |m, _| descent(m, |d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s))),
-    quantity("touchdown north", "m", 1, |m, _| descent(m, |d| d.touchdown_x_m)),
-    quantity("touchdown east", "m", 1, |m, _| descent(m, |d| d.touchdown_y_m)),
-    quantity("drag", "x", 3, |m, _| descent(m, |d| d.drag_scale)),
+    quantity("wind", "m/s", 1, |m, _| m.vehicle.of_descent(|d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s))),
+    quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_descent(|d| d.touchdown_x_m)),
+    quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_descent(|d| d.touchdown_y_m)),
+    quantity("drag", "x", 3, |m, _| m.vehicle.of_descent(|d| d.drag_scale)),
     quantity("time to touchdown", "s", 1, |m, now| m.vehicle.touchdown_in_s(now)),
     quantity("predicted speed", "m/s", 2, |m, _| m.vehicle.predicted_speed_m_s()),
     quantity("thrust", "x", 3, |m, _| solver(m, |c| f64::from(c.thrust_scale))),
@@ -108,24 +108,12 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
 
-fn motion(model: &Model, pick: fn(&Motion) -> f64) -> Option<Sample<f64>> {
-    model.vehicle.best_motion().map(|motion| motion.map(pick))
-}
-
-fn attitude(model: &Model, pick: fn(&Attitude) -> f64) -> Option<Sample<f64>> {
-    model.vehicle.attitude.map(|attitude| attitude.map(pick))
-}
-
 fn body(model: &Model, pick: fn(&BodySpeed) -> f64) -> Option<Sample<f64>> {
     model.vehicle.body_speed().map(|body| body.map(pick))
 }
 
 fn fin(vehicle: &Vehicle, number: usize) -> Option<Sample<f64>> {
     vehicle.fins.map(|fins| fins.map(|fins| fins[number].measured_rad.to_degrees()))
-}
-
-fn descent(model: &Model, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
-    model.vehicle.descent.as_ref().map(|d| Sample::new(f64::from(pick(&d.value)), d.received_at))
 }
 
 fn solver(model: &Model, pick: fn(&TD_CONTROLLER_DATA) -> f64) -> Option<Sample<f64>> {

@@ -257,8 +257,7 @@ impl Vehicle {
         of_motion: fn(&Motion) -> f64,
         of_descent: fn(&TD_DESCENT_DATA) -> f32,
     ) -> Option<Sample<f64>> {
-        let motion = self.best_motion().map(|motion| motion.map(of_motion));
-        better(motion, self.of_descent(of_descent), STALE_AFTER)
+        better(self.of_motion(of_motion), self.of_descent(of_descent), STALE_AFTER)
     }
 
     /// A number of `TD_DESCENT`, while it is known.
@@ -268,9 +267,19 @@ impl Vehicle {
         Some(sample).filter(|sample| sample.value.is_finite())
     }
 
+    /// A number of the position and velocity.
+    pub fn of_motion(&self, pick: fn(&Motion) -> f64) -> Option<Sample<f64>> {
+        self.best_motion().map(|motion| motion.map(pick))
+    }
+
+    /// A number of the attitude.
+    pub fn of_attitude(&self, pick: fn(&Attitude) -> f64) -> Option<Sample<f64>> {
+        self.attitude.map(|attitude| attitude.map(pick))
+    }
+
     /// The angle between nose and vertical, degrees.
     pub fn tilt_deg(&self) -> Option<Sample<f64>> {
-        self.attitude.map(|attitude| attitude.map(|a| a.tilt_rad.to_degrees()))
+        self.of_attitude(|attitude| attitude.tilt_rad.to_degrees())
     }
 
     /// Time from now until the landing motor is to be lit, s. It keeps counting between two messages. `None` if the

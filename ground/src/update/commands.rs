@@ -4,8 +4,7 @@
 use std::time::Duration;
 
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
-use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult, TdPhase};
-use protocol::identity::Address;
+use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdPhase};
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
@@ -400,7 +399,7 @@ pub(super) fn hold_if_unattended(model: &mut Model, now: Duration) {
     if too_late {
         model.crew.hold_due = Some(due);
     } else if now + HALF_A_TICK >= due {
-        model.outbox.push(Action::send(hold_message(model.settings.vehicle)));
+        send_once(model, CommandKind::Hold);
         model.crew.hold_due = Some(now + HOLD_EVERY);
     }
 }
@@ -420,11 +419,15 @@ fn armed_here(model: &Model) -> bool {
     arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())
 }
 
-fn hold_message(vehicle: Address) -> MavMessage {
-    MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-        command: MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
-        target_system: vehicle.system_id,
-        target_component: vehicle.component_id,
+/// Sends a command once, without following it.
+pub(super) fn send_once(model: &mut Model, kind: CommandKind) {
+    let (command, param1) = kind.mav_command();
+    model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+        command,
+        param1,
+        target_system: model.settings.vehicle.system_id,
+        target_component: model.settings.vehicle.component_id,
+        param7: if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 },
         ..COMMAND_LONG_DATA::default()
-    })
+    })));
 }

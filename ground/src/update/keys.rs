@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
+use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
 use protocol::log::record::EventLevel;
 
 use super::{Action, Request, commands, on_request, pad};
@@ -494,7 +494,11 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
     };
     match why_not {
-        None if kind == CommandKind::Tap => tap(model, by, now),
+        // The next one comes within 2 s, and the vehicle shows the time that is left.
+        None if kind == CommandKind::Tap => {
+            commands::send_once(model, kind);
+            model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
+        }
         None => commands::submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
@@ -502,19 +506,6 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
             model.tell(now, Speaker::Ground, EventLevel::Warning, text);
         }
     }
-}
-
-/// A tap is sent once and not followed: the next one comes within 2 s, and the vehicle shows the time that is left.
-fn tap(model: &mut Model, by: &Seat, now: Duration) {
-    let (command, _) = CommandKind::Tap.mav_command();
-    model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-        command,
-        target_system: model.settings.vehicle.system_id,
-        target_component: model.settings.vehicle.component_id,
-        param7: model.vehicle.boot.parameter(),
-        ..COMMAND_LONG_DATA::default()
-    })));
-    model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
 }
 
 /// Why not to send a command that another screen has just sent.

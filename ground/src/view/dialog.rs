@@ -194,13 +194,19 @@ pub fn draw_dialog(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let down = if model.dialog.is_none() { free } else { free / 2 };
     let at = Rect { x: area.x + (area.width - width) / 2, y: area.y + down, width, height };
     let at = at.intersection(frame.area());
+    let inside = pop_up(title, theme, frame, at);
+    let padded = Rect { x: inside.x + 1, width: inside.width.saturating_sub(2), ..inside };
+    draw_lines(frame, padded, &lines);
+}
+
+/// Draws an empty box over the page and returns its inside.
+fn pop_up(title: &str, theme: Theme, frame: &mut Frame, at: Rect) -> Rect {
     let block = Block::bordered().title(theme.line(format!(" {title} "), TextRole::Title));
     let inside = block.inner(at);
     frame.render_widget(Clear, at);
     frame.buffer_mut().set_style(at, theme.ground());
     frame.render_widget(block, at);
-    let padded = Rect { x: inside.x + 1, width: inside.width.saturating_sub(2), ..inside };
-    draw_lines(frame, padded, &lines);
+    inside
 }
 
 // The box of the palette: the typed text, and the actions found with their keys.
@@ -217,16 +223,9 @@ pub fn draw_palette(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) 
     }
     let width = PALETTE_COLUMNS.min(area.width);
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
-    let block = Block::bordered().title(theme.line(" Every action ", TextRole::Title));
-    let inside = block.inner(at);
-    frame.render_widget(Clear, at);
-    frame.buffer_mut().set_style(at, theme.ground());
-    frame.render_widget(block, at);
-    draw_lines(
-        frame,
-        inside,
-        &palette_lines(model, theme, usize::from(at.height.saturating_sub(FRAME_ROWS))),
-    );
+    let inside = pop_up("Every action", theme, frame, at);
+    let rows = usize::from(at.height.saturating_sub(FRAME_ROWS));
+    draw_lines(frame, inside, &palette_lines(model, theme, rows));
 }
 
 /// The typed text and this many of the actions found, the marked one among them. Empty while it is closed.

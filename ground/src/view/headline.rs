@@ -184,11 +184,13 @@ pub fn draw_banner(banner: &Banner, theme: Theme, frame: &mut Frame, area: Rect)
     let reason = theme.line(banner.reason(), banner.role);
     draw_line(frame, area, reason);
     let below = Rect { y: area.y + area.height.min(1), height: area.height.saturating_sub(1), ..area };
-    let words = banner.words.to_owned();
-    let letters = u16::try_from(words.chars().count()).unwrap_or(u16::MAX);
-    let item =
-        Item { label: String::new(), text: [words.clone(), words], letters: [letters; 2], role: banner.role };
-    draw_headline(&[item], theme, frame, below)
+    let letters = u16::try_from(banner.words.chars().count()).unwrap_or(u16::MAX);
+    draw_headline(&[word("", banner.words, letters, banner.role)], theme, frame, below)
+}
+
+/// What a page shows largest; nothing while larger words stand above every page.
+pub fn headline(model: &Model, now: Duration, of_page: fn(&Model, Duration) -> Vec<Item>) -> Vec<Item> {
+    if banner(model, now).is_some() { Vec::new() } else { of_page(model, now) }
 }
 
 // What each page shows largest: on the pad GO or NO-GO, in flight phase, height, speed and time, in the burn the time
@@ -199,11 +201,8 @@ const PAD_LETTERS: u16 = 8;
 
 /// Whether the vehicle may be armed; on the way to the start, how far it is.
 pub fn pad_headline(model: &Model, now: Duration) -> Vec<Item> {
-    if banner(model, now).is_some() {
-        return Vec::new();
-    }
-    let (word, role) = pad_word(model, now);
-    vec![Item { label: String::new(), text: [word.clone(), word], letters: [PAD_LETTERS; 2], role }]
+    let (text, role) = pad_word(model, now);
+    vec![word("", &text, PAD_LETTERS, role)]
 }
 
 fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
@@ -239,12 +238,7 @@ fn lost(model: &Model, now: Duration) -> Vec<Item> {
     let sample = |value: f64| Some(Sample::new(value, now));
     let silence_s = model.vehicle.best_motion().map(|motion| motion.age(now).as_secs_f64());
     vec![
-        Item {
-            label: "link".to_owned(),
-            text: ["LOST".to_owned(), "LOST".to_owned()],
-            letters: [5, 5],
-            role: TextRole::Alarm,
-        },
+        word("link", "LOST", 5, TextRole::Alarm),
         number("PREDICTED m up", at.and_then(|at| sample(at.altitude_m)), [0, 0], [5, 4], now),
         number("error m", at.and_then(|at| sample(at.error_m)), [0, 0], [5, 4], now),
         number("silent s", silence_s.and_then(sample), [0, 0], [4, 4], now),
@@ -253,9 +247,6 @@ fn lost(model: &Model, now: Duration) -> Vec<Item> {
 
 /// Phase, height, vertical speed and time since release.
 pub fn flight_headline(model: &Model, now: Duration) -> Vec<Item> {
-    if banner(model, now).is_some() {
-        return Vec::new();
-    }
     let vehicle = &model.vehicle;
     if is_unheard(vehicle, now) {
         return lost(model, now);
@@ -279,9 +270,6 @@ pub fn flight_headline(model: &Model, now: Duration) -> Vec<Item> {
 
 /// Time to touchdown and its predicted speed; height and vertical speed.
 pub fn burn_headline(model: &Model, now: Duration) -> Vec<Item> {
-    if banner(model, now).is_some() {
-        return Vec::new();
-    }
     let vehicle = &model.vehicle;
     if is_unheard(vehicle, now) {
         return lost(model, now);
@@ -296,17 +284,14 @@ pub fn burn_headline(model: &Model, now: Duration) -> Vec<Item> {
 
 /// The verdict.
 pub fn verdict_headline(model: &Model, now: Duration) -> Vec<Item> {
-    if banner(model, now).is_some() {
-        return Vec::new();
-    }
-    let (word, role) = match Ending::of(&model.vehicle, now) {
+    let (text, role) = match Ending::of(&model.vehicle, now) {
         Some(Ending::Landed) => ("LANDED", TextRole::Good),
         Some(Ending::UnderParachute) => ("PARACHUTE", TextRole::Caution),
         Some(Ending::Hard) => ("HARD", TextRole::Alarm),
         Some(Ending::Lost) => ("LOST", TextRole::Alarm),
         None => ("NO VERDICT", TextRole::Caution),
     };
-    vec![Item { label: String::new(), text: [word.to_owned(), word.to_owned()], letters: [10; 2], role }]
+    vec![word("", text, 10, role)]
 }
 
 /// One word for what the vehicle does; its exact phase is in the top lines.
@@ -324,6 +309,11 @@ fn phase_word(phase: TdPhase) -> &'static str {
         TdPhase::TD_PHASE_TOUCHDOWN => "DOWN",
         TdPhase::TD_PHASE_CHUTE => "CHUTE",
     }
+}
+
+/// A word, and what it is, in so many letters.
+fn word(label: &str, text: &str, letters: u16, role: TextRole) -> Item {
+    Item { label: label.to_owned(), text: [text.to_owned(), text.to_owned()], letters: [letters; 2], role }
 }
 
 /// A number with its name and unit; the name of a stale one is marked.

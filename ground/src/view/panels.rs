@@ -7,28 +7,33 @@ use ratatui::text::{Line, Span};
 
 use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
 use crate::model::{
-    Attitude, BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, are_of_legs,
+    BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, are_of_legs,
     dead_reckoning::{Basis, is_unheard, predict_position},
     words,
 };
 
+/// Title and rows: altitude, speeds and attitude; after the loss of the link the predicted position.
+pub fn flight_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
+    if is_lost(model, now) {
+        return (LOST_TITLE, lost_rows(model, theme, now));
+    }
+    ("Flight", flight_rows(model, theme, now))
+}
+
 /// Altitude, speeds and attitude.
 pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
-    let (motion, attitude, body) = (vehicle.best_motion(), vehicle.attitude, vehicle.body_speed());
-    let of_motion = |pick: fn(&Motion) -> f64| motion.map(|known| known.map(pick));
-    let of_attitude = |pick: fn(&Attitude) -> f64| attitude.map(|known| known.map(pick));
-    let of_body = |pick: fn(&BodySpeed) -> f64| body.map(|known| known.map(pick));
+    let of_body = |pick: fn(&BodySpeed) -> f64| vehicle.body_speed().map(|known| known.map(pick));
     let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
     vec![
-        line("altitude", of_motion(|m| m.altitude_m), 2, "m"),
-        line("vertical", of_motion(|m| m.climb_m_s), 2, "m/s"),
-        line("horizontal", of_motion(Motion::horizontal_m_s), 2, "m/s"),
-        line("distance", of_motion(Motion::distance_m), 1, "m"),
+        line("altitude", vehicle.of_motion(|m| m.altitude_m), 2, "m"),
+        line("vertical", vehicle.of_motion(|m| m.climb_m_s), 2, "m/s"),
+        line("horizontal", vehicle.of_motion(Motion::horizontal_m_s), 2, "m/s"),
+        line("distance", vehicle.of_motion(Motion::distance_m), 1, "m"),
         line("u axial", of_body(|b| b.u_m_s), 2, "m/s"),
         line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
-        line("tilt", of_attitude(|a| a.tilt_rad.to_degrees()), 2, "deg"),
-        line("turn rate", of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
+        line("tilt", vehicle.tilt_deg(), 2, "deg"),
+        line("turn rate", vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
     ]
 }
 
@@ -351,6 +356,8 @@ pub fn limit_bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
 }
 
 // The panel of the predicted position after the link is lost in flight.
+
+pub const LOST_TITLE: &str = "PREDICTED, not heard";
 
 /// Whether the position of a vehicle in flight is stale.
 pub fn is_lost(model: &Model, now: Duration) -> bool {

@@ -101,44 +101,49 @@ pub fn draw_side_view(
     let view = Bounds::around(&points, limit_m, area);
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
     let label = |text: String| theme.line(text, TextRole::Label);
-    let canvas = Canvas::default()
-        .marker(Marker::Braille)
-        .background_color(theme.back())
-        .x_bounds([left, right])
-        .y_bounds([bottom, top])
-        .paint(|context| {
-            context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: theme.ink(Ink::Ground) });
-            for side in [-PAD_HALF_M, PAD_HALF_M] {
-                context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: theme.ink(Ink::Body) });
-            }
-            for x in limit_m.into_iter().flat_map(|limit_m| [-limit_m, limit_m]) {
-                let y2 = LIMIT_DOTS * per_dot;
-                context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: theme.ink(Ink::Limit) });
-            }
-            context.draw(&Points { coords: predicted, color: theme.ink(Ink::Planned) });
-            for pair in flown.windows(2) {
-                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
-                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Flown) });
-            }
-            if let Some(((x, y), radius)) = lost {
-                context.draw(&Circle { x, y, radius, color: theme.ink(Ink::Predicted) });
-                context.print(x, y, "+");
-            }
-            let step = widgets::tick_step(top, usize::from(area.height / TICK_ROWS));
-            for height in widgets::ticks(step, top - DOTS_UP * per_dot, step) {
-                context.print(left, height, label(format!("{} m", shortest(height))));
-            }
-            let step = widgets::tick_step(right - left, usize::from(area.width / TICK_COLUMNS));
-            let margin = DOTS_ACROSS * per_dot;
-            for x in widgets::ticks(left + margin, right - 6.0 * margin, step) {
-                context.print(x, bottom, label(format!("'{}", shortest(x))));
-            }
-            if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
-                let words = theme.either_side(&format!("limit ±{} m", shortest(limit_m)));
-                context.print(right - words.chars().count() as f64 * margin, top, label(words));
-            }
-        });
+    let canvas = canvas(theme, [left, right], [bottom, top], |context| {
+        context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: theme.ink(Ink::Ground) });
+        for side in [-PAD_HALF_M, PAD_HALF_M] {
+            context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: theme.ink(Ink::Body) });
+        }
+        for x in limit_m.into_iter().flat_map(|limit_m| [-limit_m, limit_m]) {
+            let y2 = LIMIT_DOTS * per_dot;
+            context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: theme.ink(Ink::Limit) });
+        }
+        context.draw(&Points { coords: predicted, color: theme.ink(Ink::Planned) });
+        draw_flown(context, &flown, theme.ink(Ink::Flown));
+        if let Some(((x, y), radius)) = lost {
+            context.draw(&Circle { x, y, radius, color: theme.ink(Ink::Predicted) });
+            context.print(x, y, "+");
+        }
+        let step = widgets::tick_step(top, usize::from(area.height / TICK_ROWS));
+        for height in widgets::ticks(step, top - DOTS_UP * per_dot, step) {
+            context.print(left, height, label(format!("{} m", shortest(height))));
+        }
+        let step = widgets::tick_step(right - left, usize::from(area.width / TICK_COLUMNS));
+        let margin = DOTS_ACROSS * per_dot;
+        for x in widgets::ticks(left + margin, right - 6.0 * margin, step) {
+            context.print(x, bottom, label(format!("'{}", shortest(x))));
+        }
+        if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > right || -*limit_m < left) {
+            let words = theme.either_side(&format!("limit ±{} m", shortest(limit_m)));
+            context.print(right - words.chars().count() as f64 * margin, top, label(words));
+        }
+    });
     frame.render_widget(canvas, area);
+}
+
+/// A picture in braille dots.
+fn canvas<F: Fn(&mut Context)>(theme: Theme, x: [f64; 2], y: [f64; 2], paint: F) -> Canvas<'static, F> {
+    let canvas = Canvas::default().marker(Marker::Braille).background_color(theme.back());
+    canvas.x_bounds(x).y_bounds(y).paint(paint)
+}
+
+fn draw_flown(context: &mut Context, flown: &[(f64, f64)], color: Color) {
+    for pair in flown.windows(2) {
+        let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
+        context.draw(&Line { x1, y1, x2, y2, color });
+    }
 }
 
 /// The section that the picture shows, m.
@@ -236,46 +241,38 @@ pub fn draw_top_view(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     let per_dot = 1.1 * 2.0 * reach_m / across.min(up - DOTS_UP);
     let (half_x, half_y) = (per_dot * across / 2.0, per_dot * up / 2.0);
     let label = |text: String| theme.line(text, TextRole::Label);
-    let canvas = Canvas::default()
-        .marker(Marker::Braille)
-        .background_color(theme.back())
-        .x_bounds([-half_x, half_x])
-        .y_bounds([-half_y, half_y])
-        .paint(|context| {
-            if let Some(radius) = fence_m {
-                context.draw(&Circle { x: 0.0, y: 0.0, radius, color: theme.ink(Ink::Limit) });
-            }
-            let pad = PAD_HALF_M.max(2.0 * per_dot);
-            for (x1, y1, x2, y2) in [(-pad, 0.0, pad, 0.0), (0.0, -pad, 0.0, pad)] {
-                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Body) });
-            }
-            for pair in flown.windows(2) {
-                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
-                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Flown) });
-            }
-            if let Some(at) = down {
-                let radius = at.radius_m.max(2.0 * per_dot);
-                context.draw(&Circle { x: at.east_m, y: at.north_m, radius, color: theme.ink(Ink::Planned) });
-                context.print(at.east_m, at.north_m, "x");
-            }
-            if let Some(at) = lost {
-                let radius = at.error_m;
-                context.draw(&Circle { x: at.y_m, y: at.x_m, radius, color: theme.ink(Ink::Predicted) });
-                context.print(at.y_m, at.x_m, "+");
-            } else if let Some((east, north)) = flown.last() {
-                context.print(*east, *north, "o");
-            }
-            let step = widgets::tick_step(2.0 * half_x, usize::from(area.width / TICK_COLUMNS));
-            let margin = DOTS_ACROSS * per_dot;
-            for x in widgets::ticks(margin - half_x, half_x - 6.0 * margin, step) {
-                context.print(x, -half_y, label(format!("'{}", shortest(x))));
-            }
-            context.print(-half_x, half_y, label(wind(model)));
-            if let Some(fence_m) = fence_m.filter(|fence_m| *fence_m > half_x.min(half_y)) {
-                let words = format!("fence {} m", shortest(fence_m));
-                context.print(half_x - words.len() as f64 * margin, half_y, label(words));
-            }
-        });
+    let canvas = canvas(theme, [-half_x, half_x], [-half_y, half_y], |context| {
+        if let Some(radius) = fence_m {
+            context.draw(&Circle { x: 0.0, y: 0.0, radius, color: theme.ink(Ink::Limit) });
+        }
+        let pad = PAD_HALF_M.max(2.0 * per_dot);
+        for (x1, y1, x2, y2) in [(-pad, 0.0, pad, 0.0), (0.0, -pad, 0.0, pad)] {
+            context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Body) });
+        }
+        draw_flown(context, &flown, theme.ink(Ink::Flown));
+        if let Some(at) = down {
+            let radius = at.radius_m.max(2.0 * per_dot);
+            context.draw(&Circle { x: at.east_m, y: at.north_m, radius, color: theme.ink(Ink::Planned) });
+            context.print(at.east_m, at.north_m, "x");
+        }
+        if let Some(at) = lost {
+            let radius = at.error_m;
+            context.draw(&Circle { x: at.y_m, y: at.x_m, radius, color: theme.ink(Ink::Predicted) });
+            context.print(at.y_m, at.x_m, "+");
+        } else if let Some((east, north)) = flown.last() {
+            context.print(*east, *north, "o");
+        }
+        let step = widgets::tick_step(2.0 * half_x, usize::from(area.width / TICK_COLUMNS));
+        let margin = DOTS_ACROSS * per_dot;
+        for x in widgets::ticks(margin - half_x, half_x - 6.0 * margin, step) {
+            context.print(x, -half_y, label(format!("'{}", shortest(x))));
+        }
+        context.print(-half_x, half_y, label(wind(model)));
+        if let Some(fence_m) = fence_m.filter(|fence_m| *fence_m > half_x.min(half_y)) {
+            let words = format!("fence {} m", shortest(fence_m));
+            context.print(half_x - words.len() as f64 * margin, half_y, label(words));
+        }
+    });
     frame.render_widget(canvas, area);
 }
 
@@ -346,33 +343,28 @@ pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     // In rows; a column is half as wide as a row is high.
     let (across, up) = (f64::from(FIN_PICTURE_COLUMNS - 1) / 4.0, f64::from(FIN_PICTURE_ROWS - 1) / 2.0);
     let text = |words: String, role: TextRole| theme.line(words, role);
-    let canvas = Canvas::default()
-        .marker(Marker::Braille)
-        .background_color(theme.back())
-        .x_bounds([-across, across])
-        .y_bounds([-up, up])
-        .paint(|context| {
-            context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: theme.ink(Ink::Body) });
-            for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
-                let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
-                arm(context, (east, north), fin, theme.ink(Ink::Planned), theme.ink(Ink::Ground));
-                let apart = fin.error_deg() > APART_DEG;
-                let degrees = fixed(fin.measured_rad.to_degrees(), 0);
-                let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
-                // A label extends outwards.
-                let leads_left = if east < 0.0 { 0.5 * words.len() as f64 - 0.5 } else { 0.0 };
-                let role = if apart { TextRole::Caution } else { role };
-                context.print(column(LABEL * east - leads_left), (LABEL * north).round(), text(words, role));
-            }
-            if model.vehicle.attitude.is_some() {
-                context.print(0.0, up, text("N".to_owned(), TextRole::Title));
-            }
-            let motion = model.vehicle.motion;
-            if let Some((east, north)) = motion.and_then(|motion| to_pad(&motion.value)) {
-                let (x, y) = on_border((east, north), (across, up));
-                context.print(column(x), y.round(), text("P".to_owned(), TextRole::Title));
-            }
-        });
+    let canvas = canvas(theme, [-across, across], [-up, up], |context| {
+        context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: theme.ink(Ink::Body) });
+        for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
+            let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
+            arm(context, (east, north), fin, theme.ink(Ink::Planned), theme.ink(Ink::Ground));
+            let apart = fin.error_deg() > APART_DEG;
+            let degrees = fixed(fin.measured_rad.to_degrees(), 0);
+            let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });
+            // A label extends outwards.
+            let leads_left = if east < 0.0 { 0.5 * words.len() as f64 - 0.5 } else { 0.0 };
+            let role = if apart { TextRole::Caution } else { role };
+            context.print(column(LABEL * east - leads_left), (LABEL * north).round(), text(words, role));
+        }
+        if model.vehicle.attitude.is_some() {
+            context.print(0.0, up, text("N".to_owned(), TextRole::Title));
+        }
+        let motion = model.vehicle.motion;
+        if let Some((east, north)) = motion.and_then(|motion| to_pad(&motion.value)) {
+            let (x, y) = on_border((east, north), (across, up));
+            context.print(column(x), y.round(), text("P".to_owned(), TextRole::Title));
+        }
+    });
     frame.render_widget(canvas, area);
 }
 

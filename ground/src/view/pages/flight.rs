@@ -34,13 +34,18 @@ pub fn draw_flying(
     area: Rect,
 ) {
     let roomy = is_roomy(area);
-    let area = headline::draw_headline(&headline::flight_headline(model, now), theme, frame, area);
+    let area = headline::draw_headline(
+        &headline::headline(model, now, headline::flight_headline),
+        theme,
+        frame,
+        area,
+    );
     let [gauge_columns, value_columns] = if roomy { ROOMY_COLUMNS } else { NARROW_COLUMNS };
     let [gauge_area, middle, right] =
         side_by_side(area, [Length(gauge_columns), Length(value_columns), Fill(1)]);
     let inside = titled("Height, m", theme, frame, gauge_area);
     draw_lines(frame, inside, &widgets::gauge_lines(model, theme, now, usize::from(inside.height)));
-    let title = if panels::is_lost(model, now) { "PREDICTED, not heard" } else { title };
+    let title = if panels::is_lost(model, now) { panels::LOST_TITLE } else { title };
     draw_values(model, (title, values, roomy), theme, now, frame, middle);
     draw_pictures(model, fins_steer && roomy, theme, now, frame, right);
 }
@@ -109,17 +114,14 @@ pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'sta
 /// The values, the most important first.
 fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = panels::lost_rows(model, theme, now);
-    let motion = model.vehicle.best_motion();
     let of = |pick| model.vehicle.of_descent(pick);
     lines.push(motor(model, theme, now));
     lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
     lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
     lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
     lines.push(booster(model, theme, now));
-    let horizontal = motion.map(|motion| motion.map(Motion::horizontal_m_s));
-    let distance = motion.map(|motion| motion.map(Motion::distance_m));
-    lines.push(row(theme, "horizontal", horizontal, 1, "m/s", now));
-    lines.push(row(theme, "distance", distance, 1, "m", now));
+    lines.push(row(theme, "horizontal", model.vehicle.of_motion(Motion::horizontal_m_s), 1, "m/s", now));
+    lines.push(row(theme, "distance", model.vehicle.of_motion(Motion::distance_m), 1, "m", now));
     lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 0, "m", now));
     lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 0, "m", now));
     lines
@@ -183,11 +185,8 @@ pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'st
 /// The values, the most important first.
 fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = panels::lost_rows(model, theme, now);
-    let motion = model.vehicle.best_motion();
     let of = |pick| model.vehicle.of_descent(pick);
-    let of_motion = |pick: fn(&Motion) -> f64| {
-        motion.map(|motion| motion.map(pick)).filter(|sample| !sample.value.is_nan())
-    };
+    let of_motion = |pick| model.vehicle.of_motion(pick).filter(|sample| !sample.value.is_nan());
     let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
     lines.push(band_word(model, theme, now));
     lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));

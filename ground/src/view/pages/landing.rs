@@ -29,9 +29,9 @@ const FIN_ROWS: u16 = 5;
 /// Draws the headline, the panels, the events and the side view.
 pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let first = if model.vehicle.verdict.is_some() {
-        headline::verdict_headline(model, now)
+        headline::headline(model, now, headline::verdict_headline)
     } else {
-        headline::burn_headline(model, now)
+        headline::headline(model, now, headline::burn_headline)
     };
     let roomy = is_roomy(area);
     let area = headline::draw_headline(&first, theme, frame, area);
@@ -73,15 +73,11 @@ fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 
 /// Altitude, speeds and attitude; after the loss of the link the predicted position.
 fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if panels::is_lost(model, now) {
-        panel("PREDICTED, not heard", &panels::lost_rows(model, theme, now), theme, frame, area);
-    } else {
-        let inside = titled("Flight", theme, frame, area);
-        let mut rows = panels::controller_rows(model, theme, now);
-        rows.truncate(1);
-        rows.extend(panels::flight_rows(model, theme, now));
-        draw_lines(frame, inside, &rows);
+    let (title, mut rows) = panels::flight_panel(model, theme, now);
+    if !panels::is_lost(model, now) {
+        rows.splice(0..0, panels::controller_rows(model, theme, now).into_iter().take(1));
     }
+    panel(title, &rows, theme, frame, area);
 }
 
 fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -98,9 +94,8 @@ fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let mut lines: Vec<Line> = panels::controller_rows(model, theme, now).into_iter().take(1).collect();
     let vehicle = &model.vehicle;
     lines.push(row(theme, "tilt", vehicle.tilt_deg(), 2, "deg", now));
-    let motion = vehicle.best_motion();
-    lines.push(row(theme, "horizontal", motion.map(|m| m.map(Motion::horizontal_m_s)), 2, "m/s", now));
-    lines.push(row(theme, "distance", motion.map(|m| m.map(Motion::distance_m)), 1, "m", now));
+    lines.push(row(theme, "horizontal", vehicle.of_motion(Motion::horizontal_m_s), 2, "m/s", now));
+    lines.push(row(theme, "distance", vehicle.of_motion(Motion::distance_m), 1, "m", now));
     lines.extend(panels::gimbal_rows(model, theme, now));
     draw_lines(frame, inside, &lines);
 }
@@ -160,11 +155,8 @@ fn value(
 }
 
 fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let motion = model.vehicle.best_motion();
-    let altitude = motion.map(|motion| motion.map(|m| m.altitude_m));
-    let climb = motion.map(|motion| motion.map(|m| m.climb_m_s));
-    let mut spans = value(theme, "alt", altitude, 1, now);
-    spans.extend(value(theme, "vz", climb, 1, now));
+    let mut spans = value(theme, "alt", model.vehicle.of_motion(|m| m.altitude_m), 1, now);
+    spans.extend(value(theme, "vz", model.vehicle.of_motion(|m| m.climb_m_s), 1, now));
     Line::from(spans)
 }
 
@@ -197,7 +189,12 @@ const TABLE_COLUMNS: u16 = 80;
 /// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let roomy = is_roomy(area);
-    let area = headline::draw_headline(&headline::verdict_headline(model, now), theme, frame, area);
+    let area = headline::draw_headline(
+        &headline::headline(model, now, headline::verdict_headline),
+        theme,
+        frame,
+        area,
+    );
     let columns = if roomy { TABLE_COLUMNS } else { area.width };
     let mut lines = review_lines(model, theme, now, usize::from(columns));
     if !roomy {

@@ -31,7 +31,7 @@ const LADDER_COLUMNS: u16 = 40;
 
 /// Draws GO or NO-GO, the checks and the ladder, the events below.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let foremost = headline::pad_headline(model, now);
+    let foremost = headline::headline(model, now, headline::pad_headline);
     let (checks, ladder) = (checks(model, theme, now), ladder(model, theme, now));
     let lists_steps = model.checklist.is_some() && model.pages.checklist && !is_roomy(area);
     let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };

@@ -150,8 +150,7 @@ pub fn draw_path(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 
 /// The position in numbers, for small screens.
 pub fn path_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let motion = model.vehicle.best_motion();
-    let of = |pick: fn(&Motion) -> f64| motion.map(|motion| motion.map(pick));
+    let of = |pick| model.vehicle.of_motion(pick);
     let mut lines = panels::lost_rows(model, theme, now);
     if lines.is_empty() {
         lines = vec![
@@ -203,12 +202,7 @@ pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let half = Length(CONTROLLER_ROWS);
     let [flight_area, below_flight] = stacked(left, [half, Fill(1)]);
     let [controller_area, below_controller] = stacked(middle, [half, Fill(1)]);
-    let lost = panels::is_lost(model, now);
-    let (title, rows) = if lost {
-        ("PREDICTED, not heard", panels::lost_rows(model, theme, now))
-    } else {
-        ("Flight", panels::flight_rows(model, theme, now))
-    };
+    let (title, rows) = panels::flight_panel(model, theme, now);
     panel(title, &rows, theme, frame, flight_area);
     panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, below_flight);
     panel("Controller (NMPC)", &panels::controller_rows(model, theme, now), theme, frame, controller_area);
