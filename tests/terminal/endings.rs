@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use e2e::{Signal, Terminal};
-use ground::app::log::LogGuard;
+use ground::app::files::LogGuard;
 use ground::app::screen::Screen;
 use ground::config::Config;
 use protocol::log::reader::{LogItem, LogReader};
