@@ -64,7 +64,7 @@ fn a_crew_checks_its_vehicle_and_then_arms_it() {
     // The computer, given the recorded requests again, checks the same and finds the same.
     let (code, words) = replay(folder.path(), &["verify", "vehicle.mcap"]);
     assert_eq!(code, Some(0), "{words}");
-    let (code, words) = replay(folder.path(), &["audit", "ground.mcap", "vehicle.mcap"]);
+    let (code, words) = replay(folder.path(), &["verify", "--book", "ground.mcap", "vehicle.mcap"]);
     assert_eq!(code, Some(0), "{words}");
 }
 

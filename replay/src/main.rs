@@ -1,13 +1,11 @@
 //! The `replay` command.
 
-mod cli;
-
 use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use cli::Cli;
+use replay::cli::{self, Cli};
 
 /// Every exit code is decided here, and listed in the help of [`Cli`].
 fn main() -> ExitCode {

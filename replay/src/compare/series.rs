@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::Anchors;
+use flight::rules::phase::Phase;
+use serde::Serialize;
+
+use super::CompareError;
 use crate::info::VerdictFacts;
 use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts, heard_message};
 use crate::table::{Cell, Kind, TableReader, TableShape};
@@ -195,6 +198,160 @@ fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
     cells.get(place)?.number().filter(|time_s| time_s.is_finite())
 }
 
+/// The event on which the flights are aligned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Align {
+    /// Ignition of the landing motor.
+    Ignition,
+    /// Touchdown, from the verdict.
+    Touchdown,
+    /// Vehicle time itself.
+    Time,
+}
+
+/// The moments of a flight to align on, vehicle time, s.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Anchors {
+    /// Ignition of the landing motor.
+    pub ignition_s: Option<f64>,
+    pub touchdown_s: Option<f64>,
+}
+
+impl Anchors {
+    /// Looks for the ignition in a record.
+    pub(super) fn note(&mut self, entry: &Entry) {
+        if self.ignition_s.is_some() {
+            return;
+        }
+        let lit = |phase: u32| {
+            u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn)
+        };
+        match entry {
+            Entry::PilotTick(tick) if lit(tick.output.phase) => self.ignition_s = Some(tick.input.time_s),
+            Entry::Telemetry(telemetry) if telemetry.phase.is_some_and(lit) => {
+                self.ignition_s = Some(telemetry.time_s);
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Align {
+    /// What to add to the other flight's times, s.
+    pub(super) fn shift_s(self, baseline: &Flown, other: &Flown) -> Result<f64, CompareError> {
+        let (event, anchor): (_, fn(&Anchors) -> Option<f64>) = match self {
+            Self::Time => return Ok(0.0),
+            Self::Ignition => ("ignition", |anchors| anchors.ignition_s),
+            Self::Touchdown => ("touchdown", |anchors| anchors.touchdown_s),
+        };
+        let of = |flown: &Flown| {
+            anchor(&flown.anchors).ok_or(CompareError::NoAnchor { name: flown.name.clone(), event })
+        };
+        Ok(of(baseline)? - of(other)?)
+    }
+
+    /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.
+    pub fn best_for(baseline: &Flown, other: &Flown) -> Self {
+        if baseline.only_one_has_ticks(other) {
+            return Self::Time;
+        }
+        let both = baseline.anchors.ignition_s.is_some() && other.anchors.ignition_s.is_some();
+        if both { Self::Ignition } else { Self::Time }
+    }
+}
+
+/// Fraction of a period: samples of flights aligned on an event are up to half a period apart.
+const PERIOD_SHARE: f64 = 0.6;
+/// Tolerance for rounding: times are sums of periods.
+const SAME_S: f64 = 5e-7;
+
+/// Samples of a signal in two flights.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Samples {
+    /// Samples of the baseline.
+    #[serde(rename = "samples_expected")]
+    pub expected: usize,
+    /// Baseline samples that the other flight lacks.
+    #[serde(rename = "samples_missing")]
+    pub missing: usize,
+    /// Samples that only the other flight has.
+    #[serde(rename = "samples_added")]
+    pub added: usize,
+}
+
+impl Samples {
+    /// Pairs the samples of two signals; `shift_s` is added to the second's times.
+    pub(super) fn of(a: &Series, b: &Series, shift_s: f64) -> Self {
+        let (ours, theirs) = (&a.times_s, &b.times_s);
+        let mut paired = 0;
+        if ours.len() == 1 && theirs.len() == 1 {
+            // A value recorded once has no period, and may come before the event on which flights are aligned.
+            paired = 1;
+        } else {
+            let period_s = typical_period_s(ours).min(typical_period_s(theirs));
+            let near_s = SAME_S + PERIOD_SHARE * period_s;
+            let mut waiting = theirs.iter().map(|time_s| time_s + shift_s).peekable();
+            for time_s in ours {
+                while waiting.next_if(|other_s| *other_s < time_s - near_s).is_some() {}
+                paired += usize::from(waiting.next_if(|other_s| *other_s <= time_s + near_s).is_some());
+            }
+        }
+        Self { expected: ours.len(), missing: ours.len() - paired, added: theirs.len() - paired }
+    }
+
+    /// The share of the baseline's samples that is missing.
+    pub(super) fn missing_share(self) -> f64 {
+        share(self.missing, self.expected)
+    }
+
+    /// The share of the other's samples that is added.
+    pub(super) fn added_share(self) -> f64 {
+        share(self.added, self.expected - self.missing + self.added)
+    }
+}
+
+fn share(part: usize, whole: usize) -> f64 {
+    if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
+}
+
+/// The median step between times; infinite for a single time.
+fn typical_period_s(times_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
+/// Signals of one log, by name.
+type Signals = BTreeMap<String, Series>;
+
+/// The time between the first and the last sample of a log, s.
+fn recorded_s(signals: &Signals) -> Option<[f64; 2]> {
+    let first = signals.values().filter_map(|series| series.times_s.first().copied()).reduce(f64::min)?;
+    let last = signals.values().filter_map(|series| series.times_s.last().copied()).reduce(f64::max)?;
+    Some([first, last])
+}
+
+/// The time that two logs have in common, in the first's time, s; the second's times are shifted. `None` if there is none.
+pub(super) fn common_s(a: &Signals, b: &Signals, shift_s: f64) -> Option<[f64; 2]> {
+    let ([from_a, to_a], [from_b, to_b]) = (recorded_s(a)?, recorded_s(b)?);
+    let common = [from_a.max(from_b + shift_s), to_a.min(to_b + shift_s)];
+    (common[0] < common[1]).then_some(common)
+}
+
+/// The signals with what lies within a time. Of the instants at both ends a log may have a part of the messages, so they
+/// are left out.
+pub(super) fn within(signals: &Signals, [from_s, to_s]: [f64; 2]) -> Signals {
+    let part = |(name, series): (&String, &Series)| {
+        let kept = series.times_s.partition_point(|time_s| *time_s <= from_s)
+            ..series.times_s.partition_point(|time_s| *time_s < to_s);
+        let (times_s, values) = (series.times_s.get(kept.clone())?, series.values.get(kept)?);
+        let some = Series { times_s: times_s.to_vec(), values: values.to_vec(), whole: series.whole };
+        (!times_s.is_empty()).then(|| (name.clone(), some))
+    };
+    signals.iter().filter_map(part).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,5 +366,53 @@ mod tests {
         series.whole = true;
         assert_eq!(series.at(1.9), Some(10.0));
         assert_eq!(series.at(2.1), None);
+    }
+
+    fn found(ours: &[f64], theirs: &[f64]) -> (usize, usize) {
+        let series = |times: &[f64]| Series { times_s: times.to_vec(), values: times.to_vec(), whole: false };
+        let samples = Samples::of(&series(ours), &series(theirs), 0.0);
+        assert_eq!(samples.expected, ours.len());
+        (samples.missing, samples.added)
+    }
+
+    #[test]
+    fn samples_are_paired_once_and_by_their_times() {
+        let whole: Vec<f64> = (0..10).map(f64::from).collect();
+        let half: Vec<f64> = (0..5).map(|place| 2.0 * f64::from(place)).collect();
+        assert_eq!(found(&whole, &whole), (0, 0));
+        assert_eq!(found(&whole, &half), (5, 0));
+        assert_eq!(found(&half, &whole), (0, 5));
+        let shifted: Vec<f64> = whole.iter().map(|time_s| time_s + 0.5).collect();
+        assert_eq!(found(&whole, &shifted), (0, 0));
+        let mut hole = whole.clone();
+        hole.remove(4);
+        assert_eq!((found(&whole, &hole), found(&hole, &whole)), ((1, 0), (0, 1)));
+        assert_eq!(found(&whole, &whole[..7]), (3, 0));
+        assert_eq!(found(&whole, &[]), (10, 0));
+        assert_eq!(found(&[0.0], &[7.0]), (0, 0));
+        // Two records at the same time count as two.
+        assert_eq!(found(&[0.0, 0.0, 1.0], &[0.0, 1.0]), (1, 0));
+    }
+
+    fn log(times: &[(&str, &[f64])]) -> Signals {
+        let series = |times_s: &[f64]| Series {
+            times_s: times_s.to_vec(),
+            values: times_s.iter().map(|time_s| 10.0 * time_s).collect(),
+            whole: false,
+        };
+        times.iter().map(|(name, times_s)| ((*name).to_owned(), series(times_s))).collect()
+    }
+
+    #[test]
+    fn only_the_time_that_both_recorded_is_kept() {
+        let vehicle = log(&[("x", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]), ("start", &[0.0]), ("end", &[5.0])]);
+        let station = log(&[("x", &[-8.0, -7.0, -6.0]), ("start", &[]), ("end", &[])]);
+        let common = common_s(&vehicle, &station, 9.0);
+        assert_eq!(common, Some([1.0, 3.0]));
+        assert_eq!(within(&vehicle, [1.0, 3.0]), log(&[("x", &[2.0])]));
+        assert_eq!(common_s(&vehicle, &station, 0.0), None);
+        assert_eq!(common_s(&vehicle, &Signals::new(), 0.0), None);
+        // A time that ends before it begins holds nothing.
+        assert_eq!(within(&vehicle, [3.0, 1.0]), Signals::new());
     }
 }

@@ -1,22 +1,30 @@
 //! Writes the content of a log in the formats of other programs.
 //!
 //! * [`export_tables`]: CSV or Parquet, one file a table; see [`table`](crate::table).
-//! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back.
+//! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back; [`import_tlog`]: a flight log of one.
+//! * [`write_frames`]: the stream that a board reads, and the answers that it should give.
 //!
 //! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
-mod csv;
-mod dictionary;
-mod parquet;
+mod frames;
 mod tables;
 mod tlog;
 
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::{Args, ValueEnum};
+pub use frames::{FramesError, write_frames};
 pub use tables::{ExportedFile, TableFormat, export_tables};
-pub use tlog::{ExportedTlog, export_tlog};
+pub use tlog::{ExportedTlog, ImportError, ImportProgress, ImportedTlog, export_tlog, import_tlog};
 
-use std::path::PathBuf;
-
-use crate::log::LogError;
+use crate::cli::{Answer, answer, say, warn_of_damage};
+use crate::log::{FlightLog, LogError};
+use crate::output::{Destination, Overwrite};
+use crate::print::print_json;
+use serde::Serialize;
 
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -47,4 +55,148 @@ pub enum ExportError {
         found: String,
         wanted: String,
     },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The log, an MCAP file, or the telemetry log of a ground station, a .tlog.
+    file: PathBuf,
+    /// The format; a .tlog becomes a log.
+    #[arg(long, value_enum)]
+    to: Option<Format>,
+    /// Output: a directory for csv and parquet (one file for each table) and for frames, otherwise a file; of a .tlog its
+    /// name with .mcap if left out.
+    #[arg(long, short, value_name = "PATH")]
+    output: Option<PathBuf>,
+    /// For tlog: the endpoint whose frames are written, if the log has several [default: ground].
+    #[arg(long, value_name = "vehicle|ground")]
+    endpoint: Option<String>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Comma-separated values.
+    Csv,
+    /// Apache Parquet.
+    Parquet,
+    /// Raw MAVLink frames, for ground stations.
+    Tlog,
+    /// Rerun; a separate program writes it.
+    Rrd,
+    /// The frames that `board fly` reads, and the answers recorded to them, as the files frames and recorded.
+    Frames,
+    /// A log, of a .tlog.
+    Mcap,
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        let is_tlog = self.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+        let format = self.to.or(is_tlog.then_some(Format::Mcap));
+        let format = format.context("--to is missing: csv, parquet, tlog, rrd or frames")?;
+        let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
+        let output = output.context("--output is missing: where to write")?;
+        let destination = Destination { path: &output, overwrite: Overwrite::if_forced(self.force) };
+        match format {
+            Format::Csv => self.tables(TableFormat::Csv, destination),
+            Format::Parquet => self.tables(TableFormat::Parquet, destination),
+            Format::Tlog => self.tlog(destination),
+            Format::Rrd => self.rerun(&output),
+            Format::Frames => {
+                let written = write_frames(&self.file, destination)?;
+                self.answer(&written, |output| writeln!(output, "{written} frames"))
+            }
+            Format::Mcap => self.log(destination),
+        }
+    }
+
+    fn answer(
+        &self,
+        written: &impl Serialize,
+        words: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
+    ) -> Result<Answer> {
+        answer(|output| if self.json { print_json(written, output) } else { words(output) })?;
+        Ok(Answer::Given)
+    }
+
+    fn tables(&self, format: TableFormat, destination: Destination) -> Result<Answer> {
+        let mut log = FlightLog::open(&self.file)?;
+        let files = export_tables(&mut log, format, destination)?;
+        self.answer(&files, |output| {
+            files.iter().try_for_each(|file| {
+                writeln!(output, "{}: {} rows of {} columns", file.path.display(), file.rows, file.columns)
+            })
+        })?;
+        warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
+        Ok(Answer::Given)
+    }
+
+    fn tlog(&self, destination: Destination) -> Result<Answer> {
+        let open = || FlightLog::open(&self.file);
+        let written = export_tlog(&open, self.endpoint.as_deref(), destination)?;
+        self.answer(&written, |output| {
+            let path = destination.path.display();
+            let (received, sent) = (written.received, written.sent);
+            writeln!(output, "{path}: {received} frames received and {sent} sent by the {}", written.endpoint)
+        })?;
+        warn_of_damage(&self.file.display().to_string(), written.damage.as_deref());
+        Ok(Answer::Given)
+    }
+
+    fn log(&self, destination: Destination) -> Result<Answer> {
+        let mut told = 0;
+        let imported = import_tlog(&self.file, destination, &mut |progress| tell(progress, &mut told))?;
+        self.answer(&imported, |output| {
+            writeln!(
+                output,
+                "{}: {} frames, {} of them not understood, and {} records of telemetry; left out: {} frames of MAVLink 1, {} bytes of no frame",
+                destination.path.display(),
+                imported.frames,
+                imported.not_understood,
+                imported.telemetry,
+                imported.mavlink1,
+                imported.garbage_bytes
+            )
+        })
+    }
+
+    /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
+    /// beside this one.
+    fn rerun(&self, output: &Path) -> Result<Answer> {
+        let program =
+            std::env::current_exe().context("where this program lies")?.with_file_name("replay-rerun");
+        let (log, recording) = (self.file.display(), output.display());
+        if !program.exists() {
+            bail!(
+                "the export to Rerun is not built (it takes some ten minutes): \
+                 cargo run --release -p replay-rerun -- {log} --output {recording}"
+            );
+        }
+        let status = Command::new(&program)
+            .arg(&self.file)
+            .arg("--output")
+            .arg(output)
+            .args(self.force.then_some("--force"))
+            .status()
+            .with_context(|| format!("{}", program.display()))?;
+        ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
+        Ok(Answer::Given)
+    }
+}
+
+/// Reports every tenth of the progress of a long import.
+fn tell(ImportProgress { read, total }: ImportProgress, told: &mut u64) {
+    const LARGE_BYTES: u64 = 32_000_000;
+    const MEGABYTE: u64 = 1_000_000;
+    let tenths = (10 * read).checked_div(total).unwrap_or(0);
+    if total > LARGE_BYTES && tenths > *told {
+        *told = tenths;
+        say(&format!("{} of {} MB", read / MEGABYTE, total / MEGABYTE));
+    }
 }

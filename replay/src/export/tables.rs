@@ -1,17 +1,23 @@
 //! Writes tables into files.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::metadata::KeyValue;
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use ::parquet::schema::types::Type;
 use serde::Serialize;
 
-use super::csv::CsvTable;
-use super::parquet::ParquetTable;
-use super::{ExportError, dictionary};
+use super::ExportError;
 use crate::log::FlightLog;
 use crate::output::{Destination, NewFile};
-use crate::table::{Row, TableReader, TableShape};
+use crate::table::{Cell, Column, Kind, Meaning, Row, TableReader, TableShape};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableFormat {
@@ -62,13 +68,13 @@ pub fn export_tables<'a, R: Read>(
     let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     let mut whole = whole;
     if !whole.is_empty() {
-        let path = directory.path.join(dictionary::FILE);
+        let path = directory.path.join(DICTIONARY);
         let failed = |source| ExportError::Write { path: path.clone(), source };
         let destination = Destination { path: &path, overwrite: directory.overwrite };
         let file = NewFile::create(destination, &input).map_err(failed)?;
         let shapes: Vec<&TableShape> = reader.shapes().iter().collect();
-        let (written, rows) = dictionary::write(file, &shapes)?;
-        whole.push((ExportedFile { path, rows, columns: dictionary::COLUMNS.len() }, written));
+        let (written, rows) = write_dictionary(file, &shapes)?;
+        whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
     }
     let mut files = Vec::new();
     for (file, written) in whole {
@@ -114,5 +120,231 @@ impl Table {
             Self::Csv(table) => table.finish(),
             Self::Parquet(table) => table.finish(),
         }
+    }
+}
+
+pub(super) struct CsvTable {
+    path: PathBuf,
+    output: BufWriter<NewFile>,
+}
+
+impl CsvTable {
+    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+        let path = file.path().to_owned();
+        let write = |source| ExportError::Write { path: path.clone(), source };
+        let mut output = BufWriter::new(file);
+        let names: Vec<String> = shape.columns.iter().map(|column| quoted(&column.name)).collect();
+        writeln!(output, "{}", names.join(",")).map_err(write)?;
+        Ok(Self { path, output })
+    }
+
+    pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+        let cells: Vec<String> = row.cells.iter().map(text_of).collect();
+        writeln!(self.output, "{}", cells.join(",")).map_err(|source| self.failed(source))
+    }
+
+    /// The complete file, still under its temporary name.
+    pub(super) fn finish(self) -> Result<NewFile, ExportError> {
+        let Self { path, output } = self;
+        output.into_inner().map_err(|error| ExportError::Write { path, source: error.into_error() })
+    }
+
+    fn failed(&self, source: std::io::Error) -> ExportError {
+        ExportError::Write { path: self.path.clone(), source }
+    }
+}
+
+fn text_of(cell: &Cell) -> String {
+    match cell {
+        Cell::Float(number) => format!("{number:?}"),
+        Cell::Integer(number) => number.to_string(),
+        Cell::Text(text) => quoted(text),
+        Cell::Absent => String::new(),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// The name of its file.
+const DICTIONARY: &str = "dictionary.csv";
+const DICTIONARY_COLUMNS: [&str; 6] = ["table", "column", "type", "unit", "meaning", "values"];
+
+/// Writes the dictionary of some tables. Returns the complete file, still under its temporary name, and its rows.
+fn write_dictionary(file: NewFile, shapes: &[&TableShape]) -> Result<(NewFile, u64), ExportError> {
+    let heads = DICTIONARY_COLUMNS.map(|name| Column {
+        name: name.to_owned(),
+        kind: Kind::Text,
+        meaning: Meaning::default(),
+    });
+    let mut table =
+        CsvTable::create(file, &TableShape { name: "dictionary".to_owned(), columns: heads.into() })?;
+    let mut rows = 0;
+    for shape in shapes {
+        for Column { name, kind, meaning } in &shape.columns {
+            let kind = match kind {
+                Kind::Float => "number",
+                Kind::Integer => "whole number",
+                Kind::Text => "text",
+            };
+            let cells = [&shape.name, name, kind, &meaning.unit, &meaning.words, &values(meaning)];
+            let cells = cells.map(|text: &str| Cell::Text(text.to_owned()));
+            table.write(&Row { table: 0, cells: cells.into() })?;
+            rows += 1;
+        }
+    }
+    Ok((table.finish()?, rows))
+}
+
+/// The words for the numbers of a column, as in `9 TD_PHASE_POWERED; 10 TD_PHASE_TOUCHDOWN`.
+pub(super) fn values(meaning: &Meaning) -> String {
+    let values = meaning.values().iter().map(|(number, word)| format!("{number} {word}"));
+    values.collect::<Vec<_>>().join("; ")
+}
+
+/// Number of rows in a group; a group is held in memory until it is written.
+const GROUP_ROWS: usize = 16_384;
+
+pub(super) struct ParquetTable {
+    path: PathBuf,
+    columns: Vec<Column>,
+    writer: SerializedFileWriter<NewFile>,
+    held: Vec<Vec<Cell>>,
+}
+
+impl ParquetTable {
+    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+        let path = file.path().to_owned();
+        let failed = |source| ExportError::Parquet { path: path.clone(), source };
+        let schema = schema_of(shape).map_err(failed)?;
+        let properties = WriterProperties::builder()
+            .set_compression(Compression::SNAPPY)
+            .set_key_value_metadata(Some(metadata_of(shape)))
+            .build();
+        let writer =
+            SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+        Ok(Self { path, columns: shape.columns.clone(), writer, held: Vec::new() })
+    }
+
+    pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+        self.held.push(row.cells.clone());
+        if self.held.len() >= GROUP_ROWS { self.write_group() } else { Ok(()) }
+    }
+
+    /// The complete file, still under its temporary name.
+    pub(super) fn finish(mut self) -> Result<NewFile, ExportError> {
+        self.write_group()?;
+        let path = self.path;
+        self.writer.into_inner().map_err(|source| ExportError::Parquet { path, source })
+    }
+
+    fn write_group(&mut self) -> Result<(), ExportError> {
+        let rows = std::mem::take(&mut self.held);
+        if rows.is_empty() {
+            return Ok(());
+        }
+        group(&mut self.writer, &self.columns, &rows)
+            .map_err(|source| ExportError::Parquet { path: self.path.clone(), source })
+    }
+}
+
+fn group(
+    writer: &mut SerializedFileWriter<NewFile>,
+    columns: &[Column],
+    rows: &[Vec<Cell>],
+) -> Result<(), ParquetError> {
+    let mut group = writer.next_row_group()?;
+    for (place, column) in columns.iter().enumerate() {
+        let cells = || rows.iter().map(move |cells| cells.get(place).unwrap_or(&Cell::Absent));
+        let Some(mut writer) = group.next_column()? else {
+            return Err(ParquetError::General(format!("no column for {}", column.name)));
+        };
+        write_column(&mut writer, column.kind, cells)?;
+        writer.close()?;
+    }
+    group.close().map(|_| ())
+}
+
+/// Parquet definition levels: 1 for a cell with a value, 0 for an empty cell.
+fn write_column<'a, I: Iterator<Item = &'a Cell>>(
+    writer: &mut SerializedColumnWriter<'_>,
+    kind: Kind,
+    cells: impl Fn() -> I,
+) -> Result<(), ParquetError> {
+    match kind {
+        Kind::Float => {
+            let values: Vec<f64> = cells().filter_map(Cell::number).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(cell.number().is_some())).collect();
+            writer.typed::<DoubleType>().write_batch(&values, Some(&levels), None)?;
+        }
+        Kind::Integer => {
+            let whole = |cell: &Cell| match cell {
+                Cell::Integer(number) => Some(*number),
+                _ => None,
+            };
+            let values: Vec<i64> = cells().filter_map(whole).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(whole(cell).is_some())).collect();
+            writer.typed::<Int64Type>().write_batch(&values, Some(&levels), None)?;
+        }
+        Kind::Text => {
+            let text = |cell: &Cell| match cell {
+                Cell::Text(text) => Some(ByteArray::from(text.as_str())),
+                _ => None,
+            };
+            let values: Vec<ByteArray> = cells().filter_map(text).collect();
+            let levels: Vec<i16> = cells().map(|cell| i16::from(text(cell).is_some())).collect();
+            writer.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
+        }
+    }
+    Ok(())
+}
+
+/// The unit, the meaning and the words of each column: `COLUMN.unit`, `COLUMN.meaning`, `COLUMN.values`.
+fn metadata_of(shape: &TableShape) -> Vec<KeyValue> {
+    let mut metadata = Vec::new();
+    for Column { name, meaning, .. } in &shape.columns {
+        let facts =
+            [("unit", meaning.unit.clone()), ("meaning", meaning.words.clone()), ("values", values(meaning))];
+        let said = facts.into_iter().filter(|(_, text)| !text.is_empty());
+        metadata.extend(said.map(|(fact, text)| KeyValue::new(format!("{name}.{fact}"), text)));
+    }
+    metadata
+}
+
+fn schema_of(shape: &TableShape) -> Result<Type, ParquetError> {
+    let field = |column: &Column| {
+        let (physical, logical) = match column.kind {
+            Kind::Float => (Physical::DOUBLE, None),
+            Kind::Integer => (Physical::INT64, None),
+            Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        };
+        Type::primitive_type_builder(&column.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()
+            .map(Arc::new)
+    };
+    let fields = shape.columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
+    Type::group_type_builder(&shape.name).with_fields(fields).build()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_and_text_is_quoted_only_where_necessary() {
+        for number in [0.1, -0.0, 1e300, f64::MIN_POSITIVE, 3.0] {
+            assert_eq!(text_of(&Cell::Float(number)).parse::<f64>().unwrap().to_bits(), number.to_bits());
+        }
+        assert_eq!(text_of(&Cell::Float(f64::NAN)), "NaN");
+        assert_eq!(text_of(&Cell::Absent), "");
+        assert_eq!(quoted("plain"), "plain");
+        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
     }
 }

@@ -3,15 +3,23 @@
 //! A `.tlog` is a sequence of Unix times in microseconds (8 bytes, big-endian), each followed by one whole frame.
 //! Mission Planner, QGroundControl and MAVProxy write and play back such files.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Read, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use protocol::log::record::TOPIC_RAW_RX;
+use protocol::dialect::MavMessage;
+use protocol::frame::Frame;
+use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record, TOPIC_RAW_RX};
+use protocol::log::tlog::{TlogFrame, TlogReader};
+use protocol::log::v1;
+use protocol::log::writer::{LogHeader, LogWriteError};
+use protocol::text::Reassembler;
 use serde::Serialize;
 
 use super::ExportError;
-use crate::log::{Entry, FlightLog};
+use crate::log::{Entry, FlightLog, Heard, NewLog, NewLogError, frame_of};
 use crate::output::{Destination, NewFile};
 
 /// Summary of a written `.tlog`.
@@ -98,4 +106,219 @@ fn write_frames<R: Read>(
     file.commit().map_err(failed)?;
     written.damage = log.damage().map(ToString::to_string);
     Ok(written)
+}
+
+/// System id of a ground station, by convention.
+const GROUND_SYSTEM: u8 = 255;
+/// Interval between progress reports, bytes.
+const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
+
+/// Why a `.tlog` could not be imported.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The `.tlog` cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    Read {
+        path: PathBuf,
+        /// Error from the operating system.
+        source: std::io::Error,
+    },
+    /// The `.tlog` has no frame.
+    #[error("{}: is not a .tlog: it has no MAVLink 2 frame that follows a time of 8 bytes", path.display())]
+    NoFrames { path: PathBuf },
+    /// The log cannot be created.
+    #[error("{}: cannot be created", path.display())]
+    Create {
+        path: PathBuf,
+        /// Error from the operating system.
+        source: std::io::Error,
+    },
+    /// The log cannot be written.
+    #[error("{}: cannot be written", path.display())]
+    Write {
+        path: PathBuf,
+        /// Error from the writer.
+        source: LogWriteError,
+    },
+}
+
+/// Summary of an import.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct ImportedTlog {
+    /// Frames kept.
+    pub frames: u64,
+    /// Of these, frames of other dialects or with a wrong checksum: kept, but not decoded.
+    pub not_understood: u64,
+    /// Frames of MAVLink 1, which are left out.
+    pub mavlink1: u64,
+    /// Bytes that belong to no frame.
+    pub garbage_bytes: u64,
+    /// Telemetry records decoded from the frames.
+    pub telemetry: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImportProgress {
+    /// Bytes read.
+    pub read: u64,
+    /// Size of the `.tlog`.
+    pub total: u64,
+}
+
+/// Imports a `.tlog` into a new flight log. Memory does not grow with its size.
+///
+/// # Errors
+/// See [`ImportError`].
+pub fn import_tlog<'a>(
+    input: &Path,
+    output: impl Into<Destination<'a>>,
+    progress: &mut dyn FnMut(ImportProgress),
+) -> Result<ImportedTlog, ImportError> {
+    let destination = output.into();
+    let output = destination.path;
+    let read = |source| ImportError::Read { path: input.to_owned(), source };
+    let file = File::open(input).map_err(read)?;
+    let total = file.metadata().map_err(read)?.len();
+    let mut frames = TlogReader::new(file);
+    let Some(first) = frames.next_frame().map_err(read)? else {
+        return Err(ImportError::NoFrames { path: input.to_owned() });
+    };
+    let start_us = first.time_us;
+    let header = LogHeader {
+        writer: "replay".to_owned(),
+        start_unix_ns: start_us.saturating_mul(1000),
+        run: BTreeMap::from([("imported_from".to_owned(), input.display().to_string())]),
+        ..LogHeader::default()
+    };
+    let failed = |error| match error {
+        NewLogError::Create(source) => ImportError::Create { path: output.to_owned(), source },
+        NewLogError::Write(source) => ImportError::Write { path: output.to_owned(), source },
+    };
+    let mut log = NewLog::create(destination, input, &header).map_err(failed)?;
+    let link = format!("file:{}", input.file_name().unwrap_or_default().to_string_lossy());
+    let mut imported = ImportedTlog::default();
+    let mut fold = Fold::default();
+    let mut next = Some(first);
+    let mut told = 0;
+    while let Some(TlogFrame { time_us, bytes }) = next {
+        let since_us = time_us.saturating_sub(start_us);
+        let time_ns = since_us.saturating_mul(1000);
+        let understood = frame_of(&bytes);
+        imported.frames += 1;
+        imported.not_understood += u64::from(understood.is_none());
+        let source = bytes.get(5).copied();
+        let direction = if source == Some(GROUND_SYSTEM) { Direction::Tx } else { Direction::Rx };
+        let raw = RawFrame { direction, endpoint: "ground", link: link.clone(), bytes };
+        log.write(&Record::RawFrame(raw), time_ns).map_err(failed)?;
+        if let Some(frame) = understood.filter(|_| direction == Direction::Rx) {
+            for record in fold.take(&frame, since_us as f64 / 1e6) {
+                imported.telemetry += u64::from(matches!(record, Record::Telemetry(_)));
+                log.write(&record, time_ns).map_err(failed)?;
+            }
+        }
+        next = frames.next_frame().map_err(read)?;
+        if frames.bytes_read() >= told + PROGRESS_BYTES {
+            told = frames.bytes_read();
+            progress(ImportProgress { read: told, total });
+        }
+    }
+    imported.mavlink1 = frames.mavlink1();
+    imported.garbage_bytes = frames.garbage_bytes();
+    log.finish().map_err(failed)?;
+    Ok(imported)
+}
+
+/// Shortest interval between telemetry records, s.
+const PERIOD_S: f64 = 0.1;
+
+#[derive(Default)]
+struct Fold {
+    known: v1::Telemetry,
+    changed: bool,
+    written_at_s: Option<f64>,
+    heard: Heard,
+    judged: bool,
+    texts: Reassembler,
+}
+
+impl Fold {
+    /// Takes a frame that the vehicle sent `time_s` after the first; returns a record when one is due.
+    pub(super) fn take(&mut self, frame: &Frame, time_s: f64) -> Vec<Record> {
+        let Ok(message) = frame.decode() else {
+            return Vec::new();
+        };
+        let mut records = Vec::new();
+        self.heard.take(&message);
+        match &message {
+            MavMessage::STATUSTEXT(chunk) => {
+                let now = Duration::from_secs_f64(time_s.max(0.0));
+                records.extend(self.texts.push(frame.source(), chunk, now).into_iter().map(|text| {
+                    let level = match text.severity {
+                        0..=2 => EventLevel::Fatal,
+                        3 => EventLevel::Error,
+                        4 => EventLevel::Warning,
+                        _ => EventLevel::Info,
+                    };
+                    Record::Event(Event { level, name: "vehicle".to_owned(), message: text.text })
+                }));
+            }
+            MavMessage::TD_LANDING_VERDICT(_) if !self.judged => {
+                self.judged = true;
+                records.extend(self.heard.verdict().map(|verdict| Record::LandingVerdict(Box::new(verdict))));
+            }
+            message => self.changed |= self.note(message),
+        }
+        let due = self.written_at_s.is_none_or(|at_s| time_s - at_s >= PERIOD_S);
+        if self.changed && due {
+            self.changed = false;
+            self.written_at_s = Some(time_s);
+            self.known.time_s = time_s;
+            records.push(Record::Telemetry(Box::new(self.known.clone())));
+        }
+        records
+    }
+
+    /// Whether the message changed anything.
+    fn note(&mut self, message: &MavMessage) -> bool {
+        let known = &mut self.known;
+        let centidegrees = |angle: &i16| (f64::from(*angle) / 100.0).to_radians();
+        match message {
+            MavMessage::TD_FLIGHT_STATUS(data) => {
+                known.phase = Some(data.phase as u32);
+                known.interlocks = Some(u32::from(data.interlocks.bits()));
+                known.countdown_ms = (data.countdown_ms != i32::MAX).then_some(data.countdown_ms);
+            }
+            MavMessage::LOCAL_POSITION_NED(data) => {
+                known.x_m = Some(f64::from(data.x));
+                known.altitude_m = Some(-f64::from(data.z));
+                if let Some(pitch_rad) = known.pitch_rad {
+                    let (sin, cos) = libm::sincos(pitch_rad);
+                    let (forward, up) = (f64::from(data.vx), -f64::from(data.vz));
+                    known.u_m_s = Some(forward * cos + up * sin);
+                    known.w_m_s = Some(forward * sin - up * cos);
+                }
+            }
+            MavMessage::ATTITUDE_QUATERNION(data) => {
+                // A rotation about the east axis: the quaternion holds half of the pitch angle.
+                known.pitch_rad = Some(2.0 * libm::atan2(f64::from(data.q3), f64::from(data.q1)));
+                known.q_rad_s = Some(f64::from(data.pitchspeed));
+            }
+            MavMessage::TD_FINS(data) => {
+                known.fin_commanded_rad = data.commanded.iter().map(centidegrees).collect();
+                known.fin_measured_rad = data.measured.iter().map(centidegrees).collect();
+            }
+            MavMessage::TD_GIMBAL(data) => {
+                known.gimbal_commanded_rad = Some(centidegrees(&data.pitch_commanded));
+                known.gimbal_measured_rad = Some(centidegrees(&data.pitch_measured));
+            }
+            MavMessage::TD_CONTROLLER(data) => {
+                known.control_level = Some(data.level as u32);
+                known.solver_status = Some(data.solver_status as u32);
+                known.iterations = Some(u32::from(data.iterations));
+                known.solve_time_s = Some(f64::from(data.solve_time_us) / 1e6);
+            }
+            _ => return false,
+        }
+        true
+    }
 }

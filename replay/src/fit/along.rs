@@ -20,9 +20,9 @@ use nalgebra::{Matrix2, Vector2};
 use world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
+use super::least_squares::{NoiseStep, Whitener, lowest};
 use super::least_squares::{Prior, Solution, inflate, solve, solve_from};
 use super::trace::{Frame, Trace};
-use super::whiten::{NoiseStep, Whitener, lowest};
 
 /// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known yet. From 5 m/s on, 4 of 60
 /// `field` flights have an error of the drag of 4 to 13 %, from 15 m/s on one has 6 %.

@@ -8,6 +8,10 @@ use core::f64::consts::PI;
 
 use flight::vehicle::thrust_curve::ThrustCurve;
 
+use super::along::white_variance;
+use super::least_squares::{Prior, inflate, solve_from};
+use super::{Basis, Fit, Named};
+
 /// Terms of the shape. Five follow a deviation that turns around four times in a burn; faster ones change neither speed
 /// nor height at the ground.
 pub(super) const SHAPE_TERMS: usize = 5;
@@ -55,9 +59,167 @@ pub(super) fn shape_sigmas(rms: f64) -> [f64; SHAPE_TERMS] {
     terms.map(|term| rms * term / whole)
 }
 
+/// Most rows: an hour at 1 kHz.
+const ROWS_MAX: usize = 3_600_000;
+/// Fewest rows with thrust.
+const FEWEST: usize = 20;
+/// Blocks over which residuals may be correlated: a stand rings at some ten hertz.
+const BLOCKS: usize = 40;
+/// Standard deviation of a load cell's calibration with known weights. The table does not show it.
+const CALIBRATION_SIGMA: f64 = 0.003;
+
+const TARE: usize = 0;
+const IMPULSE: usize = 1;
+const BURN_TIME: usize = 2;
+const BEGIN: usize = 3;
+const SHAPE: usize = 4;
+
+/// Why a table of a test stand cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StandError {
+    /// A row is wrong.
+    #[error("line {line}: {found}; {required}")]
+    Row { line: u64, found: String, required: &'static str },
+    /// It is no table of this kind.
+    #[error("{0}")]
+    Table(String),
+}
+
+/// Reads a table with the columns `time_s` and `thrust_n`; others are ignored.
+///
+/// # Errors
+/// [`StandError`] names the line and what would be accepted.
+pub fn read_stand(text: &str) -> Result<Vec<(f64, f64)>, StandError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let headers = reader.headers().map_err(|error| StandError::Table(error.to_string()))?.clone();
+    let place = |wanted: &str| {
+        headers.iter().position(|name| name.trim_start_matches('\u{feff}') == wanted).ok_or_else(|| {
+            StandError::Table(format!("has no column {wanted}; the first line names time_s and thrust_n"))
+        })
+    };
+    let places = [place("time_s")?, place("thrust_n")?];
+    let mut rows: Vec<(f64, f64)> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| StandError::Table(error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |place: usize| {
+            let text = record.get(place).unwrap_or_default();
+            let required = "a finite number is accepted";
+            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| StandError::Row {
+                line,
+                found: text.chars().take(40).collect(),
+                required,
+            })
+        };
+        let row = (number(places[0])?, number(places[1])?);
+        if rows.last().is_some_and(|last| row.0 <= last.0) {
+            let required = "times must increase from row to row";
+            return Err(StandError::Row { line, found: format!("time {}", row.0), required });
+        }
+        if rows.len() >= ROWS_MAX {
+            return Err(StandError::Table(format!("has more than {ROWS_MAX} rows; no burn is that long")));
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// Fits a burn; times count from the ignition command.
+///
+/// # Errors
+/// The table has too little thrust.
+pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Result<Fit, StandError> {
+    let peak_n = rows.iter().map(|row| row.1).fold(f64::NEG_INFINITY, f64::max);
+    let burning: Vec<usize> = (0..rows.len()).filter(|row| rows[*row].1 > 0.1 * peak_n).collect();
+    let (Some(first), Some(last)) = (burning.first().copied(), burning.last().copied()) else {
+        return Err(StandError::Table("has no thrust".to_owned()));
+    };
+    if burning.len() < FEWEST || peak_n <= 0.0 {
+        return Err(StandError::Table(format!("has fewer than {FEWEST} rows with thrust")));
+    }
+    // A tenth of the burn before and after tells the tare.
+    let lasted_s = rows[last].0 - rows[first].0;
+    let near = |row: &&(f64, f64)| {
+        row.0 >= rows[first].0 - 0.1 * lasted_s - 0.2 && row.0 <= rows[last].0 + 0.1 * lasted_s + 0.2
+    };
+    let rows: Vec<(f64, f64)> = rows.iter().filter(near).copied().collect();
+    let thrusts: Vec<f64> = rows.iter().map(|row| row.1).collect();
+    let white_n = libm::sqrt(white_variance(&thrusts).unwrap_or(0.0)).max(1e-3 * peak_n);
+    let begins_s = rows.iter().find(|row| row.1 > 0.1 * peak_n).map_or(0.0, |row| row.0);
+    let mut priors = vec![
+        Prior { mean: 0.0, sigma: 0.1 * peak_n },
+        Prior { mean: 1.0, sigma: 0.5 },
+        Prior { mean: 1.0, sigma: 0.5 },
+        Prior { mean: begins_s, sigma: 1.0 },
+    ];
+    // On a stand nothing else hides the shape: five per cent is more than certified curves differ by.
+    priors.extend(shape_sigmas(0.05).map(|sigma| Prior { mean: 0.0, sigma }));
+    let residuals = |values: &[f64]| -> Vec<f64> {
+        let burn = Burn {
+            curve,
+            impulse_scale: values[IMPULSE],
+            burn_time_scale: values[BURN_TIME].max(0.2),
+            shape: core::array::from_fn(|k| values[SHAPE + k]),
+        };
+        let half_s = 0.5e-3;
+        let missed = rows.iter().map(|(time_s, thrust_n)| {
+            let at_s = time_s - values[BEGIN];
+            (thrust_n - values[TARE] - burn.mean_n(at_s - half_s, at_s + half_s)) / white_n
+        });
+        missed.collect()
+    };
+    let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+    let impulse_n_s: f64 =
+        rows.windows(2).map(|pair| 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0)).sum();
+    start[IMPULSE] = (impulse_n_s / curve.total_impulse_n_s()).clamp(0.2, 5.0);
+    let lasts_s = curve.falls_through_s(0.1 * curve.peak_thrust_n()).unwrap_or(curve.burn_time_s());
+    start[BURN_TIME] = (lasted_s / lasts_s).clamp(0.2, 5.0);
+    if (start[IMPULSE] - 1.0).abs() > 0.3 || (start[BURN_TIME] - 1.0).abs() > 0.4 {
+        return Err(StandError::Table(format!(
+            "gives {impulse_n_s:.1} N s in {lasted_s:.2} s, and {} has {:.1} N s in {lasts_s:.2} s: another motor, or another unit",
+            curve.name(),
+            curve.total_impulse_n_s()
+        )));
+    }
+    let unsolved = || StandError::Table("does not fit the curve".to_owned());
+    let mut solution = solve_from(&start, &priors, residuals).ok_or_else(unsolved)?;
+    inflate(&mut solution, &priors, residuals, rows.len().div_ceil(BLOCKS));
+    solution.covariance[(IMPULSE, IMPULSE)] += libm::pow(CALIBRATION_SIGMA * solution.values[IMPULSE], 2.0);
+    let mut fit = Fit {
+        source: source.to_owned(),
+        mission: String::new(),
+        motor: curve.name().to_owned(),
+        basis: Basis {
+            impulse_n_s: curve.total_impulse_n_s(),
+            burn_time_s: curve.burn_time_s(),
+            drag_area_m2: 0.0,
+            loaded_kg: 0.0,
+        },
+        found: Vec::new(),
+        not_found: Vec::new(),
+        damage: None,
+    };
+    let reason = "the table does not show it";
+    for (place, name, unit) in [
+        (IMPULSE, "thrust_scale", ""),
+        (BURN_TIME, "burn_time_scale", ""),
+        (BEGIN, "ignition_delay", "s"),
+        (TARE, "tare", "N"),
+    ] {
+        fit.take(&solution, &priors, place, &Named { name, unit, scale: 1.0, reason });
+    }
+    for k in 0..SHAPE_TERMS {
+        let name = format!("thrust_shape_{}", k + 1);
+        fit.take(&solution, &priors, SHAPE + k, &Named { name: &name, unit: "", scale: 1.0, reason });
+    }
+    fit.lacks("drag_scale, gimbal, wind, sensors", "a test stand does not fly");
+    Ok(fit)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down; 10 % more impulse in twice the time.
     #[test]
@@ -75,5 +237,58 @@ mod tests {
         assert!((shaped.burnt_kg(9.0) - 0.12).abs() < 1e-12, "and the whole stays");
         // There the cosine is zero: the thrust is that without a shape.
         assert!((shaped.mean_n(3.999, 4.001) - 22.0).abs() < 1e-6);
+    }
+
+    fn curve() -> ThrustCurve {
+        vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n0.2 40\n3 36\n4 0\n").unwrap()
+    }
+
+    /// The curve with 4 % more impulse in a burn that is 5 % shorter, 0.21 s after the command, with a tare of 1.5 N and a
+    /// noise of 0.2 N that repeats itself every 7 rows.
+    #[test]
+    fn val_hand_a_synthetic_burn() {
+        let curve = curve();
+        let noise = [0.2, -0.1, 0.3, -0.3, 0.0, -0.2, 0.1];
+        let rows: Vec<(f64, f64)> = (0..2500)
+            .map(|row| {
+                let time_s = f64::from(row) * 0.002;
+                let thrust_n = 1.04 / 0.95 * curve.thrust_at_n((time_s - 0.21) / 0.95);
+                (time_s, 1.5 + thrust_n + noise[row as usize % 7])
+            })
+            .collect();
+        let fit = fit_stand("stand.csv", &rows, &curve).unwrap();
+        for (name, truth, bar) in [
+            ("thrust_scale", 1.04, 0.004),
+            ("burn_time_scale", 0.95, 0.004),
+            ("ignition_delay", 0.21, 0.002),
+            ("tare", 1.5, 0.1),
+        ] {
+            let found = fit.get(name).unwrap();
+            assert!((found.value - truth).abs() < bar, "{found:?}");
+            assert!(found.low < truth && truth < found.high, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn another_motor_and_a_wrong_table_are_named() {
+        let rows: Vec<(f64, f64)> = (0..200).map(|row| (f64::from(row) * 0.01, 500.0)).collect();
+        let error = fit_stand("stand.csv", &rows, &curve()).unwrap_err().to_string();
+        assert!(error.contains("another motor, or another unit"), "{error}");
+        let of = |text: &str| read_stand(text).unwrap_err().to_string();
+        assert_eq!(of("t,f\n1,2\n"), "has no column time_s; the first line names time_s and thrust_n");
+        assert_eq!(of("time_s,thrust_n\n0,1\n1,x\n"), "line 3: x; a finite number is accepted");
+        assert_eq!(of("time_s,thrust_n\n0,1\n0,2\n"), "line 3: time 0; times must increase from row to row");
+    }
+
+    proptest! {
+        #[test]
+        fn no_table_panics(text in "\\PC{0,200}", rows in prop::collection::vec((-1e3..1e3_f64, -1e6..1e6_f64), 0..60)) {
+            let _ = read_stand(&text);
+            let lines: Vec<String> = rows.iter().map(|(time, thrust)| format!("{time},{thrust}")).collect();
+            let _ = read_stand(&format!("time_s,thrust_n\n{}", lines.join("\n")));
+            let mut rows = rows;
+            rows.sort_by(|one, two| one.0.total_cmp(&two.0));
+            let _ = fit_stand("any", &rows, &curve());
+        }
     }
 }

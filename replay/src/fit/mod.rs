@@ -14,30 +14,37 @@
 //! * [`pooled`](mod@pooled): several flights together. [`patch`]: the mission with what was found.
 //! * [`least_squares`] and [`whiten`]: most likely values, where the noise is a slow disturbance.
 
-mod air_moment;
 mod along;
 mod burn;
+pub mod day;
 mod least_squares;
-mod patch;
-mod pooled;
+pub mod lot;
 mod sensors;
 mod servo;
-mod stand;
 mod trace;
 mod turning;
-mod whiten;
 mod wind;
 
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
 use flight::vehicle::mission::Mission;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
+pub use self::burn::{StandError, fit_stand, read_stand};
+use self::day::Learnt;
 use self::least_squares::{Prior, Solution};
-pub use self::patch::patched;
-pub use self::pooled::{Pooled, pooled};
-pub use self::stand::{StandError, fit_stand, read_stand};
 pub use self::trace::{Frame, Trace, TraceError};
 use self::turning::Turning;
+use crate::cli::{Answer, answer, refuse_existing, say, warn_of_damage, write_new};
+use crate::print::{counted, print_json, shown};
+use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
 
 /// 97.5 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;
@@ -298,6 +305,311 @@ fn gimbal(fit: &mut Fit, turning: Result<Turning, &'static str>) {
     }
 }
 
+/// The text of a mission with what a fit found, each change with its interval in a comment at the top.
+///
+/// # Errors
+/// The mission's text is none, or a value that was found is outside the range of its key.
+pub fn patched(mission_toml: &str, fit: &Fit) -> Result<String, SettingError> {
+    let mission = mission_with(mission_toml, &[])?;
+    let airframe = &mission.airframe;
+    let mut changes: Vec<(&str, f64, &Parameter)> = Vec::new();
+    let mut change = |path, value: &dyn Fn(f64) -> f64, name: &str| {
+        if let Some(found) = fit.get(name) {
+            changes.push((path, value(found.value), found));
+        }
+    };
+    // Where the two cannot be told apart, both have the scale of the sum.
+    let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
+    let (body, fins) =
+        if apart { ("body_drag_scale", "fin_drag_scale") } else { ("drag_scale", "drag_scale") };
+    let (along, open) = (airframe.body.axial_drag_coefficient, airframe.fins.drag_coefficient);
+    change("airframe.body.axial_drag_coefficient", &|scale| along * scale, body);
+    change("airframe.fins.drag_coefficient", &|scale| open * scale, fins);
+    change("airframe.gimbal.servo.delay_s", &|delay_s| delay_s, "gimbal_delay");
+    change("airframe.gimbal.servo.rate_deg_s", &|rate_deg_s| rate_deg_s, "gimbal_rate");
+    change("airframe.gimbal.servo.slop_deg", &|play_deg| play_deg.max(0.0), "gimbal_play");
+    change("estimator.gyro_noise_deg_s_sqrt_hz", &|noise| noise, "gyro_noise");
+    change("estimator.accelerometer_noise_mg_sqrt_hz", &|noise| noise, "accelerometer_noise");
+    change("estimator.barometer_m", &|noise| noise, "barometer_noise");
+    change("estimator.gnss_velocity_m_s", &|noise| noise, "gnss_velocity_noise");
+    change("estimator.gnss_horizontal_m", &|noise| noise, "gnss_horizontal_noise");
+    change("estimator.gnss_vertical_m", &|noise| noise, "gnss_vertical_noise");
+    change("estimator.lidar_m", &|noise| noise, "lidar_noise");
+    let setting = |(path, value, _): &(&str, f64, &Parameter)| Setting {
+        path: (*path).to_owned(),
+        value: toml::Value::Float(*value),
+        at_s: None,
+    };
+    let settings: Vec<Setting> = changes.iter().map(setting).collect();
+    let text = mission_toml_with(mission_toml, &settings)?;
+    mission_with(&text, &[])?;
+    let mut head = format!("# {} with what was found in {}:\n", fit.mission, one_line(&fit.source));
+    for (path, value, found) in changes {
+        let Parameter { name, low, high, unit, .. } = found;
+        // Writing to a String cannot fail.
+        let _ = writeln!(head, "# {path} = {value:.6}, from {name} {low:.6} to {high:.6} {unit} (95 %)");
+    }
+    Ok(head + &text)
+}
+
+/// Text for a comment: without line breaks and control characters.
+fn one_line(text: &str) -> String {
+    protocol::text::printable(text.as_bytes())
+}
+
+/// A parameter over several flights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pooled {
+    /// The mean, with the interval of the mean.
+    pub mean: Parameter,
+    /// How many flights have it.
+    pub flights: usize,
+    /// Standard deviation from flight to flight, without the fits' own errors.
+    pub scatter: f64,
+}
+
+/// Every parameter that at least two fits have, in the order of the first fit that has it.
+pub fn pooled(fits: &[Fit]) -> Vec<Pooled> {
+    let mut names: Vec<&str> = Vec::new();
+    for parameter in fits.iter().flat_map(|fit| &fit.found) {
+        if !names.contains(&parameter.name.as_str()) {
+            names.push(&parameter.name);
+        }
+    }
+    names
+        .into_iter()
+        .filter_map(|name| pool(&fits.iter().filter_map(|fit| fit.get(name)).collect::<Vec<_>>()))
+        .collect()
+}
+
+fn pool(values: &[&Parameter]) -> Option<Pooled> {
+    let first = *values.first()?;
+    let count = values.len() as f64;
+    if values.len() < 2 || values.iter().any(|value| value.sigma.is_nan() || value.sigma <= 0.0) {
+        return None;
+    }
+    let weighted = |variance: f64| {
+        let weights: Vec<f64> = values.iter().map(|one| 1.0 / (one.sigma * one.sigma + variance)).collect();
+        let sum: f64 = weights.iter().sum();
+        let mean = values.iter().zip(&weights).map(|(one, weight)| one.value * weight).sum::<f64>() / sum;
+        let spread: f64 =
+            values.iter().zip(&weights).map(|(one, weight)| weight * libm::pow(one.value - mean, 2.0)).sum();
+        let squares: f64 = weights.iter().map(|weight| weight * weight).sum();
+        (mean, sum, squares, spread)
+    };
+    let (_, sum, squares, spread) = weighted(0.0);
+    let variance = ((spread - (count - 1.0)) / (sum - squares / sum)).max(0.0);
+    let (mean, sum, _, spread) = weighted(variance);
+    let sigma = libm::sqrt((spread / (count - 1.0)).max(1.0) / sum);
+    let reach = StudentsT::new(0.0, 1.0, count - 1.0).ok()?.inverse_cdf(0.975) * sigma;
+    let mean = Parameter {
+        low: mean - reach,
+        high: mean + reach,
+        ..Parameter::normal(&first.name, &first.unit, mean, sigma)
+    };
+    Some(Pooled { mean, flights: values.len(), scatter: libm::sqrt(variance) })
+}
+
+/// Fits of flights and burns, each alone and all together.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitReport {
+    pub fits: Vec<Fit>,
+    /// Parameters of at least two of them.
+    pub together: Vec<Pooled>,
+    /// What they tell of the next day, if that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub day: Option<Learnt>,
+}
+
+/// Writes fits as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_fit(report: &FitReport, output: &mut impl Write) -> io::Result<()> {
+    for (place, fit) in report.fits.iter().enumerate() {
+        if place > 0 {
+            writeln!(output)?;
+        }
+        print_one(fit, output)?;
+    }
+    if !report.together.is_empty() {
+        let logs = counted(report.fits.len() as u64, "log");
+        writeln!(
+            output,
+            "\ntogether, {logs}: mean with its 95 % interval, and scatter from one to the next"
+        )?;
+    }
+    for Pooled { mean, flights, scatter } in &report.together {
+        let scatter = digits(*scatter, mean.sigma);
+        writeln!(output, "  {}   scatter {scatter} in {flights}", line(mean))?;
+    }
+    match &report.day {
+        Some(day) => {
+            writeln!(output)?;
+            day::print_learn(day, output)
+        }
+        None => Ok(()),
+    }
+}
+
+fn print_one(fit: &Fit, output: &mut impl Write) -> io::Result<()> {
+    let mission = if fit.mission.is_empty() { "a test stand" } else { &fit.mission };
+    writeln!(
+        output,
+        "{}: {} with {}, 95 % intervals",
+        shown(&fit.source),
+        shown(mission),
+        shown(&fit.motor)
+    )?;
+    for parameter in &fit.found {
+        writeln!(output, "  {}", line(parameter))?;
+    }
+    if !fit.not_found.is_empty() {
+        writeln!(output, "not found")?;
+    }
+    for lack in &fit.not_found {
+        writeln!(output, "  {}: {}", shown(&lack.name), shown(&lack.reason))?;
+    }
+    Ok(())
+}
+
+fn line(parameter: &Parameter) -> String {
+    let Parameter { name, unit, value, sigma, low, high } = parameter;
+    let number = |value: f64| digits(value, *sigma);
+    let text = format!(
+        "{:<28} {:>10}   {:>10} to {:<10} {}",
+        shown(name),
+        number(*value),
+        number(*low),
+        number(*high),
+        shown(unit)
+    );
+    text.trim_end().to_owned()
+}
+
+/// A number to two digits of its standard deviation.
+fn digits(value: f64, sigma: f64) -> String {
+    let places = if sigma > 0.0 && sigma.is_finite() {
+        (1.0 - libm::floor(libm::log10(sigma))).clamp(0.0, 7.0) as usize
+    } else {
+        4
+    };
+    format!("{value:.places$}")
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// Logs of vehicles (MCAP), tables of a test stand (CSV with time_s from the ignition command, and thrust_n), and earlier
+    /// answers in JSON.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// The motor that a table is compared with: a built-in one, or a .eng or .rse file.
+    #[arg(long, value_name = "NAME|FILE")]
+    motor: Option<String>,
+    /// Write the mission of the only log, with what was found of its vehicle. An existing file is kept.
+    #[arg(long, value_name = "FILE")]
+    write_mission: Option<PathBuf>,
+    #[command(flatten)]
+    day: day::Arguments,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is read of an earlier answer.
+#[derive(Deserialize)]
+struct Earlier {
+    fits: Vec<Fit>,
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        if self.write_mission.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
+            bail!("--write-mission takes the log of one flight: its mission is changed");
+        }
+        if let Some(motor) = &self.motor
+            && !self.files.iter().any(|file| ends_in(file, "csv"))
+        {
+            bail!(
+                "--motor {motor}: only a table of a test stand (CSV) is compared with a motor; a log has its own"
+            );
+        }
+        if let Some(path) = &self.write_mission {
+            refuse_existing(path)?;
+        }
+        self.day.check()?;
+        let (mut fits, mut refused, mut flown) = (Vec::new(), false, None);
+        for file in &self.files {
+            match self.one(file, &mut flown) {
+                Ok(found) => fits.extend(found),
+                Err(error) if self.files.len() == 1 || self.day.is_asked() => return Err(error),
+                // One unreadable log must not hide the others.
+                Err(error) => {
+                    refused = true;
+                    say(&format!("{error:#}"));
+                }
+            }
+        }
+        for fit in &fits {
+            warn_of_damage(&fit.source, fit.damage.as_deref());
+        }
+        let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
+        let report = FitReport { together: pooled(&fits), fits, day };
+        answer(|output| if self.json { print_json(&report, output) } else { print_fit(&report, output) })?;
+        Ok(match report.day.and_then(|day| day.go) {
+            Some(go) => Answer::Decided { yes: go },
+            None if refused => Answer::NotAll,
+            None => Answer::Given,
+        })
+    }
+
+    /// The fits of a file; notes the mission of the first log.
+    fn one(&self, file: &Path, flown: &mut Option<String>) -> Result<Vec<Fit>> {
+        let name = file.display().to_string();
+        let read = || std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"));
+        if ends_in(file, "json") {
+            let earlier: Earlier = serde_json::from_str(&read()?)
+                .with_context(|| format!("{name}: is no answer of `replay fit --json`"))?;
+            return Ok(earlier.fits);
+        }
+        if ends_in(file, "csv") {
+            let motor = self.motor.as_deref().with_context(|| {
+                format!("{name}: --motor is missing: a table is compared with the motor's certified curve")
+            })?;
+            let rows = read_stand(&read()?).with_context(|| name.clone())?;
+            return Ok(vec![fit_stand(&name, &rows, &curve_of(motor)?).context(name)?]);
+        }
+        let trace = Trace::open(file)?;
+        let found = fit(&trace);
+        if let Some(path) = &self.write_mission {
+            let text = patched(&trace.mission_toml, &found).context("the mission with what was found")?;
+            write_new(path, &text)?;
+            say(&format!("{}: --profile of `onboard-sim fly` and `campaign` takes it", path.display()));
+        }
+        flown.get_or_insert(trace.mission_toml);
+        Ok(vec![found])
+    }
+}
+
+fn is_log(file: &Path) -> bool {
+    !ends_in(file, "csv") && !ends_in(file, "json")
+}
+
+fn ends_in(file: &Path, wanted: &str) -> bool {
+    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+}
+
+fn curve_of(motor: &str) -> Result<ThrustCurve> {
+    if vehicles::motors::names().any(|known| known == motor) {
+        return Ok(vehicles::motors::builtin(motor)?);
+    }
+    let text = std::fs::read_to_string(motor).with_context(|| {
+        let known = vehicles::motors::names().collect::<Vec<_>>().join(", ");
+        format!("'{motor}' is neither a built-in motor ({known}) nor a readable file")
+    })?;
+    vehicles::thrust_curve::from_file_text(motor, &text).with_context(|| motor.to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -320,5 +632,47 @@ mod tests {
         assert!((found.value - 1.02).abs() < 1e-12, "the two cancel: {found:?}");
         let heavier = Basis { loaded_kg: 3.3, ..basis };
         assert!((fit.over(&heavier).found[0].sigma - 0.011).abs() < 1e-12);
+    }
+
+    fn fits(values: &[(f64, f64)]) -> Vec<Fit> {
+        let fit = |(value, sigma): &(f64, f64)| Fit {
+            source: String::new(),
+            mission: String::new(),
+            motor: String::new(),
+            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
+            found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
+            not_found: Vec::new(),
+            damage: None,
+        };
+        values.iter().map(fit).collect()
+    }
+
+    /// 1, 2 and 3 with errors of 0.1: the weights are equal, the mean is 2, the variance between is 1 - 0.01, and the
+    /// interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root of 1/3.
+    #[test]
+    fn val_hand_three_flights() {
+        let found = pooled(&fits(&[(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
+        assert_eq!(found.len(), 1);
+        let Pooled { mean, scatter, flights } = &found[0];
+        assert!((mean.value - 2.0).abs() < 1e-12 && *flights == 3);
+        assert!((scatter - libm::sqrt(0.99)).abs() < 1e-12, "{scatter}");
+        assert!((mean.high - 2.0 - 4.302_65 / libm::sqrt(3.0)).abs() < 1e-4, "{mean:?}");
+    }
+
+    #[test]
+    fn one_flight_is_not_pooled_and_equal_flights_do_not_scatter() {
+        assert!(pooled(&fits(&[(1.0, 0.1)])).is_empty());
+        let found = pooled(&fits(&[(1.0, 0.1), (1.0, 0.1)]));
+        assert!(
+            found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn a_number_has_two_digits_of_its_deviation() {
+        assert_eq!(digits(0.998_765, 0.001_8), "0.9988");
+        assert_eq!(digits(254.71, 9.8), "254.7");
+        assert_eq!(digits(1234.4, 120.0), "1234");
+        assert_eq!(digits(1.0, 0.0), "1.0000");
     }
 }

@@ -15,9 +15,9 @@ use world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
 
 use super::Parameter;
 use super::along::{Along, falling};
+use super::least_squares::{NoiseStep, Whitener};
 use super::least_squares::{Prior, solve};
 use super::trace::{Frame, Trace};
-use super::whiten::{NoiseStep, Whitener};
 
 /// Frames of one sample of the wind.
 const FRAMES: usize = 20;

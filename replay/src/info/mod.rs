@@ -1,32 +1,30 @@
 //! Describes a log: its content, how complete it is, and what can be done with it.
 
-mod channels;
-mod ending;
-mod facts;
-mod frames;
-mod phases;
-mod solve_times;
+mod counts;
 
-pub use channels::ChannelFacts;
-pub use facts::{
-    Completeness, Grade, GradeLevel, Info, ProfileFacts, SchemaFacts, Span, VerdictFacts, VerdictLimit,
-};
-pub use frames::FrameFacts;
-pub use phases::{PhaseSource, PhaseSpan, PhaseTimeline};
-pub use solve_times::SolveTimes;
+use std::collections::BTreeMap;
+use std::io::{self, IsTerminal as _, Read, Write};
+use std::path::{Path, PathBuf};
 
-use std::io::Read;
-use std::path::Path;
-
+use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
+pub use self::counts::{ChannelFacts, FrameFacts, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
+use anyhow::Result;
+use clap::Args;
+use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
+use protocol::log::v1;
+use serde::Serialize;
+use sim::ending::FlightEnding;
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
 
+use crate::cli::{Answer, answer, say, warn_of_completeness};
 use crate::log::{
-    Clocks, Entry, FlightLog, Flights, LogError, SummaryFacts, Verdicts, heard_message, summary_of,
+    AttachmentFacts, BuildComparison, Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Flights, Found, Head,
+    LogError, SummaryFacts, Verdicts, heard_message, summary_of,
 };
-use channels::ChannelCounter;
-use ending::EndingTracker;
-use frames::FrameCounter;
-use phases::PhaseTracker;
+use crate::print::{counted, print_json, shown};
+use crate::settings::explained;
 
 /// Describes a log file.
 ///
@@ -151,4 +149,564 @@ impl Seen {
             attachments: head.attachments.clone(),
         }
     }
+}
+
+/// What is in a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Info {
+    /// The log.
+    pub file: String,
+    /// Size of the file.
+    pub size_bytes: Option<u64>,
+    /// What can be done with the log.
+    pub grade: Grade,
+    /// The library that wrote the file.
+    pub library: String,
+    pub schema: SchemaFacts,
+    /// Which build wrote it.
+    pub build: BTreeMap<String, String>,
+    /// Comparison of that build with this one.
+    pub build_comparison: BuildComparison,
+    pub run: BTreeMap<String, String>,
+    /// The profile that was flown.
+    pub profile: Option<ProfileFacts>,
+    /// From the first record to the last.
+    pub span: Option<Span>,
+    /// Its channels, by topic.
+    pub channels: Vec<ChannelFacts>,
+    /// The frames of the flight computer from its release on.
+    pub frames: Option<FrameFacts>,
+    /// The phases from each source that records them, the vehicle first.
+    pub phases: Vec<PhaseTimeline>,
+    /// The landing verdict.
+    pub verdict: Option<VerdictFacts>,
+    /// How the flight ended, in one sentence, if the log says so.
+    pub ending: Option<String>,
+    /// How the clocks of the log differ.
+    pub clocks: Clocks,
+    /// Why the first unreadable record could not be read.
+    pub unreadable: Option<String>,
+    /// Whether anything is missing.
+    pub completeness: Completeness,
+    pub attachments: Vec<AttachmentFacts>,
+}
+
+/// The version of a log's schema, and of this build's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SchemaFacts {
+    pub version: u32,
+    pub this_build: u32,
+}
+
+/// What can be done with a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Grade {
+    /// How much.
+    pub level: GradeLevel,
+    pub reason: String,
+}
+
+/// How much can be done with a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GradeLevel {
+    /// The flight computer can be run again on its own inputs.
+    BitExact,
+    /// Frames in full precision, but nothing to run them with.
+    Numeric,
+    /// Only what went over the air or the simulator knew.
+    TelemetryOnly,
+}
+
+impl GradeLevel {
+    /// The grade's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BitExact => "bit-exact",
+            Self::Numeric => "numeric",
+            Self::TelemetryOnly => "telemetry-only",
+        }
+    }
+}
+
+impl Grade {
+    pub(super) fn without_frames(unreadable: Option<&str>) -> Self {
+        let reason = match unreadable {
+            None => "it has no frames of a flight computer that this build knows".to_owned(),
+            Some(why) => format!("it has no frames of a flight computer that this build can read: {why}"),
+        };
+        Self { level: GradeLevel::TelemetryOnly, reason }
+    }
+}
+
+/// The profile in a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ProfileFacts {
+    /// Its name, if it can be used.
+    pub name: Option<String>,
+    /// Its one-line description, if it can be used.
+    pub summary: Option<String>,
+    /// Why this build cannot use it, if so.
+    pub problem: Option<String>,
+}
+
+impl ProfileFacts {
+    pub(super) fn of(head: &Head) -> Option<Self> {
+        let parsed = match head.profile_toml.as_ref()? {
+            Ok(text) => vehicles::mission::from_toml(text, "profile.toml")
+                .map(|mission| (mission.name, mission.summary))
+                .map_err(|error| explained(&error.to_string())),
+            Err(error) => Err(error.to_string()),
+        };
+        Some(match parsed {
+            Ok((name, summary)) => Self { name: Some(name), summary: Some(summary), problem: None },
+            Err(problem) => Self { name: None, summary: None, problem: Some(problem) },
+        })
+    }
+}
+
+/// From the first record to the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Span {
+    /// Earliest log time, ns since the Unix epoch.
+    pub first_ns: u64,
+    /// Latest log time, ns since the Unix epoch.
+    pub last_ns: u64,
+    pub duration_s: f64,
+}
+
+impl Span {
+    pub(super) fn new(first_ns: u64, last_ns: u64) -> Self {
+        Self { first_ns, last_ns, duration_s: seconds(last_ns.saturating_sub(first_ns)) }
+    }
+}
+
+/// Whether anything is missing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Completeness {
+    /// The log was closed properly, is undamaged, and lacks nothing up to the end of its flight.
+    pub complete: bool,
+    /// Why the log could not be read to its end, if so.
+    pub damage: Option<String>,
+    /// The last time that could be read, s after the first record.
+    pub readable_until_s: Option<f64>,
+    /// How much is missing after that, s; known only if the end of the file can be read.
+    pub missing_s: Option<f64>,
+    /// Messages missing before the last of their channel.
+    pub messages_lost: u64,
+    /// Number of flights with ticks: more than one in a joined log.
+    pub flights: usize,
+    /// Where the record of a flight ends, if that is before the end of the flight.
+    pub cut: Option<Cut>,
+}
+
+impl Completeness {
+    pub(super) fn new(
+        damage: Option<&Damage>,
+        span: Option<&Span>,
+        channels: &[ChannelFacts],
+        summary: impl FnOnce() -> Option<SummaryFacts>,
+    ) -> Self {
+        let missing_s = damage.and_then(|_| {
+            let end_ns = summary()?.last_log_time_ns;
+            Some(seconds(end_ns.checked_sub(span?.last_ns)?))
+        });
+        let messages_lost = channels.iter().map(|channel| channel.lost).sum();
+        Self {
+            complete: damage.is_none() && messages_lost == 0,
+            damage: damage.map(ToString::to_string),
+            readable_until_s: span.map(|span| span.duration_s),
+            missing_s,
+            messages_lost,
+            flights: 0,
+            cut: None,
+        }
+    }
+
+    /// Adds what the flights of the log show.
+    pub(super) fn with_flights(self, flights: &Flights) -> Self {
+        let cut = flights.cut();
+        Self { complete: self.complete && cut.is_none(), flights: flights.flown(), cut, ..self }
+    }
+}
+
+/// The landing verdict, as recorded or heard.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictFacts {
+    /// Whether the vehicle landed within the limits that decide.
+    pub landed: bool,
+    /// How the flight ended, in one sentence.
+    pub ending: String,
+    /// Time of contact, s.
+    pub time_s: f64,
+    /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
+    pub clock: Clock,
+    /// The limits that decide: those of the legs.
+    pub limits: Vec<VerdictLimit>,
+    /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
+    pub table_2: Vec<VerdictLimit>,
+}
+
+/// A limit of the landing verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictLimit {
+    /// Name of the judged quantity.
+    pub name: String,
+    pub value: f64,
+    /// The lowest allowed.
+    pub minimum: f64,
+    /// The highest allowed.
+    pub maximum: f64,
+    /// Unit of value and limits.
+    pub unit: String,
+    /// Whether the value is inside the limits.
+    pub passed: bool,
+}
+
+impl VerdictFacts {
+    /// A recorded verdict.
+    pub fn of(verdict: &v1::LandingVerdict) -> Self {
+        let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
+            let limits = limits.iter().map(|limit| VerdictLimit {
+                name: limit.name.clone(),
+                value: limit.value,
+                minimum: limit.minimum,
+                maximum: limit.maximum,
+                unit: limit.unit.clone(),
+                passed: limit.passed,
+            });
+            limits.collect()
+        };
+        Self {
+            landed: verdict.landed,
+            ending: verdict.ending.clone().unwrap_or_else(|| ending_of_earlier(verdict)),
+            time_s: verdict.time_s,
+            clock: Clock::Flight,
+            limits: facts(&verdict.limits),
+            table_2: facts(&verdict.table_2),
+        }
+    }
+
+    /// The verdict that was found in a log.
+    pub(crate) fn found(found: &Found) -> Self {
+        let clock = if found.heard { Clock::Boot } else { Clock::Flight };
+        Self { clock, ..Self::of(&found.verdict) }
+    }
+
+    /// Its time of contact with its clock.
+    pub fn contact(&self) -> ClockTime {
+        ClockTime { clock: self.clock, time_s: self.time_s }
+    }
+}
+
+/// How a flight ended whose log, of an earlier release, does not say it.
+fn ending_of_earlier(verdict: &v1::LandingVerdict) -> String {
+    // The limits of a planar landing are Table 2; those of legs have other names.
+    let in_plane = verdict.limits.iter().any(|limit| limit.name == "u");
+    let broken = verdict.limits.iter().rev().find(|limit| !limit.passed);
+    FlightEnding {
+        aborted: false,
+        landed: verdict.landed,
+        table_2: in_plane.then_some(verdict.landed),
+        failure: broken.map(|limit| limit.name.as_str()),
+    }
+    .to_string()
+}
+
+fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}
+
+/// Writes a description of a log as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
+    writeln!(output, "{}{size}", shown(&info.file))?;
+    row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
+    row(output, "complete", &completeness(info))?;
+    if info.completeness.flights > 1 {
+        row(output, "flights", &format!("{}; `replay verify` reports on each", info.completeness.flights))?;
+    }
+    print_origin(info, output)?;
+    let schema = &info.schema;
+    if schema.version != schema.this_build {
+        let newer = schema.version > schema.this_build;
+        let words =
+            if newer { "newer than this build reads" } else { "without the flight computer's frames" };
+        row(
+            output,
+            "schema",
+            &format!("{}, {words} (this build writes {})", schema.version, schema.this_build),
+        )?;
+    }
+    if let Some(span) = &info.span {
+        let (first, last) = (utc(span.first_ns), utc(span.last_ns));
+        row(output, "time", &format!("{first} to {last}, {:.3} s", span.duration_s))?;
+    }
+    if let Some(timeline) = info.phases.first() {
+        print_phases(timeline, output)?;
+    }
+    print_verdict(info, output)?;
+    if let Some(frames) = &info.frames {
+        print_frames(frames, output)?;
+    }
+    print_channels(&info.channels, output)?;
+    let attached: Vec<String> = info
+        .attachments
+        .iter()
+        .map(|attachment| format!("{} ({})", shown(&attachment.name), size_text(attachment.bytes as u64)))
+        .collect();
+    row(output, "attached", &or_none(attached.join(", ")))?;
+    if let Some(reason) = &info.unreadable {
+        row(output, "unreadable", &shown(reason))?;
+    }
+    Ok(())
+}
+
+fn row(output: &mut impl Write, name: &str, text: &str) -> io::Result<()> {
+    writeln!(output, "{}", format!("{name:<11} {text}").trim_end())
+}
+
+fn completeness(info: &Info) -> String {
+    let found = &info.completeness;
+    if found.complete {
+        return "yes: ended properly, every checksum holds".to_owned();
+    }
+    let mut faults = Vec::new();
+    if let Some(damage) = &found.damage {
+        faults.push(shown(damage));
+        faults.push(match found.readable_until_s {
+            None => "no record could be read".to_owned(),
+            Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
+        });
+        faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
+    }
+    if found.messages_lost > 0 {
+        faults.push(format!("{} lost", counted(found.messages_lost, "message")));
+    }
+    faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
+    format!("NO: {}", faults.join("; "))
+}
+
+fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    row(output, "written by", &or_none(shown(&info.library)))?;
+    let listed = |entries: &BTreeMap<String, String>| {
+        let listed: Vec<String> =
+            entries.iter().map(|(key, value)| format!("{} {}", shown(key), or_none(short(value)))).collect();
+        or_none(listed.join(", "))
+    };
+    row(output, "run", &listed(&info.run))?;
+    let comparison = &info.build_comparison;
+    if !comparison.recorded {
+        row(output, "build", "not recorded")?;
+    } else if comparison.differences.is_empty() {
+        row(output, "build", &format!("this one: {}", listed(&info.build)))?;
+    } else {
+        row(output, "build", "differs from this build:")?;
+        for difference in &comparison.differences {
+            let value =
+                |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
+            let (recorded, this) = (value(&difference.recorded), value(&difference.this_build));
+            row(output, "", &format!("{}: {recorded} (this one: {this})", shown(&difference.fact)))?;
+        }
+    }
+    let profile = match &info.profile {
+        None => "not attached".to_owned(),
+        Some(profile) => match (&profile.name, &profile.summary) {
+            (Some(name), Some(summary)) => format!("{}: {}", shown(name), shown(summary)),
+            _ => format!("cannot be used: {}", shown(profile.problem.as_deref().unwrap_or_default())),
+        },
+    };
+    row(output, "profile", &profile)
+}
+
+fn print_phases(timeline: &PhaseTimeline, output: &mut impl Write) -> io::Result<()> {
+    for (index, span) in timeline.spans.iter().enumerate() {
+        let clock = match timeline.source {
+            PhaseSource::Vehicle => "T+",
+            PhaseSource::Telemetry => "the station's clock",
+        };
+        let from = if index == 0 {
+            format!("   ({clock}, from the {})", timeline.source.name())
+        } else {
+            String::new()
+        };
+        let name = if index == 0 { "phases" } else { "" };
+        row(output, name, &format!("{:>9.3} to {:>9.3} s  {}{from}", span.from_s, span.until_s, span.phase))?;
+    }
+    if timeline.further_changes > 0 {
+        row(output, "", &format!("and {} more", counted(timeline.further_changes, "change")))?;
+    }
+    Ok(())
+}
+
+fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    if let Some(ending) = &info.ending {
+        row(output, "verdict", &shown(ending))?;
+    }
+    let Some(verdict) = &info.verdict else {
+        return Ok(());
+    };
+    let contact = info.clocks.words(verdict.contact());
+    row(output, "", &format!("touchdown at {contact}"))?;
+    let by = if verdict.table_2.is_empty() { "" } else { "by the limits of the legs:" };
+    for (title, limits) in [(by, &verdict.limits), ("by the landing paper's Table 2:", &verdict.table_2)] {
+        if !title.is_empty() && !limits.is_empty() {
+            row(output, "", title)?;
+        }
+        for limit in limits {
+            let passed = if limit.passed { "inside" } else { "OUTSIDE" };
+            let text = format!(
+                "{:<14} {:>9.4} {:<6} {passed} {} to {}",
+                shown(&limit.name),
+                limit.value,
+                shown(&limit.unit),
+                rounded(limit.minimum),
+                rounded(limit.maximum)
+            );
+            row(output, "", &text)?;
+        }
+    }
+    Ok(())
+}
+
+fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> {
+    let FrameFacts { first, last, restarts, lost, repeated, start, solve_time, .. } = frames;
+    let start = if *start { "" } else { ", start NOT RECORDED" };
+    let lost = match lost {
+        0 => "none lost".to_owned(),
+        gaps => format!("{} LOST", counted(*gaps as u64, "gap")),
+    };
+    let restarts = counted(*restarts as u64, "restart");
+    row(output, "frames", &format!("{first} to {last}, {restarts}, {lost}{start}"))?;
+    if *repeated > 0 {
+        row(output, "", &format!("{repeated} repeated"))?;
+    }
+    let text = solve_time.as_ref().map_or_else(
+        || "not recorded: simulated without a clock".to_owned(),
+        |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
+    );
+    row(output, "solve time", &text)
+}
+
+fn solve_time_text(times: &SolveTimes) -> String {
+    format!(
+        "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it",
+        times.median_s * 1e3,
+        times.p99_s * 1e3,
+        times.max_s * 1e3,
+        times.deadline_s * 1e3,
+        times.over_deadline
+    )
+}
+
+fn print_channels(channels: &[ChannelFacts], output: &mut impl Write) -> io::Result<()> {
+    for (index, channel) in channels.iter().enumerate() {
+        let ChannelFacts { topic, schema, messages, lost, unreadable, metadata, .. } = channel;
+        let mut remarks: Vec<String> = ["endpoint", "link"]
+            .iter()
+            .filter_map(|key| metadata.get(*key))
+            .map(|value| shown(value))
+            .collect();
+        if *lost > 0 {
+            remarks.push(format!("{lost} LOST"));
+        }
+        if *unreadable > 0 {
+            remarks.push(format!("{unreadable} UNREADABLE"));
+        }
+        let text =
+            format!("{:<16} {messages:>8}  {:<31} {}", shown(topic), shown(schema), remarks.join(", "));
+        row(output, if index == 0 { "channels" } else { "" }, &text)?;
+    }
+    Ok(())
+}
+
+/// Only the beginning of a hash; JSON has all of it.
+fn short(value: &str) -> String {
+    const HASH_MIN: usize = 40;
+    const SHOWN: usize = 12;
+    let hash = value.len() >= HASH_MIN && value.bytes().all(|byte| byte.is_ascii_hexdigit());
+    shown(if hash { &value[..SHOWN] } else { value })
+}
+
+/// Rounds away the error of converting degrees to radians and back.
+fn rounded(limit: f64) -> f64 {
+    (limit * 1e6).round() / 1e6
+}
+
+fn or_none(text: String) -> String {
+    if text.is_empty() { "none".to_owned() } else { text }
+}
+
+fn size_text(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} bytes"),
+        10_000..10_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    }
+}
+
+/// To the millisecond.
+fn utc(unix_ns: u64) -> String {
+    const MILLISECOND_NS: u64 = 1_000_000;
+    OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ns - unix_ns % MILLISECOND_NS))
+        .ok()
+        .and_then(|time| time.format(&Rfc3339).ok())
+        .unwrap_or_else(|| format!("{unix_ns} ns"))
+}
+
+/// Stands for standard input.
+const STDIN: &str = "-";
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The logs, MCAP files; - is standard input.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Answer in JSON: a description, or a list of descriptions for several logs.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        let (mut described, mut refused) = (Vec::new(), false);
+        for file in &self.files {
+            match description(file) {
+                Ok(info) => described.push(info),
+                Err(error) if self.files.len() == 1 => return Err(error.into()),
+                // One unreadable log must not hide the others.
+                Err(error) => {
+                    refused = true;
+                    say(&format!("{:#}", anyhow::Error::from(error)));
+                }
+            }
+        }
+        answer(|output| match described.as_slice() {
+            [only] if self.json && self.files.len() == 1 => print_json(only, output),
+            all if self.json => print_json(&all, output),
+            all => all.iter().enumerate().try_for_each(|(place, info)| {
+                if place > 0 {
+                    writeln!(output)?;
+                }
+                print_info(info, output)
+            }),
+        })?;
+        // On a terminal the description has said it already.
+        let said = !self.json && std::io::stdout().is_terminal();
+        for info in described.iter().filter(|_| !said) {
+            warn_of_completeness(&info.file, &info.completeness);
+        }
+        Ok(if refused { Answer::NotAll } else { Answer::Given })
+    }
+}
+
+fn description(file: &std::path::Path) -> Result<Info, LogError> {
+    if file.as_os_str() == STDIN {
+        // A stream has no end to look for a summary at.
+        return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?, || None);
+    }
+    info(file)
 }

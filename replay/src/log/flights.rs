@@ -4,6 +4,7 @@
 //! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`. If the log
 //! has none, a flight begins with `/pilot/start`. Each flight ends with its verdict.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use flight::computer::FRAME_S;
@@ -143,5 +144,150 @@ impl Flights {
     /// How many flights have ticks.
     pub fn flown(&self) -> usize {
         self.found.iter().filter(|flight| flight.ticks > 0).count()
+    }
+}
+
+/// Checks the order of frames as they are read from the file.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FrameOrder {
+    last_frame: u64,
+    /// The sequence number of the channel's next record if none is lost.
+    next_record: u32,
+    /// Another flight comes before this one in the log. Sequence numbers may continue or start again, so the number of
+    /// the flight's first frame shows whether frames are lost.
+    behind_another: bool,
+}
+
+/// The number of a flight's first frame.
+const FIRST_FRAME: u64 = 1;
+
+impl FrameOrder {
+    /// The order of a flight that follows another one in the same log.
+    pub fn behind_another() -> Self {
+        Self { behind_another: true, ..Self::default() }
+    }
+
+    /// Takes a frame and the sequence number of its record; returns the gap before it, if records are lost there.
+    pub fn note(&mut self, frame: u64, record: u32) -> Option<Gap> {
+        let gap = Gap { after: self.last_frame, before: frame };
+        let lost = if self.behind_another { frame > FIRST_FRAME } else { record > self.next_record };
+        self.behind_another = false;
+        self.last_frame = frame;
+        // A writer without sequence numbers leaves 0 everywhere, and no loss can be seen.
+        self.next_record = record.saturating_add(1);
+        lost.then_some(gap)
+    }
+}
+
+/// A set of tick numbers, stored as runs.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TickRanges {
+    /// First number of each run, and its last.
+    runs: BTreeMap<u64, u64>,
+    repeated: u64,
+}
+
+/// A gap between two ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Gap {
+    /// The last tick before the gap.
+    pub after: u64,
+    /// The first tick after the gap.
+    pub before: u64,
+}
+
+impl TickRanges {
+    /// Adds a number.
+    pub fn insert(&mut self, tick: u64) {
+        let left = self.runs.range(..=tick).next_back().map(|(first, last)| (*first, *last));
+        if left.is_some_and(|(_, last)| tick <= last) {
+            self.repeated += 1;
+            return;
+        }
+        let first = match left {
+            Some((first, last)) if last.checked_add(1) == Some(tick) => first,
+            _ => tick,
+        };
+        let behind = tick.checked_add(1).and_then(|next| self.runs.remove(&next));
+        self.runs.insert(first, behind.unwrap_or(tick));
+    }
+
+    /// The lowest and the highest number.
+    pub fn bounds(&self) -> Option<(u64, u64)> {
+        Some((*self.runs.first_key_value()?.0, *self.runs.last_key_value()?.1))
+    }
+
+    pub fn repeated(&self) -> u64 {
+        self.repeated
+    }
+
+    /// The gaps between the lowest and the highest number.
+    pub fn gaps(&self) -> impl Iterator<Item = Gap> {
+        let behind = self.runs.keys().skip(1);
+        self.runs.values().zip(behind).map(|(last, first)| Gap { after: *last, before: *first })
+    }
+}
+
+impl Gap {
+    /// How many ticks are missing.
+    pub fn missing(&self) -> u64 {
+        self.before.saturating_sub(self.after).saturating_sub(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    fn gaps(frames: &[(u64, u32)]) -> Vec<(u64, u64)> {
+        let mut order = FrameOrder::default();
+        frames
+            .iter()
+            .filter_map(|(frame, record)| order.note(*frame, *record))
+            .map(|gap| (gap.after, gap.before))
+            .collect()
+    }
+
+    #[test]
+    fn a_restart_is_no_loss_and_a_loss_is() {
+        assert_eq!(gaps(&[(1, 0), (2, 1), (52, 2), (53, 3)]), []);
+        assert_eq!(gaps(&[(1, 0), (2, 1), (52, 51), (53, 52)]), [(2, 52)]);
+        assert_eq!(gaps(&[(7, 6), (8, 7)]), [(0, 7)]);
+        assert_eq!(gaps(&[(1, 0), (2, 0), (90, 0)]), []);
+        let mut second = FrameOrder::behind_another();
+        assert_eq!((second.note(1, 600), second.note(2, 601)), (None, None));
+        assert!(second.note(5, 605).is_some() && FrameOrder::behind_another().note(601, 600).is_some());
+        assert_eq!(gaps(&[(1, u32::MAX), (2, u32::MAX)]), [(0, 1)]);
+    }
+
+    proptest! {
+        #[test]
+        fn runs_and_gaps_are_those_of_a_plain_set(numbers in prop::collection::vec(0..40_u64, 1..60)) {
+            let mut ranges = TickRanges::default();
+            for number in &numbers {
+                ranges.insert(*number);
+            }
+            let set: BTreeSet<u64> = numbers.iter().copied().collect();
+            let (first, last) = ranges.bounds().unwrap();
+            prop_assert_eq!(Some(&first), set.first());
+            prop_assert_eq!(Some(&last), set.last());
+            let missing: BTreeSet<u64> = ranges.gaps().flat_map(|gap| gap.after + 1..gap.before).collect();
+            let expected: BTreeSet<u64> = (first..=last).filter(|number| !set.contains(number)).collect();
+            prop_assert_eq!(missing, expected);
+            prop_assert_eq!(ranges.repeated() as usize, numbers.len() - set.len());
+        }
+    }
+
+    #[test]
+    fn the_ends_of_the_numbers_do_not_overflow() {
+        let mut ranges = TickRanges::default();
+        for number in [u64::MAX, 0, u64::MAX - 1, u64::MAX] {
+            ranges.insert(number);
+        }
+        assert_eq!(ranges.bounds(), Some((0, u64::MAX)));
+        assert_eq!(ranges.gaps().map(|gap| gap.missing()).sum::<u64>(), u64::MAX - 2);
     }
 }

@@ -4,36 +4,30 @@
 //! ([`FlightLog::damage`]); every record before the damage has been returned.
 
 mod clocks;
-mod entry;
-mod error;
 mod flights;
-mod frame_order;
 mod head;
-mod heard;
-mod new_log;
+mod record;
 mod recording;
-mod schema;
-mod summary;
-mod tick_ranges;
-
-pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
-pub use entry::{Entry, StampedEntry};
-pub use error::LogError;
-pub use flights::{Cut, Flights, LoggedFlight};
-pub use frame_order::FrameOrder;
-pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-pub(crate) use heard::{Found, Heard, Verdicts, frame_of, heard_message};
-pub(crate) use new_log::{NewLog, NewLogError};
-pub use recording::{Recording, RecordingError};
-pub(crate) use schema::{computer_descriptor, pilot_descriptor};
-pub use summary::{SummaryFacts, summary_of};
-pub use tick_ranges::{Gap, TickRanges};
+mod verdict;
 
 use std::fs::File;
-use std::io::{BufReader, Chain, Cursor, Read};
+use std::io::{BufReader, BufWriter, Chain, Cursor, Read, Seek as _, Write as _};
 use std::path::Path;
 
-use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
+pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
+pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight, TickRanges};
+pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
+use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, RECORD_LIMIT_BYTES};
+use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_RAW_RX, TOPIC_TELEMETRY};
+use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+use protocol::text::printable;
+pub use record::{Entry, StampedEntry};
+pub(crate) use record::{computer_descriptor, pilot_descriptor};
+pub use recording::{Recording, RecordingError};
+pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
+
+use crate::output::{Destination, NewFile};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -157,4 +151,163 @@ impl<R: Read> FlightLog<R> {
         let topics = self.reader.channels().map(|(_, channel)| channel.topic.clone()).collect();
         Err(LogError::Foreign { name: self.name.clone(), library: self.head.library.clone(), topics })
     }
+}
+
+/// Most topics of a foreign file listed in a message.
+const TOPICS_SHOWN: usize = 8;
+
+/// Why a file cannot be used as a flight log. Damage inside a log is not a reason.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The file cannot be read.
+    #[error("{name}: cannot be read")]
+    Read {
+        /// The file.
+        name: String,
+        /// Error from the operating system.
+        source: std::io::Error,
+    },
+    /// The file is empty.
+    #[error("{name}: is empty; a flight log is an MCAP file")]
+    Empty {
+        /// The file.
+        name: String,
+    },
+    /// The file is of another kind.
+    #[error(
+        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a{}",
+        hex(found),
+        hint(name)
+    )]
+    NotMcap {
+        /// The file.
+        name: String,
+        /// Its first bytes.
+        found: Vec<u8>,
+    },
+    /// The file begins like a log, but no message can be read.
+    #[error("{name}: nothing could be read: it is damaged before its first message: {damage}")]
+    NothingReadable {
+        /// The file.
+        name: String,
+        /// What is wrong.
+        damage: String,
+    },
+    /// An MCAP file of another program.
+    #[error(
+        "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {}, {} or similar topics",
+        printable(library.as_bytes()), listed(topics), TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_TELEMETRY,
+        TOPIC_RAW_RX
+    )]
+    Foreign {
+        /// The file.
+        name: String,
+        /// The library that wrote it.
+        library: String,
+        topics: Vec<String>,
+    },
+}
+
+/// Advice for a file of another known kind.
+fn hint(name: &str) -> &'static str {
+    let is_tlog =
+        std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+    if is_tlog { "; `replay export` makes a log of a .tlog" } else { "" }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
+fn listed(topics: &[String]) -> String {
+    if topics.is_empty() {
+        return "no topics".to_owned();
+    }
+    let mut shown: Vec<String> =
+        topics.iter().take(TOPICS_SHOWN).map(|topic| printable(topic.as_bytes())).collect();
+    if topics.len() > TOPICS_SHOWN {
+        shown.push(format!("{} more", topics.len() - TOPICS_SHOWN));
+    }
+    format!("the topics {}", shown.join(", "))
+}
+
+/// A log being written; see [`NewFile`].
+pub(crate) struct NewLog {
+    writer: LogWriter<BufWriter<NewFile>>,
+}
+
+/// Why a new log could not be written.
+pub(crate) enum NewLogError {
+    /// The file exists or cannot be created.
+    Create(std::io::Error),
+    /// Writing failed.
+    Write(LogWriteError),
+}
+
+impl NewLog {
+    pub(crate) fn create(
+        destination: Destination,
+        input: &Path,
+        header: &LogHeader,
+    ) -> Result<Self, NewLogError> {
+        let file = NewFile::create(destination, input).map_err(NewLogError::Create)?;
+        let writer = LogWriter::new(BufWriter::new(file), header).map_err(NewLogError::Write)?;
+        Ok(Self { writer })
+    }
+
+    pub(crate) fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), NewLogError> {
+        self.writer.write(record, time_ns).map_err(NewLogError::Write)
+    }
+
+    pub(crate) fn finish(self) -> Result<(), NewLogError> {
+        let failed = |error| NewLogError::Write(mcap::McapError::from(error).into());
+        let mut file = self.writer.finish().map_err(NewLogError::Write)?;
+        file.flush().map_err(failed)?;
+        let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
+        file.commit().map_err(failed)
+    }
+}
+
+/// Facts from a file's summary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SummaryFacts {
+    /// Messages in the file.
+    pub message_count: u64,
+    /// Of these, frames of the flight computer.
+    pub ticks: u64,
+    /// Time of the last message, ns since the Unix epoch.
+    pub last_log_time_ns: u64,
+}
+
+/// Reads the summary at the end of a file, if possible.
+pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
+    let summary = read_summary(path)?;
+    let stats = summary.stats?;
+    let is_tick =
+        |id: &u16| summary.channels.get(id).is_some_and(|channel| channel.topic == TOPIC_PILOT_TICK);
+    let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_tick(id));
+    Some(SummaryFacts {
+        message_count: stats.message_count,
+        ticks: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
+        last_log_time_ns: stats.message_end_time,
+    })
+}
+
+/// The summary at the end of a file; `None` if the file has none that can be read.
+fn read_summary(path: &Path) -> Option<mcap::Summary> {
+    let mut file = File::open(path).ok()?;
+    let size = file.metadata().ok()?.len();
+    let options =
+        SummaryReaderOptions::default().with_file_size(size).with_record_length_limit(RECORD_LIMIT_BYTES);
+    let mut reader = SummaryReader::new_with_options(options);
+    while let Some(event) = reader.next_event() {
+        match event.ok()? {
+            SummaryReadEvent::ReadRequest(need) => {
+                let count = file.read(reader.insert(need)).ok()?;
+                reader.notify_read(count);
+            }
+            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to).ok()?),
+        }
+    }
+    reader.finish()
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::{flight_v1, v1};
 
-use super::heard::{Verdicts, heard_message};
+use super::verdict::{Verdicts, heard_message};
 use super::{Clocks, Cut, Entry, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
 
 /// Most records of one kind: seventeen minutes of frames at 200 Hz.

@@ -9,15 +9,20 @@ mod scan;
 mod write;
 
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use anyhow::Result;
+use clap::Args;
 use mcap::records::op;
-use serde::Serialize;
-
-use crate::log::LogError;
-use crate::output::Destination;
 use scan::{ChunkName, Good, Records};
+use serde::Serialize;
 use write::Rescue;
+
+use crate::cli::{Answer, answer};
+use crate::log::LogError;
+use crate::output::{Destination, Overwrite};
+use crate::print::{counted, print_json, shown};
 
 /// Why nothing could be recovered.
 #[derive(Debug, thiserror::Error)]
@@ -249,4 +254,68 @@ fn lost_of(
     }));
     lost.sort_by_key(|lost| lost.from_byte);
     lost
+}
+
+/// Writes what was recovered and what is lost as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_recovery(recovery: &Recovery, output: &mut impl Write) -> io::Result<()> {
+    let kept_s = recovery.kept_s.map(|kept_s| format!(" over {kept_s:.3} s")).unwrap_or_default();
+    writeln!(
+        output,
+        "{}: kept {} in {}{kept_s}, {} about the log; written to {}",
+        shown(&recovery.input),
+        counted(recovery.messages, "message"),
+        counted(recovery.chunks, "chunk"),
+        counted(recovery.records_about, "record"),
+        recovery.output.display()
+    )?;
+    for lost in &recovery.lost {
+        let span = lost.span_s.map_or_else(
+            || "of unknown time".to_owned(),
+            |(from, until)| format!("{from:.3} to {until:.3} s after the first message"),
+        );
+        writeln!(
+            output,
+            "lost {} from byte {}, {span}: {}",
+            counted(lost.bytes, "byte"),
+            lost.from_byte,
+            shown(&lost.reason)
+        )?;
+    }
+    if recovery.was_whole() {
+        return writeln!(output, "the log was whole: nothing is lost");
+    }
+    if let Some(fault) = recovery.fault() {
+        writeln!(output, "the log was DAMAGED: {fault}; the recovered log says so, too")?;
+    }
+    Ok(())
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The damaged log.
+    file: PathBuf,
+    /// The log to write.
+    output: PathBuf,
+    /// Replace an existing file, but never the damaged log itself.
+    #[arg(long)]
+    force: bool,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let recovery = recover(&self.file, destination)?;
+        answer(
+            |output| {
+                if self.json { print_json(&recovery, output) } else { print_recovery(&recovery, output) }
+            },
+        )?;
+        Ok(Answer::Given)
+    }
 }

@@ -13,28 +13,37 @@
 //! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
 //! computer only. The crew's abort comes at its recorded frame.
 
+pub mod flip;
+mod jobs;
 mod prepared;
 mod rerun;
-mod write;
-
-pub use prepared::Prepared;
-pub use write::{ReflyLogError, write_log};
+pub mod vary;
 
 use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, Result, anyhow, bail};
+use clap::{Args, ValueEnum};
 use flight::rules::phase::Phase;
-use protocol::log::record::Record;
+pub use prepared::Prepared;
+use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
+use protocol::log::writer::{LogHeader, LogWriteError};
 use serde::Serialize;
 use sim::sortie::SetUpError;
 use world::world::WorldError;
 
+use crate::cli::{Answer, answer, warn_of_what_is_missing};
+use crate::controller::{REFLOWN_AT, REFLOWN_BY};
 use crate::info::VerdictFacts;
-use crate::log::{Recording, RecordingError};
-use crate::settings::{Setting, SettingError};
+use crate::log::{Clock, ClockTime, NewLog, NewLogError, Recording, RecordingError};
+use crate::output::{Destination, Overwrite};
+use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
+use crate::settings::{Setting, SettingArguments, SettingError};
 
 /// The controller that flies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// As recorded.
@@ -74,7 +83,7 @@ pub enum StartAt {
 }
 
 /// Which recorded state to begin from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum From {
     /// The simulated world's.
@@ -290,4 +299,306 @@ pub fn margin(verdict: &VerdictFacts) -> f64 {
         if fraction.is_nan() { f64::NEG_INFINITY } else { fraction }
     });
     fractions.fold(f64::INFINITY, f64::min)
+}
+
+/// Why a log could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReflyLogError {
+    /// The file exists or cannot be created.
+    #[error("{}: cannot be created", path.display())]
+    Create {
+        path: PathBuf,
+        /// Error from the operating system.
+        source: std::io::Error,
+    },
+    /// Writing failed.
+    #[error("{}: cannot be written", path.display())]
+    Write {
+        path: PathBuf,
+        /// Error from the writer.
+        source: LogWriteError,
+    },
+}
+
+/// Writes a re-flown flight as a log that every command accepts.
+///
+/// # Errors
+/// The file exists and may not be replaced, or cannot be created or written.
+pub fn write_log<'a>(
+    destination: impl Into<Destination<'a>>,
+    recording: &Recording,
+    options: &ReflyOptions,
+    report: &ReflyReport,
+    flight: &ReflownFlight,
+) -> Result<(), ReflyLogError> {
+    let destination = destination.into();
+    let path = destination.path;
+    let failed = |error| match error {
+        NewLogError::Create(source) => ReflyLogError::Create { path: path.to_owned(), source },
+        NewLogError::Write(source) => ReflyLogError::Write { path: path.to_owned(), source },
+    };
+    let header = header(recording, options, report, flight);
+    let mut log = NewLog::create(destination, Path::new(&recording.name), &header).map_err(failed)?;
+    for (time_s, record) in records(report, flight) {
+        log.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(failed)?;
+    }
+    log.finish().map_err(failed)
+}
+
+fn header(
+    recording: &Recording,
+    options: &ReflyOptions,
+    report: &ReflyReport,
+    flight: &ReflownFlight,
+) -> LogHeader {
+    let mut run: BTreeMap<String, String> = recording.head.run.clone();
+    run.insert("reflown_from".to_owned(), report.file.clone());
+    run.insert(REFLOWN_AT.to_owned(), report.start.tick.to_string());
+    run.insert("reflown_with".to_owned(), report.settings.join(" "));
+    if report.law != Law::AsRecorded {
+        run.insert(REFLOWN_BY.to_owned(), report.law.name().to_owned());
+    }
+    run.extend(flight.run.clone());
+    run.insert("plant_settings".to_owned(), report.plant_settings.join(" "));
+    run.retain(|_, fact| !fact.is_empty());
+    if let Some(seed) = options.seed {
+        run.insert("seed".to_owned(), seed.to_string());
+        let before = recording.head.run.get("seed").map_or("not recorded", String::as_str);
+        run.insert("reflown_instead_of_seed".to_owned(), before.to_owned());
+    }
+    let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
+    LogHeader {
+        writer: "replay".to_owned(),
+        start_unix_ns: start.unwrap_or(0),
+        run,
+        // It keeps its mission; its settings change in flight.
+        profile_toml: recording.profile_toml().ok().map(str::to_owned),
+        scenario_toml: recording.head.scenario_toml.clone(),
+    }
+}
+
+/// Every record with its vehicle time, s, in order.
+fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
+    let mut records = flight.records.clone();
+    let began = Event {
+        level: EventLevel::Info,
+        name: "replay".to_owned(),
+        message: format!("flown again in simulation from tick {}", report.start.tick),
+    };
+    records.push((report.start.time_s, Record::Event(began)));
+    let end_s = records.iter().map(|(time_s, _)| *time_s).fold(0.0, f64::max);
+    records.extend(flight.verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict)))));
+    records.sort_by(|a, b| a.0.total_cmp(&b.0));
+    records
+}
+
+/// Writes the result of flying a flight again.
+///
+/// # Errors
+/// The output failed.
+pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
+    let start = &report.start;
+    writeln!(
+        output,
+        "from tick {} (T+{:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
+        start.tick,
+        start.time_s,
+        start.phase,
+        match start.from {
+            crate::refly::From::Truth => "truth",
+            crate::refly::From::Estimate => "estimate",
+        },
+        start.x_m,
+        start.z_m,
+        report.thrust_scale
+    )?;
+    for (what, settings) in [("with", &report.settings), ("plant alone with", &report.plant_settings)] {
+        if !settings.is_empty() {
+            writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
+        }
+    }
+    for (what, faults) in
+        [("with the fault", &report.faults.with), ("without the fault", &report.faults.without)]
+    {
+        if !faults.is_empty() {
+            writeln!(output, "{what} {}, from the beginning of the flight", shown(&faults.join(" ")))?;
+        }
+    }
+    if let Some(seed) = report.seed {
+        writeln!(output, "plant drawn with seed {seed} instead of the recorded one")?;
+    }
+    let Reached { frames, identical, first_different } = report.reached;
+    writeln!(
+        output,
+        "flown again from its start up to there: {identical} of {frames} recorded frames identical"
+    )?;
+    if let Some(frame) = first_different {
+        writeln!(
+            output,
+            "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
+        )?;
+    }
+    match report.law {
+        Law::AsRecorded => {}
+        law => writeln!(output, "with the landing burn flown by {}", law.name())?,
+    }
+    print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
+    let answer = match report.verdict_changed {
+        Some(true) => "the verdict CHANGES",
+        Some(false) => "the verdict does not change",
+        None => "the log has no verdict to compare with",
+    };
+    let margin = report.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
+    writeln!(output, "{answer}; margin to the nearest limit {margin}")?;
+    writeln!(
+        output,
+        "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
+        counted(report.ticks as u64, "tick"),
+        report.commands_recorded,
+        report.commands_identical,
+        report.gimbal_difference_max_rad
+    )
+}
+
+/// Two verdicts, limit by limit.
+pub(crate) fn print_verdicts(
+    recorded: Option<&VerdictFacts>,
+    now: Option<&VerdictFacts>,
+    output: &mut impl Write,
+) -> io::Result<()> {
+    let words = |verdict| verdict_words(verdict, "no verdict");
+    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
+    writeln!(output, "{:<14} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
+    for LimitRow { limit, values: [then, now] } in
+        verdict_rows(now.or(recorded), [recorded, now], shown, " OUTSIDE")
+    {
+        writeln!(
+            output,
+            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
+            shown(&limit.name),
+            limit.minimum,
+            limit.maximum
+        )?;
+    }
+    Ok(())
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The log, an MCAP file; with --vary one or more.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    how: FlownHow,
+    /// Begin at this frame instead of the landing's first.
+    #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase", "flip", "vary", "vary_plant"])]
+    tick: Option<u64>,
+    /// Begin at this time in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8
+    /// (since power-up), log:19.7 (since the first record).
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["phase", "flip", "vary", "vary_plant"])]
+    at: Option<ClockTime>,
+    /// Begin with this phase, as in POWERED.
+    #[arg(long, value_name = "PHASE", value_parser = phase_named, conflicts_with_all = ["flip", "vary", "vary_plant"])]
+    phase: Option<Phase>,
+    /// Write the flight as a new log.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["flip", "vary", "vary_plant"])]
+    log: Option<PathBuf>,
+    /// Replace an existing file, but never the log that is flown again.
+    #[arg(long, requires = "log")]
+    force: bool,
+    #[command(flatten)]
+    vary: vary::Arguments,
+    #[command(flatten)]
+    flip: flip::Arguments,
+    /// Answer in JSON; with --vary, every point.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+}
+
+/// How a flight is flown again, wherever it begins.
+#[derive(Debug, Args)]
+pub(crate) struct FlownHow {
+    #[command(flatten)]
+    pub(crate) settings: SettingArguments,
+    /// Another setting of the plant only, which the controller does not know about. For example
+    /// airframe.motor=G33, truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE")]
+    plant: Vec<Setting>,
+    /// The recorded state to begin from.
+    #[arg(long, value_enum, default_value_t = From::Truth)]
+    from: From,
+    /// The controller that flies.
+    #[arg(long, value_enum, default_value_t = Law::AsRecorded)]
+    controller: Law,
+    /// Another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
+    /// flown with it from its beginning.
+    #[arg(long = "fault", value_name = "FAULT")]
+    faults: Vec<String>,
+    /// Leave out a recorded fault, by its name or in full; `all` for every one.
+    #[arg(long, value_name = "FAULT")]
+    without_fault: Vec<String>,
+    /// Seed of the plant's dispersions instead of the recorded one.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+impl FlownHow {
+    pub(crate) fn options(&self, start: StartAt) -> Result<ReflyOptions> {
+        Ok(ReflyOptions {
+            start,
+            from: self.from,
+            settings: self.settings.all()?,
+            plant_settings: self.plant.clone(),
+            law: self.controller,
+            seed: self.seed,
+            faults: FaultChanges { with: self.faults.clone(), without: self.without_fault.clone() },
+        })
+    }
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        if self.vary.is_asked() {
+            return self.vary.run(&self.files, &self.how, self.json);
+        }
+        let [file] = self.files.as_slice() else {
+            bail!("several flights need --vary, as in --vary powered.weights.theta=50:110:7")
+        };
+        if self.flip.is_asked() {
+            return self.flip.run(file, &self.how, self.json);
+        }
+        let recording = Recording::open(file)?;
+        let start = match (self.tick, self.at, self.phase) {
+            (Some(tick), ..) => StartAt::Tick(tick),
+            (_, Some(time), _) => StartAt::Time(flight_time_s(&recording, time)?),
+            (.., Some(phase)) => StartAt::Phase(phase),
+            _ => StartAt::Landing,
+        };
+        warn_of_what_is_missing(&recording);
+        let options = self.how.options(start)?;
+        let (report, flight) = refly_flight(&recording, &options)?;
+        if let Some(path) = &self.log {
+            let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
+            write_log(destination, &recording, &options, &report, &flight)?;
+        }
+        answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
+        Ok(Answer::Given)
+    }
+}
+
+fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
+    let converted = recording.clocks.convert(time, Clock::Flight);
+    let name = &recording.name;
+    converted.map(|time| time.time_s).with_context(|| {
+        format!("--at {time}: {name} does not say when its T+0 was on that clock; give the time as T+SECONDS")
+    })
+}
+
+fn phase_named(given: &str) -> Result<Phase> {
+    let known = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given));
+    known.ok_or_else(|| {
+        let names: Vec<&str> = Phase::ALL.iter().map(|phase| phase.name()).collect();
+        anyhow!("no phase `{given}`; there are {}", names.join(", "))
+    })
 }

@@ -4,18 +4,21 @@
 //! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. If the log lacks something,
 //! the section says so. A flight is shown in the plane of its landing.
 
-mod axis;
 mod chart;
 mod html;
-mod page;
 mod section;
 mod track;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use track::Flight;
+
+use crate::cli::{Answer, answer, warn_of_completeness};
 use crate::info::{Completeness, Info, info};
 use crate::log::{Recording, RecordingError};
-use track::Flight;
+use crate::output::{Destination, NewFile, Overwrite, same_file};
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -34,7 +37,7 @@ pub struct Report {
 /// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let (flight, info) = told(path)?;
-    let html = page::page(&flight, &info, &section::all(&flight, &info));
+    let html = html::page(&flight, &info, &section::all(&flight, &info));
     Ok(Report { name: info.file, html, completeness: info.completeness })
 }
 
@@ -47,7 +50,7 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
     let mut sections = section::all(&flight, &info);
     let both = section::overlay::html([(&flight, &info), (&other, &others)]);
     sections.insert(1, section::Section { title: "Two flights", html: both });
-    let html = page::page(&flight, &info, &sections);
+    let html = html::page(&flight, &info, &sections);
     Ok(Report { name: info.file, html, completeness: info.completeness })
 }
 
@@ -57,4 +60,49 @@ fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let info: Info = info(path)?;
     let flight = Flight::of(recording);
     Ok((flight, info))
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The log, an MCAP file.
+    file: PathBuf,
+    /// The page to write, or - for standard output; the log's name with .html if left out.
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Another log, whose flight is drawn into the same pictures.
+    #[arg(long, value_name = "LOG")]
+    with: Option<PathBuf>,
+    /// Replace an existing file, but never the log.
+    #[arg(long)]
+    force: bool,
+}
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        use std::io::Write as _;
+        let page = match &self.with {
+            None => report(&self.file)?,
+            Some(with) => report_with(&self.file, with)?,
+        };
+        let html = page.html;
+        let path = self.output.clone().unwrap_or_else(|| self.file.with_extension("html"));
+        if path.as_os_str() == "-" {
+            answer(|output| output.write_all(html.as_bytes()))?;
+            warn_of_completeness(&page.name, &page.completeness);
+            return Ok(Answer::Given);
+        }
+        if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
+            bail!("{}: is a log that is being read", path.display());
+        }
+        let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
+        NewFile::create(destination, &self.file)
+            .and_then(|mut file| {
+                file.write_all(html.as_bytes())?;
+                file.commit()
+            })
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+        answer(|output| writeln!(output, "{}", path.display()))?;
+        warn_of_completeness(&page.name, &page.completeness);
+        Ok(Answer::Given)
+    }
 }

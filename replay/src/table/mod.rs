@@ -6,10 +6,471 @@
 //! A short list (four fins) has one column for each element, a long one (a plan's nodes) has none. The limits of
 //! a verdict are rows of a separate table.
 
-mod columns;
 mod dialect;
-mod mavlink;
-mod rows;
 
-pub use columns::{Column, Kind, Meaning, TableShape};
-pub use rows::{Cell, Row, TableReader};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry::{Occupied, Vacant};
+use std::io::Read;
+
+use prost_reflect::{
+    DescriptorPool, DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor,
+    ReflectMessage as _, Value,
+};
+use protocol::identity::Address;
+use protocol::log::reader::LogChannel;
+use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
+use protocol::log::v1;
+
+use self::dialect::{cells_of_frame, shape_of_frame, words_of};
+use crate::log::{Entry, FlightLog, LogError, StampedEntry, frame_of};
+
+/// A list up to this length has one column for each element; a longer one, has none.
+const LIST_MAX: usize = 8;
+
+/// Unit suffixes of field names and their units, the longest first.
+const UNITS: [(&str, &str); 13] = [
+    ("_rad_s2", "rad/s2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s2"),
+    ("_m_s", "m/s"),
+    ("_kg_m2", "kg m2"),
+    ("_bytes", "bytes"),
+    ("_rad", "rad"),
+    ("_deg", "deg"),
+    ("_kg", "kg"),
+    ("_ms", "ms"),
+    ("_m", "m"),
+    ("_n", "N"),
+    ("_s", "s"),
+];
+
+/// The components of vectors and quaternions.
+const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
+
+/// The type of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Numbers.
+    Float,
+    /// Whole numbers, and flags as 0 and 1.
+    Integer,
+    Text,
+}
+
+/// One column of a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Its name, with its unit.
+    pub name: String,
+    pub kind: Kind,
+    pub meaning: Meaning,
+}
+
+/// What the numbers of a column mean, from the schema or the dialect.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Meaning {
+    /// As in `m/s`; empty without one.
+    pub unit: String,
+    /// In words; empty if neither schema nor dialect says more than the name.
+    pub words: String,
+    /// The enum of the dialect that has words for the numbers.
+    pub(super) values_of: Option<String>,
+}
+
+impl Meaning {
+    /// The words for the numbers of the column, if it is an enum.
+    pub fn values(&self) -> &'static [(i64, String)] {
+        self.values_of.as_deref().map_or(&[], words_of)
+    }
+
+    /// The meaning of a field of a record, from the names and the comments in its schema; `path` has the fields from the
+    /// outside in. The components of a vector have the unit of the vector, and a field without a comment has that of the
+    /// field around it.
+    fn of(path: &[FieldDescriptor]) -> Self {
+        let unit_of = |field: &FieldDescriptor| {
+            UNITS.into_iter().find(|(suffix, _)| field.name().ends_with(suffix)).map(|(_, unit)| unit)
+        };
+        let mut inside_out = path.iter().rev().skip_while(|field| COMPONENTS.contains(&field.name()));
+        let unit = inside_out.next().and_then(unit_of).unwrap_or_default();
+        let mut comments = path.iter().rev().map(comment_on);
+        let words = comments.find(|words| !words.is_empty()).unwrap_or_default();
+        // "As in the dialect's TD_PHASE."
+        let of_field = path.last().map(comment_on).unwrap_or_default();
+        let mut all = of_field.split(|c: char| !(c.is_ascii_uppercase() || c == '_'));
+        let values_of = all.find(|word| word.starts_with("TD_") && !words_of(word).is_empty());
+        Self { unit: unit.to_owned(), values_of: values_of.map(str::to_owned), words }
+    }
+}
+
+/// The comment before a field in its schema, in one line.
+fn comment_on(field: &FieldDescriptor) -> String {
+    let file = field.parent_file();
+    let info = file.file_descriptor_proto().source_code_info.as_ref();
+    let found = info.and_then(|info| info.location.iter().find(|location| location.path == field.path()));
+    let comment = found.and_then(|location| location.leading_comments.as_deref()).unwrap_or_default();
+    comment.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The name and the columns of a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TableShape {
+    /// Its name: the topic in lower case with underscores, as in `controller_tick`.
+    pub name: String,
+    /// Its columns; the first is `log_time_ns`, Unix time.
+    pub columns: Vec<Column>,
+}
+
+/// Path of a column's value in a record: fields from the outside in, and an element of a list.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    pub(super) fields: Vec<FieldDescriptor>,
+    pub(super) element: Option<usize>,
+}
+
+impl TableShape {
+    pub(super) fn new(name: &str, columns: &[(&str, Kind)]) -> Self {
+        let time = Column {
+            name: "log_time_ns".to_owned(),
+            kind: Kind::Integer,
+            meaning: Meaning {
+                unit: "ns".to_owned(),
+                words: "Unix time of the record.".to_owned(),
+                values_of: None,
+            },
+        };
+        let others = columns.iter().map(|(name, kind)| Column {
+            name: (*name).to_owned(),
+            kind: *kind,
+            meaning: Meaning::default(),
+        });
+        Self { name: name.to_owned(), columns: std::iter::once(time).chain(others).collect() }
+    }
+
+    /// The table of a kind of record, and the paths of its columns' values, without the time. Lists are assumed to be
+    /// as long as in this first record.
+    pub(super) fn of_record(name: &str, first: &DynamicMessage) -> (Self, Vec<Place>) {
+        let mut shape = Self::new(name, &[]);
+        let mut places = Vec::new();
+        walk(&first.descriptor(), Some(first), &mut Vec::new(), &mut |column, place| {
+            shape.columns.push(column);
+            places.push(place);
+        });
+        (shape, places)
+    }
+}
+
+/// The name of a topic's table.
+pub(super) fn table_name(topic: &str) -> String {
+    let word = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
+    topic.trim_matches('/').chars().map(word).collect()
+}
+
+fn walk(
+    descriptor: &MessageDescriptor,
+    record: Option<&DynamicMessage>,
+    above: &mut Vec<FieldDescriptor>,
+    take: &mut impl FnMut(Column, Place),
+) {
+    // A schema may contain itself; this is the deepest nesting that is followed.
+    if above.len() > LIST_MAX {
+        return;
+    }
+    for field in descriptor.fields() {
+        above.push(field.clone());
+        let name = above.iter().map(|field| field.name().to_owned()).collect::<Vec<_>>().join(".");
+        let value = record.map(|record| record.get_field(&field).into_owned());
+        match (field.kind(), kind_of(&field), value) {
+            (FieldKind::Message(inner), _, value) if !field.is_list() && !field.is_map() => {
+                let below = value.as_ref().and_then(|value| value.as_message());
+                walk(&inner, below, above, take);
+            }
+            (_, Some(kind), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
+                for element in 0..items.len() {
+                    let place = Place { fields: above.clone(), element: Some(element) };
+                    let meaning = Meaning::of(above);
+                    take(Column { name: element_name(&name, element), kind, meaning }, place);
+                }
+            }
+            (_, Some(kind), _) if !field.is_list() => {
+                let meaning = Meaning::of(above);
+                take(Column { name, kind, meaning }, Place { fields: above.clone(), element: None });
+            }
+            _ => {}
+        }
+        above.pop();
+    }
+}
+
+/// The second element of `fins_rad` is `fins_2_rad`: the unit stays at the end.
+fn element_name(name: &str, element: usize) -> String {
+    let unit = UNITS.into_iter().map(|(suffix, _)| suffix).find(|suffix| name.ends_with(suffix));
+    let unit = unit.unwrap_or_default();
+    format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
+}
+
+fn kind_of(field: &FieldDescriptor) -> Option<Kind> {
+    match field.kind() {
+        FieldKind::Double | FieldKind::Float => Some(Kind::Float),
+        FieldKind::Int32
+        | FieldKind::Int64
+        | FieldKind::Uint32
+        | FieldKind::Uint64
+        | FieldKind::Sint32
+        | FieldKind::Sint64
+        | FieldKind::Fixed32
+        | FieldKind::Fixed64
+        | FieldKind::Sfixed32
+        | FieldKind::Sfixed64
+        | FieldKind::Bool => Some(Kind::Integer),
+        FieldKind::String => Some(Kind::Text),
+        _ => None,
+    }
+}
+
+/// A value of a row.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// A number.
+    Float(f64),
+    /// A whole number or a flag; digests of 64 bits wrap around to negative numbers.
+    Integer(i64),
+    Text(String),
+    /// Never received, or not in the record.
+    Absent,
+}
+
+impl Cell {
+    /// The value as a number, if it is one.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Float(number) => Some(*number),
+            Self::Integer(number) => Some(*number as f64),
+            Self::Text(_) | Self::Absent => None,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Index of its table in [`TableReader::shapes`].
+    pub table: usize,
+    /// One value for each column.
+    pub cells: Vec<Cell>,
+}
+
+/// Reads a log's rows in file order.
+#[derive(Default)]
+pub struct TableReader {
+    shapes: Vec<TableShape>,
+    /// By channel; `None` for records that are not ours.
+    channels: BTreeMap<u16, Option<Known>>,
+    /// The tables of MAVLink messages.
+    messages: BTreeMap<(Address, u32), usize>,
+    limits: Option<usize>,
+    events: Option<usize>,
+}
+
+/// The known structure of a channel's records.
+struct Known {
+    table: usize,
+    descriptor: MessageDescriptor,
+    places: Vec<Place>,
+}
+
+impl TableReader {
+    /// A reader before its first record.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Every table seen so far.
+    pub fn shapes(&self) -> &[TableShape] {
+        &self.shapes
+    }
+
+    /// Passes every row of a log to `take`.
+    ///
+    /// # Errors
+    /// The log cannot be read, or `take` refused a row.
+    pub fn read<R: Read, E: From<LogError>>(
+        &mut self,
+        log: &mut FlightLog<R>,
+        mut take: impl FnMut(&TableShape, Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        while let Some(stamped) = log.next_entry()? {
+            for row in self.rows_of(log, &stamped) {
+                if let Some(shape) = self.shapes.get(row.table) {
+                    take(shape, row)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn rows_of<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry) -> Vec<Row> {
+        let time = Cell::Integer(stamped.log_time_ns.cast_signed());
+        match &stamped.entry {
+            Entry::Event(event) => {
+                let columns = [("level", Kind::Integer), ("name", Kind::Text), ("message", Kind::Text)];
+                let table = place_of(&mut self.shapes, &mut self.events, &table_name(TOPIC_EVENTS), &columns);
+                let cells = vec![
+                    time,
+                    Cell::Integer(i64::from(event.level)),
+                    Cell::Text(event.name.clone()),
+                    Cell::Text(event.message.clone()),
+                ];
+                vec![Row { table, cells }]
+            }
+            Entry::RawFrame => self.message(log, stamped, time).into_iter().collect(),
+            Entry::Verdict(verdict) => {
+                let mut rows = self.limits_of(verdict, &time);
+                rows.extend(self.record(log, stamped, time));
+                rows
+            }
+            _ => self.record(log, stamped, time).into_iter().collect(),
+        }
+    }
+
+    /// The message in a raw frame; `None` if the dialect does not have it.
+    fn message<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
+        let channel = log.channel(stamped.channel_id)?;
+        let frame = frame_of(&stamped.data)?;
+        let key = (frame.source(), frame.message_id());
+        let table = if let Some(table) = self.messages.get(&key) {
+            *table
+        } else {
+            self.shapes.push(shape_of_frame(&frame)?);
+            let table = self.shapes.len() - 1;
+            self.messages.insert(key, table);
+            table
+        };
+        let fact = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
+        let direction = if channel.topic == TOPIC_RAW_RX { "rx" } else { "tx" };
+        let cells = cells_of_frame(&frame, [fact("endpoint"), direction, fact("link")]);
+        Some(Row { table, cells: std::iter::once(time).chain(cells).collect() })
+    }
+
+    /// A record of one of our packages, with the schema in the log.
+    fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
+        let channel = log.channel(stamped.channel_id)?;
+        let shapes = &mut self.shapes;
+        let known = match self.channels.entry(stamped.channel_id) {
+            Occupied(entry) => entry.into_mut(),
+            Vacant(entry) => {
+                let known = described(channel).and_then(|descriptor| {
+                    let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
+                    let (shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
+                    // Two channels with one topic share a table.
+                    let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
+                        shapes.push(shape);
+                        shapes.len() - 1
+                    });
+                    Some(Known { table, descriptor, places })
+                });
+                entry.insert(known)
+            }
+        };
+        let Known { table, descriptor, places } = known.as_ref()?;
+        let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
+        let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
+        Some(Row { table: *table, cells: std::iter::once(time).chain(values).collect() })
+    }
+
+    fn limits_of(&mut self, verdict: &v1::LandingVerdict, time: &Cell) -> Vec<Row> {
+        let columns = [
+            ("standard", Kind::Text),
+            ("limit", Kind::Text),
+            ("unit", Kind::Text),
+            ("value", Kind::Float),
+            ("minimum", Kind::Float),
+            ("maximum", Kind::Float),
+            ("passed", Kind::Integer),
+        ];
+        let name = format!("{}_limits", table_name(TOPIC_VERDICT));
+        let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns);
+        let of_legs = if verdict.table_2.is_empty() { "table 2" } else { "legs" };
+        let row = |(standard, limit): (&str, &v1::LimitResult)| {
+            let cells = vec![
+                time.clone(),
+                Cell::Text(standard.to_owned()),
+                Cell::Text(limit.name.clone()),
+                Cell::Text(limit.unit.clone()),
+                Cell::Float(limit.value),
+                Cell::Float(limit.minimum),
+                Cell::Float(limit.maximum),
+                Cell::Integer(i64::from(limit.passed)),
+            ];
+            Row { table, cells }
+        };
+        let decide = verdict.limits.iter().map(|limit| (of_legs, limit));
+        decide.chain(verdict.table_2.iter().map(|limit| ("table 2", limit))).map(row).collect()
+    }
+}
+
+/// The index of a table that has no schema.
+fn place_of(
+    shapes: &mut Vec<TableShape>,
+    place: &mut Option<usize>,
+    name: &str,
+    columns: &[(&str, Kind)],
+) -> usize {
+    *place.get_or_insert_with(|| {
+        shapes.push(TableShape::new(name, columns));
+        shapes.len() - 1
+    })
+}
+
+fn value_at(message: &DynamicMessage, fields: &[FieldDescriptor], element: Option<usize>) -> Cell {
+    let Some((field, inner)) = fields.split_first() else {
+        return Cell::Absent;
+    };
+    if field.supports_presence() && !message.has_field(field) {
+        return Cell::Absent;
+    }
+    let value = message.get_field(field);
+    match value.as_ref() {
+        Value::Message(message) => value_at(message, inner, element),
+        Value::List(items) => element.and_then(|at| items.get(at)).map_or(Cell::Absent, cell_of),
+        value => cell_of(value),
+    }
+}
+
+/// Describes a channel's records from the schema in the log; `None` for records that are not ours.
+fn described(channel: &LogChannel) -> Option<MessageDescriptor> {
+    if channel.message_encoding != "protobuf" || !channel.schema_name.starts_with("touchdown.") {
+        return None;
+    }
+    let pool = DescriptorPool::decode(channel.schema.as_ref()).ok()?;
+    pool.get_message_by_name(&channel.schema_name)
+}
+
+fn cell_of(value: &Value) -> Cell {
+    match value {
+        Value::F64(number) => Cell::Float(*number),
+        Value::F32(number) => Cell::Float(f64::from(*number)),
+        Value::I32(number) => Cell::Integer(i64::from(*number)),
+        Value::I64(number) => Cell::Integer(*number),
+        Value::U32(number) => Cell::Integer(i64::from(*number)),
+        Value::U64(number) => Cell::Integer(number.cast_signed()),
+        Value::Bool(flag) => Cell::Integer(i64::from(*flag)),
+        Value::String(text) => Cell::Text(text.clone()),
+        _ => Cell::Absent,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_elements_number_stands_before_its_unit() {
+        for (name, second) in [
+            ("output.fins_rad", "output.fins_2_rad"),
+            ("gimbal_rad_s", "gimbal_2_rad_s"),
+            ("position_m", "position_2_m"),
+            ("counts", "counts_2"),
+        ] {
+            assert_eq!(element_name(name, 1), second);
+        }
+    }
+}

@@ -2,8 +2,11 @@
 
 use std::fmt;
 
+use prost::Message;
 use prost_reflect::{DynamicMessage, MessageDescriptor, ReflectMessage as _, Value};
 use serde::{Serialize, Serializer};
+
+use crate::controller::{Moment, Replayed};
 
 /// A field in which a recorded and a recomputed tick differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -160,13 +163,134 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
     }
 }
 
+/// Most differing fields that are kept of the first diverged tick.
+const FIELDS_KEPT: usize = 32;
+
+/// A tick that differs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Divergence {
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    pub phase: &'static str,
+    /// Number of fields that differ.
+    pub fields_different: usize,
+    /// The differing fields, in the record's order; only the first of them if there are many.
+    pub fields: Vec<FieldDifference>,
+}
+
+/// The comparisons so far.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    pub(super) ticks: u64,
+    pub(super) ticks_different: u64,
+    pub(super) fields_different: u64,
+    pub(super) first: Option<Moment>,
+    pub(super) last: Option<Moment>,
+    pub(super) divergence: Option<Divergence>,
+    pub(super) growth: Growth,
+    recorded: Vec<u8>,
+    recomputed: Vec<u8>,
+}
+
+impl Tally {
+    /// Compares a record with the recomputed one.
+    pub(super) fn compare<C: Replayed>(
+        &mut self,
+        descriptor: Option<&MessageDescriptor>,
+        recorded: &C::Tick,
+        again: &C::Tick,
+    ) {
+        let moment = C::moment(again);
+        encode_into(recorded, &mut self.recorded);
+        encode_into(again, &mut self.recomputed);
+        self.ticks += 1;
+        self.first.get_or_insert(moment);
+        self.last = Some(moment);
+        if self.recorded != self.recomputed {
+            let fields = differences(descriptor, &self.recorded, &self.recomputed);
+            let axes = C::gimbal_rad(recorded).iter().zip(C::gimbal_rad(again));
+            let gimbal_rad = axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max);
+            self.differs(moment, fields, gimbal_rad);
+        }
+    }
+
+    fn differs(&mut self, moment: Moment, mut fields: Vec<FieldDifference>, gimbal_rad: f64) {
+        let Moment { tick, time_s, phase } = moment;
+        let fields_different = fields.len();
+        self.ticks_different += 1;
+        self.fields_different += fields_different as u64;
+        self.growth.note(GrowthStep {
+            tick,
+            time_s,
+            fields_different,
+            gimbal_rad,
+            worst_ulps: fields.iter().filter_map(|field| field.ulps).max(),
+        });
+        if self.divergence.is_none() {
+            fields.truncate(FIELDS_KEPT);
+            self.divergence = Some(Divergence { tick, time_s, phase, fields_different, fields });
+        }
+    }
+}
+
+fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
+    bytes.clear();
+    bytes.reserve(record.encoded_len());
+    record.encode_raw(bytes);
+}
+
+/// Most differing ticks that are kept.
+const STEPS_KEPT: usize = 200;
+
+/// One differing tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GrowthStep {
+    /// Its number.
+    pub tick: u64,
+    /// Vehicle time, s.
+    pub time_s: f64,
+    /// Number of fields that differ.
+    pub fields_different: usize,
+    /// Difference of the gimbal commands, rad.
+    pub gimbal_rad: f64,
+    /// The largest distance of the two values of a field, in representable numbers.
+    pub worst_ulps: Option<u64>,
+}
+
+/// How a divergence grows.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Growth {
+    /// The first differing ticks.
+    pub steps: Vec<GrowthStep>,
+    /// The tick with the largest difference of the gimbal commands.
+    pub peak: Option<GrowthStep>,
+    /// The last differing tick.
+    pub last: Option<GrowthStep>,
+}
+
+impl Growth {
+    /// Notes a differing tick.
+    pub(super) fn note(&mut self, step: GrowthStep) {
+        if self.steps.len() < STEPS_KEPT {
+            self.steps.push(step);
+        }
+        // A difference that is NaN counts as the largest.
+        let exceeds = |peak: &GrowthStep| step.gimbal_rad.is_nan() || step.gimbal_rad > peak.gimbal_rad;
+        if self.peak.as_ref().is_none_or(exceeds) {
+            self.peak = Some(step);
+        }
+        self.last = Some(step);
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
     use proptest::prelude::*;
-    use prost::Message as _;
     use protocol::log::flight_v1::PilotTick;
 
-    use super::*;
     use crate::log::pilot_descriptor;
 
     #[test]

@@ -1,14 +1,21 @@
 //! Verifies one flight of a log, record by record.
 
+use std::collections::BTreeMap;
 use std::io::Read;
+use std::path::Path;
 
+use protocol::log::computer_v1;
+use protocol::log::flight_v1::PilotTick;
 use protocol::log::record::SCHEMA_VERSION;
+use serde::Serialize;
 
-use super::from_power_up::FromPowerUp;
-use super::report::{FileFacts, Obstacle, VerifyReport};
-use super::verifier::Verifier;
-use crate::controller::{LoggedComputer, LoggedPilot};
-use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, StampedEntry};
+use super::Verifier;
+use super::difference::Tally;
+use super::{FileFacts, FramesReport, Obstacle, VerifyReport};
+use crate::controller::{LoggedComputer, LoggedPilot, Replayed as _};
+use crate::info::VerdictFacts;
+use crate::log::{Entry, FlightLog, FrameOrder, Gap, Head, LogError, Recording, StampedEntry, summary_of};
+use crate::refly::{ReflyOptions, StartAt, refly};
 
 /// One flight being verified.
 pub(super) struct FlightVerifier {
@@ -152,4 +159,170 @@ fn text_of<R: Read>(
         Some(Err(error)) => Err(Obstacle::ProfileUnreadable { reason: error.to_string() }),
         Some(Ok(text)) => Ok(text),
     })
+}
+
+/// The flight computer being run again.
+pub(super) struct FromPowerUp {
+    verifier: Verifier<LoggedComputer>,
+    order: FrameOrder,
+    recorded: u64,
+    ticks: Tally,
+    /// Ticks that were computed again and whose records have not been read yet.
+    made: BTreeMap<u64, PilotTick>,
+    /// Recorded ticks whose frames have not been read yet.
+    waiting: BTreeMap<u64, PilotTick>,
+    last_compared: Option<u64>,
+    obstacle: Option<Obstacle>,
+}
+
+impl FromPowerUp {
+    pub(super) fn new(computer: LoggedComputer, order: FrameOrder) -> Self {
+        Self {
+            verifier: Verifier::new(computer),
+            order,
+            recorded: 0,
+            ticks: Tally::default(),
+            made: BTreeMap::new(),
+            waiting: BTreeMap::new(),
+            last_compared: None,
+            obstacle: None,
+        }
+    }
+
+    /// Whether every frame so far was run again.
+    pub(super) fn is_unbroken(&self) -> bool {
+        self.obstacle.is_none()
+    }
+
+    /// Takes a frame; `sequence` is the sequence number of its record in the channel.
+    pub(super) fn take_frame(&mut self, frame: &computer_v1::ComputerFrame, sequence: u32) {
+        self.recorded += 1;
+        let lost = self.order.note(frame.input.frame, sequence);
+        if self.obstacle.is_some() {
+            return;
+        }
+        self.obstacle = match lost {
+            Some(Gap { after, before }) => Some(Obstacle::FramesLost { after, before }),
+            None => self.verifier.check(frame).err().map(Obstacle::Frame),
+        };
+        if self.obstacle.is_none()
+            && let Some(made) = self.verifier.controller().pilot_tick()
+        {
+            match self.waiting.remove(&made.input.frame) {
+                Some(recorded) => self.compare(&recorded, &made),
+                None => {
+                    self.made.insert(made.input.frame, made);
+                }
+            }
+        }
+    }
+
+    /// Takes a recorded tick.
+    pub(super) fn take_tick(&mut self, recorded: PilotTick) {
+        let number = recorded.input.frame;
+        match self.made.remove(&number) {
+            Some(made) => self.compare(&recorded, &made),
+            None if self.last_compared.is_some_and(|last| number <= last) => {
+                self.obstacle.get_or_insert(Obstacle::Repeated { tick: number });
+            }
+            None => {
+                if self.waiting.insert(number, recorded).is_some() {
+                    self.obstacle.get_or_insert(Obstacle::Repeated { tick: number });
+                }
+            }
+        }
+    }
+
+    fn compare(&mut self, recorded: &PilotTick, made: &PilotTick) {
+        self.last_compared = self.last_compared.max(Some(recorded.input.frame));
+        self.ticks.compare::<LoggedPilot>(LoggedPilot::descriptor().as_ref(), recorded, made);
+    }
+
+    /// The compared ticks, the report on the frames, and why not all of them were compared. `whole`: the log was read
+    /// to its end.
+    pub(super) fn finish(mut self, whole: bool) -> (Tally, FramesReport, Option<Obstacle>) {
+        if whole {
+            // A tick that was computed and is missing in the log, although a later tick is there.
+            let lost = self.made.keys().find(|tick| self.last_compared > Some(**tick));
+            let alone = self.waiting.keys().next();
+            let missing = lost.map(|tick| Obstacle::TickLost { tick: *tick });
+            let missing = missing.or(alone.map(|tick| Obstacle::TickWithoutFrame { tick: *tick }));
+            self.obstacle = self.obstacle.or(missing);
+        }
+        let frames = self.verifier.tally;
+        let report = FramesReport {
+            recorded: self.recorded,
+            compared: frames.ticks,
+            different: frames.ticks_different,
+            first_divergence: frames.divergence,
+            until_s: frames.last.map(|last| last.time_s),
+        };
+        (self.ticks, report, self.obstacle)
+    }
+}
+
+/// The unread part of a damaged log.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Unread {
+    /// Ticks or frames that were not read, and their number in the whole file; `None` if the end of the file does not
+    /// say.
+    pub ticks: Option<(u64, u64)>,
+    /// Time from the last record read to the last record of the file, s.
+    pub seconds: Option<f64>,
+}
+
+impl Unread {
+    pub(super) fn of(path: &Path, ticks_read: u64, read_until_ns: Option<u64>) -> Self {
+        let summary = summary_of(path);
+        let all = summary.as_ref().map(|summary| summary.ticks).filter(|all| *all >= ticks_read);
+        let seconds = summary.zip(read_until_ns).and_then(|(summary, until_ns)| {
+            Some(summary.last_log_time_ns.checked_sub(until_ns)? as f64 / 1e9)
+        });
+        Self { ticks: all.map(|all| (all - ticks_read, all)), seconds }
+    }
+}
+
+/// Whether this build's controller would land differently if it flew from the first tick that differs. This is closed
+/// loop, unlike the comparison itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Consequence {
+    /// The tick from which the flight was flown again.
+    pub from_tick: u64,
+    /// The recorded verdict.
+    pub recorded: Option<VerdictFacts>,
+    /// The verdict with this build's controller; `None` if the vehicle does not come down.
+    pub reflown: Option<VerdictFacts>,
+    /// Whether the verdict changed between landed and not landed; `None` if unknown.
+    pub changed: Option<bool>,
+    /// Why the flight was not flown again.
+    pub obstacle: Option<String>,
+}
+
+impl Consequence {
+    /// Flies from a tick, or from the beginning of the landing if that comes later.
+    pub(super) fn of(recording: &Recording, first_divergence: u64) -> Self {
+        let at = |start| refly(recording, &ReflyOptions { start, ..ReflyOptions::default() });
+        let flown = at(StartAt::Landing).and_then(|landing| {
+            if landing.start.tick >= first_divergence {
+                return Ok(landing);
+            }
+            at(StartAt::Tick(first_divergence))
+        });
+        match flown {
+            Ok(report) => Self {
+                from_tick: report.start.tick,
+                recorded: report.recorded,
+                reflown: report.reflown,
+                changed: report.verdict_changed,
+                obstacle: None,
+            },
+            Err(error) => Self {
+                from_tick: first_divergence,
+                recorded: recording.verdict.as_ref().map(VerdictFacts::of),
+                reflown: None,
+                changed: None,
+                obstacle: Some(error.to_string()),
+            },
+        }
+    }
 }

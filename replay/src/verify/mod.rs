@@ -16,32 +16,33 @@
 //! For a divergence, the report says how it grows from tick to tick. If a whole file is verified, it also says whether
 //! the landing would end differently: only for this, the flight is simulated from the first tick that differs.
 
-mod consequence;
+pub mod book;
 mod difference;
+pub mod explain;
 mod flight;
-mod from_power_up;
-mod growth;
-mod report;
-mod tally;
-mod unread;
-mod verifier;
+pub mod season;
 
-pub use consequence::Consequence;
-pub use difference::{FieldDifference, FieldValue, differences, ulp_distance};
-pub use growth::{Growth, GrowthStep};
-pub use report::{FlightPlace, FramesReport, Obstacle, Verification, VerifyReport};
-pub use tally::Divergence;
-pub use unread::Unread;
-pub use verifier::Verifier;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
-use std::io::Read;
-use std::path::Path;
-
-use flight::FlightVerifier;
+use self::flight::FlightVerifier;
+pub use self::flight::{Consequence, Unread};
+use anyhow::{Result, bail};
+use clap::Args;
+use difference::Tally;
+pub use difference::{
+    Divergence, FieldDifference, FieldValue, Growth, GrowthStep, differences, ulp_distance,
+};
+use prost_reflect::MessageDescriptor;
 use protocol::log::reader::Damage;
-use report::FileFacts;
+use serde::Serialize;
 
-use crate::log::{Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
+use crate::cli::{Answer, answer, say, warn_of_cut, warn_of_damage};
+use crate::controller::{FrameError, Replayed};
+use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
+use crate::output::NewFile;
+use crate::print::{self, JunitCase, JunitOutcome, counted, print_json, print_junit, shown};
 
 /// Verifies a log file: one report on each of its flights, or one report if it has none.
 ///
@@ -111,4 +112,615 @@ pub fn verify_log<R: Read>(
         reports.push(computer.into_report(facts));
     }
     Ok(reports)
+}
+
+/// The result of a verification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verification {
+    /// The flight is whole, has ticks, and every tick is identical.
+    Identical,
+    /// The log is damaged or ends before its flight did, and every tick that could be read is identical.
+    IdenticalReadablePart,
+    /// Some tick differs.
+    Diverged,
+    /// Some tick could not be re-executed, and all others are identical.
+    NotReplayable,
+}
+
+/// Why ticks were not compared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Obstacle {
+    /// No tick in the log.
+    #[error(
+        "it has no frames of a flight computer that this build knows: replay needs the log of the vehicle or of the demonstration, not of a ground station"
+    )]
+    NoTicks,
+    /// No profile in the log.
+    #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
+    NoProfile,
+    /// This build cannot use the profile in the log.
+    #[error("its profile cannot be used by this build: {reason}")]
+    ProfileUnreadable {
+        /// What is wrong with the profile.
+        reason: String,
+    },
+    /// The log does not begin with the first tick.
+    #[error(
+        "it begins with tick {first}, and the ticks before it are missing: what the controller remembered then is unknown"
+    )]
+    BeginningMissing {
+        /// The first tick in the log.
+        first: u64,
+    },
+    /// Ticks are missing.
+    #[error(
+        "after tick {after} comes tick {before}: what the controller remembered there is unknown, and nothing behind the gap was compared"
+    )]
+    Gap {
+        /// The last tick before the gap.
+        after: u64,
+        /// The first tick after the gap.
+        before: u64,
+    },
+    /// A tick is recorded twice.
+    #[error(
+        "tick {tick} is recorded twice, as if two controllers had written: nothing behind it was compared"
+    )]
+    Repeated {
+        /// Its number.
+        tick: u64,
+    },
+    /// Frames of the flight computer are missing.
+    #[error(
+        "after frame {after} of the flight computer comes frame {before}: what it remembered there is unknown, and nothing after the gap was compared"
+    )]
+    FramesLost {
+        /// The last frame before the gap.
+        after: u64,
+        /// The first after it.
+        before: u64,
+    },
+    /// A tick was computed and is not in the log.
+    #[error("the flight computer made tick {tick}, and the log has lost its record")]
+    TickLost { tick: u64 },
+    /// A recorded tick belongs to no frame of the flight computer.
+    #[error("tick {tick} belongs to no frame of the flight computer that was run again")]
+    TickWithoutFrame { tick: u64 },
+    /// A record cannot be read.
+    #[error("a record cannot be read: {reason}")]
+    Unreadable { reason: String },
+    /// A flight computer was released, and none of its frames follow.
+    #[error("it has a record /pilot/start and no frame of the flight computer behind it")]
+    NoFrames,
+    /// There are frames of a flight computer, and no record of its release.
+    #[error("it has frames of the flight computer and no record /pilot/start before them to begin from")]
+    NoStart,
+    /// A frame cannot be given to this build's flight computer.
+    #[error("{0}")]
+    Frame(#[from] FrameError),
+}
+
+/// As text.
+impl Serialize for Obstacle {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// Result of comparing the flight computer's frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FramesReport {
+    /// Frames that could be read.
+    pub recorded: u64,
+    /// Frames that were run again and compared.
+    pub compared: u64,
+    /// Frames that differ.
+    pub different: u64,
+    /// The first frame that differs.
+    pub first_divergence: Option<Divergence>,
+    /// Vehicle time of the last frame that was compared, s.
+    pub until_s: Option<f64>,
+}
+
+/// The place of a flight in a log that holds several.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FlightPlace {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Number of flights.
+    pub of: usize,
+}
+
+/// Facts about a flight's record besides its ticks.
+pub(super) struct FileFacts {
+    pub(super) file: String,
+    pub(super) flight: Option<FlightPlace>,
+    pub(super) cut: Option<Cut>,
+    pub(super) damage: Option<String>,
+    pub(super) build: BuildComparison,
+}
+
+/// The report on one flight.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerifyReport {
+    /// The log.
+    pub file: String,
+    /// The place of the flight, if the log holds several.
+    pub flight: Option<FlightPlace>,
+    /// The result of a verification.
+    pub outcome: Verification,
+    /// The frames of the flight computer from power-up on; `None` if the log has none, so that only its ticks were
+    /// compared.
+    pub frames: Option<FramesReport>,
+    /// Whether digests of the computer's memory were compared as well. Digests of another schema are not compared.
+    pub digests_compared: bool,
+    /// Ticks that could be read.
+    pub ticks_recorded: u64,
+    /// Ticks that were re-executed and compared.
+    pub ticks_compared: u64,
+    /// Ticks identical in every bit.
+    pub ticks_identical: u64,
+    pub ticks_different: u64,
+    /// Fields that differ, over all ticks.
+    pub fields_different: u64,
+    /// The first and the last tick compared.
+    pub span: Option<(u64, u64)>,
+    /// Vehicle time from the first tick compared to the last, s.
+    pub flight_s: Option<f64>,
+    /// The first tick that differs.
+    pub first_divergence: Option<Divergence>,
+    /// How the divergence grows.
+    pub growth: Option<Growth>,
+    /// Whether the landing would end differently; only for whole files.
+    pub consequence: Option<Consequence>,
+    /// Why not every tick was compared.
+    pub obstacle: Option<Obstacle>,
+    /// Where the record ends, if that is before the end of the flight.
+    pub cut: Option<Cut>,
+    /// Why the log could not be read to its end.
+    pub damage: Option<String>,
+    /// The part that was not read because of the damage; only for files.
+    pub unread: Option<Unread>,
+    /// Comparison of the build that wrote the log with this one.
+    pub build: BuildComparison,
+}
+
+impl VerifyReport {
+    fn new(
+        facts: FileFacts,
+        (ticks_recorded, counts): (u64, Tally),
+        frames: Option<FramesReport>,
+        obstacle: Option<Obstacle>,
+    ) -> Self {
+        let (first_divergence, growth) = (counts.divergence, counts.growth);
+        let FileFacts { file, flight, cut, damage, build } = facts;
+        let frame_differs = frames.as_ref().is_some_and(|frames| frames.different > 0);
+        let outcome = if first_divergence.is_some() || frame_differs {
+            Verification::Diverged
+        } else if obstacle.is_some() {
+            Verification::NotReplayable
+        } else if damage.is_some() || cut.is_some() {
+            Verification::IdenticalReadablePart
+        } else {
+            Verification::Identical
+        };
+        Self {
+            file,
+            flight,
+            outcome,
+            frames,
+            digests_compared: true,
+            ticks_recorded,
+            ticks_compared: counts.ticks,
+            ticks_identical: counts.ticks - counts.ticks_different,
+            ticks_different: counts.ticks_different,
+            fields_different: counts.fields_different,
+            span: counts.first.zip(counts.last).map(|(first, last)| (first.tick, last.tick)),
+            flight_s: counts.first.zip(counts.last).map(|(first, last)| last.time_s - first.time_s),
+            growth: first_divergence.is_some().then_some(growth),
+            first_divergence,
+            consequence: None,
+            obstacle,
+            cut,
+            damage,
+            unread: None,
+            build,
+        }
+    }
+}
+
+/// Re-executes ticks and compares them; ticks must come in order, from the first tick on.
+#[derive(Debug)]
+pub struct Verifier<C> {
+    controller: C,
+    descriptor: Option<MessageDescriptor>,
+    tally: Tally,
+}
+
+impl<C: Replayed> Verifier<C> {
+    /// A controller before its first tick.
+    pub fn new(controller: C) -> Self {
+        Self { controller, descriptor: C::descriptor(), tally: Tally::default() }
+    }
+
+    pub(super) fn controller(&self) -> &C {
+        &self.controller
+    }
+
+    /// Re-executes the next tick and compares it with its record.
+    ///
+    /// # Errors
+    /// The recorded input cannot be given to this build's controller.
+    pub fn check(&mut self, tick: &C::Tick) -> Result<(), C::Error> {
+        let again = self.controller.run_again(tick)?;
+        self.tally.compare::<C>(self.descriptor.as_ref(), tick, &again);
+        Ok(())
+    }
+}
+
+/// Most fields of the first diverged tick that are shown.
+const FIELDS_SHOWN: usize = 5;
+
+/// Writes a verification as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
+    let name = name_of(report);
+    let VerifyReport { ticks_identical, ticks_compared, ticks_recorded, .. } = report;
+    match report.outcome {
+        Verification::Identical => {
+            writeln!(output, "{name}: {ticks_identical} of {ticks_compared} ticks identical")?;
+        }
+        Verification::IdenticalReadablePart => {
+            let of = if report.damage.is_some() { " of the readable part" } else { "" };
+            let what_is_missing = what_is_missing(report);
+            writeln!(
+                output,
+                "{name}: {ticks_identical} of {ticks_compared} ticks identical{of}{what_is_missing}"
+            )?;
+        }
+        Verification::Diverged if report.ticks_different == 0 => {
+            writeln!(
+                output,
+                "{name}: DIVERGED, though {ticks_identical} of {ticks_compared} ticks are identical"
+            )?;
+        }
+        Verification::Diverged => {
+            let VerifyReport { ticks_different, fields_different, .. } = report;
+            let fields = counted(*fields_different, "field");
+            writeln!(
+                output,
+                "{name}: DIVERGED: {ticks_different} of {ticks_compared} ticks differ, in {fields}"
+            )?;
+        }
+        Verification::NotReplayable if *ticks_compared == 0 => {
+            let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
+            writeln!(output, "{name}: nothing was compared: {}", reason.unwrap_or_default())?;
+        }
+        Verification::NotReplayable => writeln!(
+            output,
+            "{name}: not replayable as a whole: the first {ticks_identical} of {ticks_recorded} ticks are identical"
+        )?,
+    }
+    if let Some(first) = &report.first_divergence {
+        print_divergence("tick", first, output)?;
+    }
+    print_frames(report, output)?;
+    if !report.digests_compared && report.ticks_compared > 0 {
+        writeln!(
+            output,
+            "another release wrote it: what it remembered was not compared, what it decided was"
+        )?;
+    }
+    if let Some(growth) = &report.growth {
+        print_growth(growth, output)?;
+    }
+    if let Some(consequence) = &report.consequence {
+        print_consequence(consequence, output)?;
+    }
+    if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *ticks_compared > 0) {
+        writeln!(output, "not every tick was compared: {}", shown(&obstacle.to_string()))?;
+    }
+    if report.outcome != Verification::IdenticalReadablePart {
+        let what_is_missing = what_is_missing(report);
+        if !what_is_missing.is_empty() {
+            writeln!(output, "what was compared is{what_is_missing}")?;
+        }
+    }
+    Ok(())
+}
+
+/// Prints the comparison of the flight computer's frames from power-up on, or that only its ticks were compared.
+fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
+    let Some(frames) = &report.frames else {
+        let nothing = report.ticks_compared == 0;
+        return if nothing { Ok(()) } else { writeln!(output, "{TICKS_ALONE}") };
+    };
+    let FramesReport { compared, different, until_s, .. } = frames;
+    let until = until_s.map(|until_s| format!(" to {until_s:.3} s after it")).unwrap_or_default();
+    if *different == 0 {
+        writeln!(output, "flight computer from power-up{until}: {compared} of {compared} frames identical")?;
+    } else {
+        writeln!(output, "flight computer from power-up{until}: {different} of {compared} frames DIFFER")?;
+    }
+    match &frames.first_divergence {
+        Some(first) => print_divergence("frame", first, output),
+        None => Ok(()),
+    }
+}
+
+/// The remark on a log whose flight computer cannot be run again from power-up on.
+const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
+
+/// The file and, if it holds several flights, the flight's number.
+fn name_of(report: &VerifyReport) -> String {
+    let file = shown(&report.file);
+    report
+        .flight
+        .map_or_else(|| file.clone(), |flight| format!("{file}: flight {} of {}", flight.number, flight.of))
+}
+
+/// What is missing from the part of the flight that was read.
+fn what_is_missing(report: &VerifyReport) -> String {
+    let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
+    let unread = report.damage.as_ref().map(|damage| {
+        let ticks = match report.unread.and_then(|unread| unread.ticks) {
+            Some((unread, all)) => format!("{unread} of {all} ticks were not read"),
+            None => "how many ticks were not read is not known".to_owned(),
+        };
+        let seconds = report.unread.and_then(|unread| unread.seconds);
+        let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
+        format!("; {ticks}{seconds}: {}", shown(damage))
+    });
+    [cut, unread].into_iter().flatten().collect()
+}
+
+fn print_divergence(kind: &str, first: &Divergence, output: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        output,
+        "first at {kind} {} (t = {:.3} s, {}), {}:",
+        first.tick,
+        first.time_s,
+        first.phase,
+        counted(first.fields_different as u64, "field")
+    )?;
+    for field in first.fields.iter().take(FIELDS_SHOWN) {
+        print_field(field, output)?;
+    }
+    if first.fields_different > FIELDS_SHOWN {
+        writeln!(output, "  and {} more", counted((first.fields_different - FIELDS_SHOWN) as u64, "field"))?;
+    }
+    Ok(())
+}
+
+fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "  {}", field.path)?;
+    for (name, value) in [("recorded", &field.recorded), ("recomputed", &field.recomputed)] {
+        let bits = value.bits().map(|bits| format!("0x{bits:016x}")).unwrap_or_default();
+        writeln!(output, "    {}", format!("{name:<10}  {:<24}  {bits}", value.to_string()).trim_end())?;
+    }
+    if let Some(ulps) = field.ulps {
+        writeln!(output, "    apart       {ulps} ULP")?;
+    }
+    Ok(())
+}
+
+/// Prints the first diverged tick, the ticks 1, 2, 4, 8 and so on after it, the worst tick and the last tick.
+fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "how it grows (gimbal command, worst field):")?;
+    let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
+    let mut shown: Vec<&GrowthStep> = doubling.filter_map(|place| growth.steps.get(place)).collect();
+    shown.extend(growth.peak.iter().chain(&growth.last));
+    shown.sort_by_key(|step| step.tick);
+    shown.dedup_by_key(|step| step.tick);
+    for step in shown {
+        let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
+        writeln!(
+            output,
+            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {ulps} ULP in {}",
+            step.tick,
+            step.time_s,
+            step.gimbal_rad,
+            counted(step.fields_different as u64, "field")
+        )?;
+    }
+    Ok(())
+}
+
+fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::Result<()> {
+    if let Some(obstacle) = &consequence.obstacle {
+        return writeln!(output, "verdict: whether it would change is not known: {}", shown(obstacle));
+    }
+    let words = |verdict: Option<bool>| match verdict {
+        Some(true) => "LANDED",
+        Some(false) => "NOT LANDED",
+        None => "no verdict",
+    };
+    let answer = match consequence.changed {
+        Some(true) => "would CHANGE",
+        Some(false) => "would not change",
+        None => "is not comparable",
+    };
+    writeln!(
+        output,
+        "verdict: {answer}: recorded {}, flown on by this build from tick {} (closed loop) {}",
+        words(consequence.recorded.as_ref().map(|verdict| verdict.landed)),
+        consequence.from_tick,
+        words(consequence.reflown.as_ref().map(|verdict| verdict.landed))
+    )
+}
+
+/// A verification as a test case. With `strict`, only a whole identical flight passes.
+pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
+    let mut text = Vec::new();
+    // Writing into memory cannot fail.
+    let _ = print_verify(report, &mut text);
+    let details = String::from_utf8_lossy(&text).into_owned();
+    let message = details.lines().next().unwrap_or_default().to_owned();
+    let outcome = match report.outcome {
+        Verification::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
+        Verification::Identical | Verification::IdenticalReadablePart => {
+            JunitOutcome::Passed { said: details }
+        }
+        Verification::Diverged => JunitOutcome::Failed { message, details },
+        Verification::NotReplayable => JunitOutcome::Error { message: details },
+    };
+    JunitCase { name: format!("verify {}", name_of(report)), outcome }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Ask {
+    /// The logs, MCAP files, and directories of logs.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Answer in JSON: a report, or a list of reports for several logs.
+    #[arg(long, conflicts_with = "junit")]
+    json: bool,
+    /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    junit: Option<Option<PathBuf>>,
+    /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
+    /// flight did.
+    #[arg(
+        long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
+    )]
+    strict: Option<bool>,
+    /// Replace an existing JUnit file.
+    #[arg(long)]
+    force: bool,
+    /// Solve this tick of the only log again.
+    #[arg(long, value_name = "TICK", conflicts_with_all = ["junit", "strict"])]
+    explain: Option<u64>,
+    #[command(flatten)]
+    season: season::Arguments,
+    #[command(flatten)]
+    book: book::Arguments,
+}
+
+/// The result for one log.
+type Verified<'a> = (&'a Path, Result<Vec<VerifyReport>, LogError>);
+
+impl Ask {
+    pub(crate) fn run(self) -> Result<Answer> {
+        if self.book.book {
+            return self.book.run(&self.files, self.json);
+        }
+        if let Some(tick) = self.explain {
+            let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
+            return explain::run(file, tick, self.json);
+        }
+        let junit = self.junit.as_ref().and_then(Option::as_deref);
+        let junit = junit.map(|path| print::junit_file(path, self.force)).transpose()?;
+        let kind = match self.junit {
+            Some(None) => Printed::Junit,
+            _ if self.json => Printed::Json,
+            _ => Printed::Text,
+        };
+        if self.season.is_asked() {
+            let [directory] = self.files.as_slice() else { bail!("--baseline takes one directory") };
+            return self.season.run(directory, kind, junit);
+        }
+        self.verify(kind, junit)
+    }
+
+    fn verify(&self, kind: Printed, junit: Option<NewFile>) -> Result<Answer> {
+        let mut files = Vec::new();
+        for file in &self.files {
+            if file.is_dir() { files.extend(season::logs_of(file)?) } else { files.push(file.clone()) }
+        }
+        let mut answers: Vec<Verified> = Vec::new();
+        for file in &files {
+            #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
+            let started = Instant::now();
+            let verified = verify(file);
+            let took = started.elapsed();
+            match &verified {
+                Ok(reports) => {
+                    for report in reports {
+                        warn_of_damage(&report.file, report.damage.as_deref());
+                        warn_of_cut(&report.file, report.cut.as_ref());
+                        warn_of_build(report);
+                    }
+                    say_speed(reports, took);
+                }
+                // One unreadable log must not hide the results of the others.
+                Err(error) if files.len() > 1 => say(&format!("{error}")),
+                Err(_) => {}
+            }
+            answers.push((file, verified));
+        }
+        if let [(_, Err(_))] = answers.as_slice()
+            && let Some((_, Err(error))) = answers.pop()
+        {
+            return Err(error.into());
+        }
+        let strict = self.strict.unwrap_or(self.junit.is_some());
+        let cases = || answers.iter().flat_map(|verified| cases(verified, strict)).collect();
+        if let Some(file) = junit {
+            print::write_junit("verify", cases(), file)?;
+        }
+        let reports: Vec<&VerifyReport> =
+            answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).flatten().collect();
+        answer(|output| match (kind, reports.as_slice()) {
+            (Printed::Junit, _) => print_junit("verify", cases(), output),
+            (Printed::Json, [report]) if answers.len() == 1 => print_json(report, output),
+            (Printed::Json, reports) => print_json(&reports, output),
+            (Printed::Text, reports) => reports.iter().try_for_each(|report| print_verify(report, output)),
+        })?;
+        Ok(Answer::Verified { outcome: worst(&answers), strict })
+    }
+}
+
+/// What goes to standard output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Printed {
+    Text,
+    Json,
+    Junit,
+}
+
+fn cases((path, verified): &Verified, strict: bool) -> Vec<JunitCase> {
+    match verified {
+        Ok(reports) => reports.iter().map(|report| verify_case(report, strict)).collect(),
+        Err(error) => vec![JunitCase {
+            name: format!("verify {}", path.display()),
+            outcome: JunitOutcome::Error { message: error.to_string() },
+        }],
+    }
+}
+
+/// The worst result decides: a difference, then no answer, then identical.
+fn worst(answers: &[Verified]) -> Verification {
+    let rank = |outcome: Verification| match outcome {
+        Verification::Identical => 0,
+        Verification::IdenticalReadablePart => 1,
+        Verification::NotReplayable => 2,
+        Verification::Diverged => 3,
+    };
+    let outcomes = answers.iter().flat_map(|(_, verified)| match verified {
+        Ok(reports) => reports.iter().map(|report| report.outcome).collect(),
+        Err(_) => vec![Verification::NotReplayable],
+    });
+    outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Verification::NotReplayable)
+}
+
+fn warn_of_build(report: &VerifyReport) {
+    let differences = &report.build.differences;
+    if report.outcome == Verification::Diverged && !differences.is_empty() {
+        let facts: Vec<&str> = differences.iter().map(|difference| difference.fact.as_str()).collect();
+        say(&format!("note: another build wrote {}; it differs in {}", report.file, facts.join(", ")));
+    }
+}
+
+fn say_speed(reports: &[VerifyReport], took: Duration) {
+    let seconds = took.as_secs_f64();
+    let flight_s: f64 = reports.iter().filter_map(|report| report.flight_s).sum();
+    if flight_s > 0.0 && seconds > 0.0 {
+        say(&format!(
+            "{flight_s:.1} s of flight in {seconds:.2} s, {:.0} times real time",
+            flight_s / seconds
+        ));
+    }
 }

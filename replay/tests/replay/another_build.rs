@@ -4,10 +4,13 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicBool;
 
 use replay::evaluate::evaluate;
+use replay::evaluate::print_evaluate;
 use replay::log::Recording;
-use replay::print::{print_bisect, print_evaluate, print_sweep};
 use replay::refly::ReflyOptions;
-use replay::sweep::{BisectOptions, State, SweepReport, bisect, grid, sweep};
+use replay::refly::flip::print_bisect;
+use replay::refly::flip::{BisectOptions, bisect};
+use replay::refly::vary::print_sweep;
+use replay::refly::vary::{State, SweepReport, grid, sweep};
 
 use crate::asked::settings;
 use crate::from_apogee::LANDED;
@@ -50,7 +53,7 @@ fn an_evaluation_counts_differences_caused_by_the_build() {
 fn swept(flights: &[Recording]) -> SweepReport {
     let points = grid(&["powered.weights.theta=110".parse().unwrap()], &[]).unwrap();
     let mut state = State::in_memory(flights.len());
-    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut state, &mut |_| {}).unwrap()
+    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut state, &mut |_, _| {}).unwrap()
 }
 
 #[test]

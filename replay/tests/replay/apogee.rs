@@ -10,9 +10,10 @@ use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
+use replay::refly::flip::{BisectOptions, bisect};
+use replay::refly::vary::{State, grid, sweep};
 use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
-use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
-use replay::tick::tick;
+use replay::verify::explain::tick;
 use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with, with_plant};
@@ -235,7 +236,7 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs() {
     let fly = |flights: &[Recording], count: usize| {
         let jobs = NonZeroUsize::new(count).unwrap();
         let mut state = State::in_memory(points.len() * flights.len());
-        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut state, &mut |_| {})
+        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut state, &mut |_, _| {})
     };
     let one = fly(&flights[..1], 1).unwrap();
     assert_eq!(one, fly(&flights[..1], 3).unwrap());
@@ -293,10 +294,10 @@ fn every_command_answers_for_a_flight_from_apogee() {
     let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
     let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|tick| tick.input.frame).collect();
     let planning = burning[burning.len() / 2].next_multiple_of(10);
-    let (code, stdout, _) = run(replay("tick", log).arg(planning.to_string()));
+    let (code, stdout, _) = run(replay("verify", log).args(["--explain", &planning.to_string()]));
     assert!(code == 0 && stdout.contains("identical bit for bit") && stdout.contains("cold"), "{stdout}");
     let (code, stdout, stderr) =
-        run(replay("sweep", log).args(["--vary", "powered.weights.theta=80,100", "--csv", "--jobs", "2"]));
+        run(replay("refly", log).args(["--vary", "powered.weights.theta=80,100", "--csv", "--jobs", "2"]));
     assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
     assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");

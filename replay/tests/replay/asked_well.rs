@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use replay::log::Recording;
 use replay::refly::ReflyOptions;
-use replay::sweep::{BisectOptions, bisect};
+use replay::refly::flip::{BisectOptions, bisect};
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
@@ -58,7 +58,7 @@ fn a_bisection_passes_over_values_that_cannot_be_flown() {
     let report = bisect(&recording, &options, &AtomicBool::new(true)).unwrap();
     assert!(report.interrupted && report.flown == 1 && report.above.is_none() && report.outcome.landed);
     let mut text = Vec::new();
-    replay::print::print_bisect(&report, &mut text).unwrap();
+    replay::refly::flip::print_bisect(&report, &mut text).unwrap();
     assert!(String::from_utf8(text).unwrap().contains("INTERRUPTED after 1 flight"));
 }
 
@@ -89,8 +89,8 @@ fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
     let (ground, open) =
         (WITH_FRAMES.beside("swept.mcap"), || replay::log::FlightLog::open(&WITH_FRAMES.log));
     replay::export::export_tlog(&open, None, &telemetry).unwrap();
-    replay::import::import_tlog(&telemetry, &ground, &mut |_| {}).unwrap();
-    let (code, stdout, stderr) = run(replay("sweep", &MK2.log).arg(&text).arg(&ground).args([
+    replay::export::import_tlog(&telemetry, &ground, &mut |_| {}).unwrap();
+    let (code, stdout, stderr) = run(replay("refly", &MK2.log).arg(&text).arg(&ground).args([
         "--vary",
         "powered.weights.theta=80,90",
         "--jobs",
@@ -99,7 +99,7 @@ fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
     assert!(code == 0 && stdout.contains("2 points on 1 flight"), "{stdout}{stderr}");
     assert_eq!(stderr.matches("skipped: ").count(), 2, "{stderr}");
     let (code, _, stderr) =
-        run(replay("sweep", &text).arg(&ground).args(["--vary", "powered.weights.theta=80,90"]));
+        run(replay("refly", &text).arg(&ground).args(["--vary", "powered.weights.theta=80,90"]));
     assert!(code == 2 && stderr.contains("none of the 2 logs can be flown again"), "{stderr}");
 }
 
@@ -107,7 +107,7 @@ fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
 #[test]
 fn no_message_is_printed_twice() {
     let none = MK2.beside("none.mcap");
-    let mut sweep = replay("sweep", &MK2.log);
+    let mut sweep = replay("refly", &MK2.log);
     sweep.args(["--vary", "powered.wights.theta=80,90"]);
     let mut unknown = replay("refly", &MK2.log);
     unknown.args(["--set", "powered.wights.theta=80"]);

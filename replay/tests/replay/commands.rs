@@ -91,7 +91,7 @@ fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
 fn a_sweep_says_the_same_on_any_number_of_threads() {
     let log = &DISPERSED.log;
     let sweep = |jobs: &str, tunables: &str| {
-        let mut command = replay("sweep", log);
+        let mut command = replay("refly", log);
         command.args([
             "--vary",
             "powered.weights.theta=50:110:3",
@@ -130,7 +130,7 @@ fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
     let planning = frames.iter().filter(in_burn).nth(40).unwrap().input.frame.next_multiple_of(10);
     let planning = planning.to_string();
-    let (code, stdout, _) = run(replay("tick", &MK2.log).arg(&planning));
+    let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
     assert_eq!(code, 0);
     for part in [
         "identical bit for bit",
@@ -141,21 +141,31 @@ fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     ] {
         assert!(stdout.contains(part), "{part} is not in\n{stdout}");
     }
-    let (code, stdout, _) = run(replay("tick", &MK2.log).args([&planning, "--json"]));
+    let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning, "--json"]));
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, report["tick"].as_u64()), (0, planning.parse().ok()));
-    let (code, _, stderr) = run(replay("tick", &MK2.log).arg("300000"));
+    let (code, _, stderr) = run(replay("verify", &MK2.log).args(["--explain", "300000"]));
     assert!(code == 2 && stderr.contains("no tick 300000"), "{stderr}");
 }
 
 #[test]
 fn a_bisection_is_shown() {
-    let arguments =
-        ["truth.impulse_scale", "--of-plant", "--lowest", "0.6", "--highest", "1.3", "--steps", "4"];
-    let (code, stdout, _) = run(replay("bisect", &MK2.log).args(arguments));
+    let arguments = [
+        "--flip",
+        "truth.impulse_scale",
+        "--of-plant",
+        "--lowest",
+        "0.6",
+        "--highest",
+        "1.3",
+        "--steps",
+        "4",
+    ];
+    let (code, stdout, _) = run(replay("refly", &MK2.log).args(arguments));
     assert_eq!(code, 0);
     assert!(stdout.contains("the smallest change that changes the verdict: -"), "{stdout}");
-    let (code, _, stderr) = run(replay("bisect", &MK2.log).args(["a.b", "--lowest", "2", "--highest", "1"]));
+    let (code, _, stderr) =
+        run(replay("refly", &MK2.log).args(["--flip", "a.b", "--lowest", "2", "--highest", "1"]));
     assert!(code == 2 && stderr.contains("must be below"), "{stderr}");
 }
 
@@ -174,9 +184,9 @@ fn the_command_exports_and_imports_logs() {
     let (code, stdout, _) =
         run(replay("export", &WITH_FRAMES.log).args(["--to", "tlog", "--output"]).arg(&tlog));
     assert!(code == 0 && stdout.contains("sent by the vehicle"), "{stdout}");
-    let (code, stdout, _) = run(&mut replay("import", &tlog));
+    let (code, stdout, _) = run(&mut replay("export", &tlog));
     assert!(code == 0 && stdout.contains("flight.mcap: "), "{stdout}");
-    let (code, _, stderr) = run(&mut replay("import", &tlog));
+    let (code, _, stderr) = run(&mut replay("export", &tlog));
     assert!(code == 2 && stderr.contains("cannot be created"), "{stderr}");
     let (code, stdout, _) = run(replay("report", &at("flight.mcap")).arg("--output").arg(at("page.html")));
     assert!(code == 0 && stdout.contains("page.html"), "{stdout}");
@@ -222,9 +232,9 @@ fn every_command_refuses_a_file_that_is_not_a_log() {
         for arguments in [
             &["evaluate"][..],
             &["refly"],
-            &["tick", "1"],
-            &["sweep", "--vary", "powered.weights.theta=1:2:2"],
-            &["bisect", "powered.weights.theta", "--lowest", "1", "--highest", "2"],
+            &["verify", "--explain", "1"],
+            &["refly", "--vary", "powered.weights.theta=1:2:2"],
+            &["refly", "--flip", "powered.weights.theta", "--lowest", "1", "--highest", "2"],
             &["report", "--output", "-"],
             &["export", "--to", "csv", "--output", output],
             &["compare"],

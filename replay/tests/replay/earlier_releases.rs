@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use replay::info::info;
-use replay::print::print_verify;
+use replay::verify::print_verify;
 use replay::verify::{Verification, verify};
 
 fn log(name: &str) -> PathBuf {

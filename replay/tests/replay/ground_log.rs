@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
+use replay::export::import_tlog;
 use replay::export::{TableFormat, export_tables, export_tlog};
-use replay::import::import_tlog;
 use replay::info::info;
 use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording};
 

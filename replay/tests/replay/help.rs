@@ -5,8 +5,8 @@ use std::process::Command;
 use crate::command_line::run;
 
 #[test]
-fn the_help_of_fit_and_learn() {
-    for question in ["fit", "learn"] {
+fn the_help_of_fit() {
+    for question in ["fit"] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_replay"));
         // Lines are as long as in a terminal of this width.
         let (code, stdout, _) = run(command.args([question, "--help"]).env("COLUMNS", "100"));

@@ -11,10 +11,10 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Align, Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
 use replay::log::Recording;
+use replay::refly::vary::{State, grid, sweep};
 use replay::refly::{ReflyOptions, StartAt, refly};
 use replay::report::report;
-use replay::sweep::{State, grid, sweep};
-use replay::tick::tick;
+use replay::verify::explain::tick;
 
 use crate::flown::{FLIGHT, FRAME_NS, Recipe, WHOLE, write_log};
 
@@ -216,7 +216,7 @@ proptest! {
         let points = grid(&["powered.weights.theta=50:90:2".parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(2);
         let options = ReflyOptions { start: StartAt::Tick(12), ..ReflyOptions::default() };
-        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut state, &mut |_| {}) {
+        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut state, &mut |_, _| {}) {
             prop_assert_eq!(swept.points.len(), 2);
         }
     }

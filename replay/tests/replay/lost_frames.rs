@@ -9,7 +9,7 @@ use replay::log::Recording;
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
-use replay::tick::{TickError, tick};
+use replay::verify::explain::{TickError, tick};
 use replay::verify::{Obstacle, Verification, verify};
 
 use crate::command_line::{replay, run};

@@ -60,24 +60,24 @@ fn no_existing_file_is_overwritten_without_force() {
 #[test]
 fn what_a_board_gets_is_whole_or_absent() {
     let (directory, log) = copied(&WITH_FRAMES.log);
-    let asked = |log: &PathBuf, names: [&str; 2], more: &[&str]| {
-        run(replay("frames", log).args(names).args(more).current_dir(directory.path()))
+    let board = directory.path().join("board");
+    let asked = |more: &[&str]| {
+        run(replay("export", &log).args(["--to", "frames", "--output"]).arg(&board).args(more))
     };
     let bytes = std::fs::read(&log).unwrap();
     std::fs::write(&log, &bytes[..bytes.len() / 3]).unwrap();
-    for names in [["frames", "answers"], ["same", "same"]] {
-        let (code, stdout, stderr) = asked(&log, names, &[]);
-        assert!(code == 2 && !stderr.is_empty(), "{stdout}{stderr}");
-        assert_eq!(listed(directory.path()), ["flight.mcap"], "{stderr}");
-    }
+    let (code, stdout, stderr) = asked(&[]);
+    assert!(code == 2 && !stderr.is_empty(), "{stdout}{stderr}");
+    assert_eq!(listed(directory.path()), ["flight.mcap"], "{stderr}");
     std::fs::write(&log, &bytes).unwrap();
-    std::fs::write(directory.path().join("answers"), OTHERS).unwrap();
-    let (code, _, stderr) = asked(&log, ["frames", "answers"], &[]);
-    assert!(code == 2 && stderr.contains("answers") && stderr.contains("--force"), "{stderr}");
-    assert_eq!(listed(directory.path()), ["answers", "flight.mcap"]);
-    let (code, stdout, stderr) = asked(&log, ["frames", "answers"], &["--force"]);
+    std::fs::create_dir(&board).unwrap();
+    std::fs::write(board.join("recorded"), OTHERS).unwrap();
+    let (code, _, stderr) = asked(&[]);
+    assert!(code == 2 && stderr.contains("recorded") && stderr.contains("--force"), "{stderr}");
+    assert_eq!(listed(&board), ["recorded"]);
+    let (code, stdout, stderr) = asked(&["--force"]);
     assert!(code == 0 && stdout.ends_with(" frames\n"), "{stdout}{stderr}");
-    assert_eq!(listed(directory.path()), ["answers", "flight.mcap", "frames"]);
+    assert_eq!(listed(&board), ["frames", "recorded"]);
 }
 
 /// Not even with --force or under another name of the same file.
@@ -126,12 +126,12 @@ fn tables_and_imports_overwrite_nothing_either() {
     run(replay("export", &log).args(["--to", "tlog", "--output"]).arg(&tlog));
     let before = std::fs::read(&log).unwrap();
     // Without an output name, the default name is that of the flight's own log.
-    let (code, _, stderr) = run(&mut replay("import", &tlog));
+    let (code, _, stderr) = run(&mut replay("export", &tlog));
     assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
     assert_eq!(std::fs::read(&log).unwrap(), before);
-    let (code, _, stderr) = run(replay("import", &tlog).arg(&tlog).arg("--force"));
+    let (code, _, stderr) = run(replay("export", &tlog).arg("--output").arg(&tlog).arg("--force"));
     assert!(code == 2 && stderr.contains("is being read"), "{stderr}");
-    let (code, _, stderr) = run(replay("import", &tlog).arg(at("imported.mcap")));
+    let (code, _, stderr) = run(replay("export", &tlog).arg("--output").arg(at("imported.mcap")));
     assert_eq!(code, 0, "{stderr}");
 }
 
@@ -204,7 +204,7 @@ fn a_sweep_state_never_replaces_other_files() {
         }
         let before = std::fs::read(&state).unwrap();
         let (code, _, stderr) =
-            run(replay("sweep", &log).args(["--vary", "powered.weights.theta=75,80", "--state"]).arg(&state));
+            run(replay("refly", &log).args(["--vary", "powered.weights.theta=75,80", "--state"]).arg(&state));
         assert_eq!(code, 2, "{stderr}");
         assert_eq!(std::fs::read(&state).unwrap(), before);
     }

@@ -110,7 +110,7 @@ fn telemetry_alone_makes_a_page() {
     let (tlog, log) = (WITH_FRAMES.beside("page.tlog"), WITH_FRAMES.beside("page.mcap"));
     let open = || replay::log::FlightLog::open(&WITH_FRAMES.log);
     replay::export::export_tlog(&open, None, &tlog).unwrap();
-    replay::import::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
+    replay::export::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
     assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED"));

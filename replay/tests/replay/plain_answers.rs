@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use replay::import::import_tlog;
+use replay::export::import_tlog;
 use replay::log::{FlightLog, Recording};
 use replay::refly::{ReflyOptions, refly};
 
@@ -45,12 +45,12 @@ fn telemetry_only() -> PathBuf {
 #[test]
 fn telemetry_alone_is_refused_because_it_has_no_ticks() {
     let log = telemetry_only();
-    let mut tick = replay("tick", &log);
-    tick.arg("3");
-    let mut sweep = replay("sweep", &log);
+    let mut tick = replay("verify", &log);
+    tick.args(["--explain", "3"]);
+    let mut sweep = replay("refly", &log);
     sweep.args(["--vary", "powered.weights.theta=1,2"]);
-    let mut bisect = replay("bisect", &log);
-    bisect.args(["powered.weights.theta", "--lowest", "1", "--highest", "2"]);
+    let mut bisect = replay("refly", &log);
+    bisect.args(["--flip", "powered.weights.theta", "--lowest", "1", "--highest", "2"]);
     for mut command in [replay("evaluate", &log), replay("refly", &log), tick, sweep, bisect] {
         let (code, stdout, stderr) = run(&mut command);
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
@@ -72,7 +72,7 @@ fn a_cut_log_is_compared_up_to_its_end() {
 
 #[test]
 fn a_tick_without_a_solve_names_the_nearest_tick_with_one() {
-    let (code, stdout, _) = run(replay("tick", &MK2.log).arg("1"));
+    let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", "1"]));
     assert!(
         code == 0 && stdout.contains("this tick solves no landing; the nearest that does is "),
         "{stdout}"

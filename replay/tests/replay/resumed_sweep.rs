@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use replay::log::Recording;
 use replay::refly::ReflyOptions;
-use replay::sweep::{State, SweepReport, grid, sweep};
+use replay::refly::vary::{State, SweepReport, grid, sweep};
 
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
@@ -16,7 +16,7 @@ fn a_finished_flight_is_not_prepared_again() {
     let fly = |flight: &Recording, state: &mut State| -> Result<SweepReport, String> {
         let flights = std::slice::from_ref(flight);
         let options = ReflyOptions::default();
-        sweep(flights, &points, &options, NonZeroUsize::MIN, state, &mut |_| {})
+        sweep(flights, &points, &options, NonZeroUsize::MIN, state, &mut |_, _| {})
             .map_err(|error| format!("{:#}", anyhow::Error::from(error)))
     };
     let mut state = State::in_memory(points.len());

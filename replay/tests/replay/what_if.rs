@@ -4,8 +4,9 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicBool;
 
 use replay::log::Recording;
+use replay::refly::flip::{BisectOptions, bisect};
+use replay::refly::vary::{State, grid, random, sweep};
 use replay::refly::{ReflyOptions, margin, refly};
-use replay::sweep::{BisectOptions, State, bisect, grid, random, sweep};
 
 use crate::simulated::{DISPERSED, MK2, Simulated};
 
@@ -22,7 +23,7 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs_or_on_a_stop() {
     let options = ReflyOptions::default();
     let jobs = |count| NonZeroUsize::new(count).unwrap();
     let run = |count, state: &mut State| {
-        sweep(&flights, &points, &options, jobs(count), state, &mut |_| {}).unwrap()
+        sweep(&flights, &points, &options, jobs(count), state, &mut |_, _| {}).unwrap()
     };
     let one = run(1, &mut State::in_memory(12));
     assert_eq!(one, run(3, &mut State::in_memory(12)));
@@ -40,8 +41,7 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs_or_on_a_stop() {
     let mut state = State::open(&path, "id", 12).unwrap();
     assert_eq!(state.known(), 5);
     let mut flown = Vec::new();
-    let continued =
-        sweep(&flights, &points, &options, jobs(2), &mut state, &mut |progress| flown.push(progress.done));
+    let continued = sweep(&flights, &points, &options, jobs(2), &mut state, &mut |done, _| flown.push(done));
     assert_eq!(continued.unwrap(), one);
     assert_eq!(flown, [5, 6, 7, 8, 9, 10, 11, 12]);
 }
@@ -52,7 +52,8 @@ fn an_unknown_name_ends_a_sweep_with_the_nearest() {
     let points = random(&["powered.weigths.theta=50:110".parse().unwrap()], &[], 3, 1).unwrap();
     let options = ReflyOptions::default();
     let mut state = State::in_memory(6);
-    let error = sweep(&flights, &points, &options, NonZeroUsize::MIN, &mut state, &mut |_| {}).unwrap_err();
+    let error =
+        sweep(&flights, &points, &options, NonZeroUsize::MIN, &mut state, &mut |_, _| {}).unwrap_err();
     let chain = format!("{:#}", anyhow::Error::from(error));
     assert!(chain.contains("did you mean `powered.weights.theta`"), "{chain}");
 }

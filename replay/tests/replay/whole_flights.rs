@@ -135,7 +135,9 @@ fn commands_for_one_flight_refuse_a_log_with_two() {
         let mut both = a.clone();
         both.append(&a, 100_000_000_000);
         let path = written(&both, &directory, "both.mcap");
-        for arguments in [&["evaluate"][..], &["refly"], &["tick", "1"], &["report", "--output", "-"]] {
+        for arguments in
+            [&["evaluate"][..], &["refly"], &["verify", "--explain", "1"], &["report", "--output", "-"]]
+        {
             let (code, stdout, stderr) = run(replay(arguments[0], &path).args(&arguments[1..]));
             assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
             assert!(stderr.contains("holds 2 flights"), "{arguments:?}: {stderr}");

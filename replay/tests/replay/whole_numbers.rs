@@ -4,7 +4,8 @@ use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicBool;
 
 use replay::refly::ReflyOptions;
-use replay::sweep::{BisectOptions, State, bisect, grid, sweep};
+use replay::refly::flip::{BisectOptions, bisect};
+use replay::refly::vary::{State, grid, sweep};
 
 use crate::asked::with;
 use crate::simulated::MK2;
@@ -18,7 +19,7 @@ fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
         let points = grid(&[format!("{STEPS}={range}").parse().unwrap()], &[]).unwrap();
         let mut state = State::in_memory(points.len());
         let options = ReflyOptions::default();
-        let report = sweep(&flights, &points, &options, NonZeroUsize::MIN, &mut state, &mut |_| {});
+        let report = sweep(&flights, &points, &options, NonZeroUsize::MIN, &mut state, &mut |_, _| {});
         report.map_err(|error| format!("{:#}", anyhow::Error::from(error)))
     };
     assert_eq!(fly("10:20:3").unwrap().points, {

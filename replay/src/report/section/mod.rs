@@ -1,20 +1,9 @@
 //! The sections of a report, in the order they are read.
 
-mod completeness;
-mod descent;
-mod estimator;
-mod events;
-mod link;
+mod control;
 mod motion;
+mod outcome;
 pub(super) mod overlay;
-mod path;
-mod phases;
-mod prediction;
-mod saturation;
-mod solver;
-mod thrust;
-mod tracking;
-mod verdict;
 
 use super::track::Flight;
 use crate::info::Info;
@@ -30,26 +19,26 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
     let section = |title, html| Section { title, html };
     let in_space = flight.in_space.is_some();
     let mut all = vec![
-        section("", verdict::html(flight, info)),
-        section("Phases", phases::html(flight, info)),
-        section("Events", events::html(flight)),
+        section("", outcome::verdict(flight, info)),
+        section("Phases", outcome::phases(flight, info)),
+        section("Events", outcome::events(flight)),
     ];
     if in_space {
-        all.push(section("The whole flight", path::html(flight)));
+        all.push(section("The whole flight", motion::whole_flight(flight)));
     }
-    all.push(section("Path, states and input", motion::html(flight)));
+    all.push(section("Path, states and input", motion::motion(flight)));
     if in_space {
-        all.push(section("Wind, fins, roll and sensors", descent::html(flight)));
+        all.push(section("Wind, fins, roll and sensors", motion::descent(flight)));
     }
     all.extend([
-        section("Tracking error by phase", tracking::html(flight)),
-        section("Gimbal and fin saturation", saturation::html(flight)),
-        section("Solver", solver::html(flight, info)),
-        section("Predicted against actual touchdown", prediction::html(flight)),
-        section("Thrust expected against inferred", thrust::html(flight)),
-        section("Estimator error", estimator::html(flight)),
-        section("Link", link::html(flight, info)),
-        section("Log", completeness::html(info)),
+        section("Tracking error by phase", control::tracking(flight)),
+        section("Gimbal and fin saturation", control::saturation(flight)),
+        section("Solver", control::solver(flight, info)),
+        section("Predicted against actual touchdown", control::prediction(flight)),
+        section("Thrust expected against inferred", control::thrust(flight)),
+        section("Estimator error", control::estimator(flight)),
+        section("Link", outcome::link(flight, info)),
+        section("Log", outcome::completeness(info)),
     ]);
     all
 }

@@ -1,0 +1,179 @@
+//! Writes a recorded flight as the stream that a board reads, and its recorded decisions as the answers to be expected.
+
+use std::io;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+use board::stream::{Answer, Begin, Frame, Link, StreamError, send};
+use flight::guidance::baseline::Controller;
+
+use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
+use crate::log::{Entry, FlightLog, LogError};
+use crate::output::{Destination, NewFile, Overwrite};
+
+/// Why a flight cannot be given to a board.
+#[derive(Debug, thiserror::Error)]
+pub enum FramesError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("{file}: {reason}")]
+    NotWhole { file: String, reason: &'static str },
+    #[error("{path}: cannot be written")]
+    Write { path: String, source: StreamError<io::Error> },
+}
+
+/// A file of records, which gets its name when it is complete.
+struct Records<'p> {
+    path: &'p Path,
+    file: BufWriter<NewFile>,
+    buffer: Vec<u8>,
+}
+
+impl Link for Records<'_> {
+    type Error = io::Error;
+
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        Ok(0)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)
+    }
+}
+
+impl<'p> Records<'p> {
+    fn create(path: &'p Path, overwrite: Overwrite, log: &Path) -> Result<Self, FramesError> {
+        let file = NewFile::create(Destination { path, overwrite }, log)
+            .map_err(|error| failed(path, StreamError::Link(error)))?;
+        Ok(Self { path, file: BufWriter::new(file), buffer: Vec::new() })
+    }
+
+    fn send(&mut self, record: &impl prost::Message) -> Result<(), FramesError> {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        let sent = send(self, record, &mut buffer).map_err(|error| failed(self.path, error));
+        self.buffer = buffer;
+        sent
+    }
+
+    fn finish(self) -> Result<(), FramesError> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error);
+        file.and_then(NewFile::commit).map_err(|error| failed(self.path, StreamError::Link(error)))
+    }
+}
+
+fn failed(path: &Path, source: StreamError<io::Error>) -> FramesError {
+    FramesError::Write { path: path.display().to_string(), source }
+}
+
+/// Writes the frames of the flight in `log` to the file `frames` of a directory, which is made if needed, and what it
+/// decided in them to the file `recorded`. Returns the number of frames. A file gets its name when both are complete.
+///
+/// # Errors
+/// A file exists and may not be replaced; the log cannot be read, is damaged, or does not hold one flight from its start
+/// on; or a file cannot be written.
+pub fn write_frames<'a>(log: &Path, directory: impl Into<Destination<'a>>) -> Result<u64, FramesError> {
+    let Destination { path: directory, overwrite } = directory.into();
+    let opened = FlightLog::open(log)?;
+    let made = !directory.exists();
+    std::fs::create_dir_all(directory).map_err(|error| failed(directory, StreamError::Link(error)))?;
+    let written = write_into(directory, overwrite, log, opened);
+    if written.is_err() && made {
+        // Nothing is left behind. If this fails, an empty directory is.
+        let _ = std::fs::remove_dir(directory);
+    }
+    written
+}
+
+fn write_into<R: io::Read>(
+    directory: &Path,
+    overwrite: Overwrite,
+    path: &Path,
+    mut log: FlightLog<R>,
+) -> Result<u64, FramesError> {
+    let files = [directory.join("frames"), directory.join("recorded")];
+    let mut inputs = Records::create(&files[0], overwrite, path)?;
+    let mut expected = Records::create(&files[1], overwrite, path)?;
+    let (mut started, mut from_power_up, mut written) = (false, false, 0);
+    let not_whole =
+        |log: &FlightLog<_>, reason| FramesError::NotWhole { file: log.name().to_owned(), reason };
+    while let Some(stamped) = log.next_entry()? {
+        match stamped.entry {
+            Entry::ComputerStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::ComputerStart(start) => {
+                (started, from_power_up) = (true, true);
+                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                inputs.send(&Begin { at_power_up: Some(*start), ..begin })?;
+            }
+            // The computer of a flight from power-up needs no other start.
+            Entry::PilotStart(_) if from_power_up => {}
+            Entry::PilotStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::PilotStart(start) => {
+                started = true;
+                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                inputs.send(&Begin { in_the_air: Some(*start), ..begin })?;
+            }
+            Entry::ComputerFrame(frame) if from_power_up => {
+                inputs.send(&Frame { from_power_up: Some(frame.input), in_the_air: None })?;
+                let (output, state_digest) = (Some(frame.output), frame.state_digest);
+                expected.send(&Answer {
+                    from_power_up: output,
+                    in_the_air: None,
+                    state_digest,
+                    heard: None,
+                })?;
+                written += 1;
+            }
+            Entry::PilotTick(tick) if started && !from_power_up => {
+                inputs.send(&Frame { from_power_up: None, in_the_air: Some(tick.input) })?;
+                let (output, state_digest) = (Some(tick.output), tick.state_digest);
+                expected.send(&Answer {
+                    from_power_up: None,
+                    in_the_air: output,
+                    state_digest,
+                    heard: None,
+                })?;
+                written += 1;
+            }
+            // Its part of a frame from power-up.
+            Entry::PilotTick(_) if from_power_up => {}
+            Entry::ComputerFrame(_) | Entry::PilotTick(_) => {
+                return Err(not_whole(&log, "the start of its flight is missing"));
+            }
+            Entry::Unreadable { .. } => {
+                return Err(not_whole(&log, "has a record that this build cannot read"));
+            }
+            _ => {}
+        }
+    }
+    if log.damage().is_some() {
+        return Err(not_whole(&log, "is damaged"));
+    }
+    if written == 0 {
+        return Err(not_whole(&log, "has no frames of a flight computer from its start on"));
+    }
+    inputs.finish()?;
+    expected.finish()?;
+    Ok(written)
+}
+
+/// What the computer of a log is built from, besides its record of the start.
+fn beginning<R: io::Read>(log: &FlightLog<R>) -> Result<Begin, &'static str> {
+    let head = log.head();
+    if head.run.contains_key(SETTINGS_IN_FLIGHT) {
+        return Err("its settings were changed in flight");
+    }
+    if head.run.contains_key(REFLOWN_BY) {
+        return Err("another law took over in flight");
+    }
+    let Some(Ok(toml)) = &head.profile_toml else {
+        return Err("has no mission or profile before its first frame");
+    };
+    let controller = head.run.get("controller").cloned();
+    Ok(Begin {
+        toml: toml.clone(),
+        controller: controller.unwrap_or_else(|| Controller::default().name().to_owned()),
+        at_power_up: None,
+        in_the_air: None,
+        on_the_air: None,
+    })
+}

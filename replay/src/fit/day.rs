@@ -1,0 +1,584 @@
+//! What all flights so far tell of a motor lot, an airframe and a site, and what the next flight may expect of them.
+//!
+//! * [`posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns so far.
+//! * [`rate`]: the landing rate with its interval, from simulated flights with motors of the posterior.
+//! * [`day`]: the mission and the set of dispersions of the day, as files.
+//!
+//! Everything is per mass of the mission's data, as the fits are: the vehicle is taken as weighed, and its mass does not
+//! scatter beside its thrust.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::Args;
+use flight::guidance::baseline::{Controller, Law};
+use flight::vehicle::mission::Mission;
+use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha12Rng;
+use serde::Serialize;
+use sim::dispersion::{DEFAULT, Dispersion, DispersionError, may_be_kinder};
+use sim::draw::{Draw, draw};
+use sim::sortie::{SetUpError, Sortie};
+use world::truth::Truth;
+
+use super::lot::{Chance, Lot, Prediction, Trial, draw_next, predict};
+use super::{Basis, Fit, Pooled, Z_95, pooled};
+use crate::cli::{jobs, refuse_existing, say, text_of, write_new};
+use crate::print::{counted, shown};
+use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
+use crate::several::several;
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub struct DayAsk<'a> {
+    pub mission_toml: &'a str,
+    /// Name and text of the set of dispersions that is the prior.
+    pub set: (&'a str, &'a str),
+    /// Simulated flights of the day; `None`: it is not flown, and has no rate.
+    pub flights: Option<usize>,
+    pub seed: u64,
+    /// The landing rate that the club wants, and the risk of flying below it that it takes.
+    pub limit: f64,
+    pub risk: f64,
+    /// Flights at the same time; the answer does not depend on it.
+    pub jobs: NonZeroUsize,
+}
+
+/// Why nothing can be learnt.
+#[derive(Debug, thiserror::Error)]
+pub enum LearnError {
+    /// No fit has a burn.
+    #[error("no burn was found in {0} fits: a lot is learnt from burns")]
+    NoBurn(usize),
+    /// A fit is of another vehicle or motor than the mission.
+    #[error(
+        "{source_name} is of {found}, and the mission of {known}: one vehicle and one motor are learnt at a time"
+    )]
+    Other { source_name: String, found: String, known: String },
+    /// The mission, or a value that was learnt for it.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The set of dispersions.
+    #[error(transparent)]
+    Dispersion(#[from] DispersionError),
+    /// What was learnt cannot be written as a file.
+    #[error("{0}")]
+    Day(String),
+    /// A flight cannot be simulated.
+    #[error(transparent)]
+    SetUp(#[from] SetUpError),
+}
+
+/// A lot's property before the next burn.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LotReport {
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// Burns with this property.
+    pub burns: usize,
+    pub mean: f64,
+    /// Ends of the 95 % interval of the mean, as a normal one.
+    pub low: f64,
+    pub high: f64,
+    /// Standard deviation within the lot.
+    pub scatter: f64,
+    /// Standard deviation of the next burn.
+    pub next_sigma: f64,
+    /// The same before the first burn.
+    pub prior_sigma: f64,
+}
+
+/// What was learnt, and the answer for the day.
+#[derive(Debug, Clone, Serialize)]
+pub struct Learnt {
+    pub mission: String,
+    pub motor: String,
+    /// Name of the set of dispersions that was the prior.
+    pub set: String,
+    pub sources: Vec<String>,
+    pub lots: Vec<LotReport>,
+    /// Drag and gimbal of the airframe, over the flights.
+    pub airframe: Vec<Pooled>,
+    /// Mean wind at the site, lowest and highest of an even distribution, m/s.
+    pub wind_m_s: [f64; 2],
+    pub flights: usize,
+    /// `None` if the day was not flown.
+    pub prediction: Option<Prediction>,
+    pub limit: f64,
+    pub risk: f64,
+    pub go: Option<bool>,
+    #[serde(skip)]
+    pub day: Day,
+}
+
+/// The three properties of a lot, in the order of a trial's draws.
+const PROPERTIES: [(&str, &str); 3] =
+    [("thrust_scale", ""), ("burn_time_scale", ""), ("ignition_delay", "s")];
+
+/// Learns from fits, and flies the day.
+///
+/// # Errors
+/// [`LearnError`] says what is wrong with the fits, the mission or the set.
+pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
+    let set = Dispersion::from_toml(ask.set.1, ask.set.0)?;
+    let mission = crate::settings::mission_with(ask.mission_toml, &[])?;
+    one_vehicle(fits, [&mission.name, mission.motor_curve.name()])?;
+    let basis = Basis::of(&mission);
+    let fits: Vec<Fit> = fits.iter().map(|fit| fit.over(&basis)).collect();
+    let fits = fits.as_slice();
+    let scatter_scale = mission.airframe.igniter.scatter_scale;
+    let both = |sigma: f64, even: f64| libm::sqrt(sigma * sigma + even * even / 3.0);
+    let priors = [
+        // The scale is per mass: the mass scatters in it.
+        (1.0, libm::hypot(both(set.impulse_share, set.impulse_even_share), set.mass_share)),
+        (1.0, set.burn_time_share),
+        (
+            Truth::default().ignition_delay_s,
+            scatter_scale * both(set.ignition_delay_s, set.ignition_delay_even_s),
+        ),
+    ]
+    // A set without scatter still has to leave room for what is measured.
+    .map(|(mean, sigma)| Lot::prior(mean, sigma.max(1e-3)));
+    let values: Vec<Vec<f64>> = PROPERTIES
+        .iter()
+        .map(|(name, _)| fits.iter().filter_map(|fit| fit.get(name)).map(|found| found.value).collect())
+        .collect();
+    if values[0].is_empty() {
+        return Err(LearnError::NoBurn(fits.len()));
+    }
+    let lots: Vec<Lot> = priors.iter().zip(&values).map(|(prior, values)| prior.with(values)).collect();
+    let airframe: Vec<Pooled> = airframe(fits);
+    let wind_m_s = wind(fits, &set);
+    let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
+    let day = Day::of(ask, &mission, &lots, &airframe, wind_m_s, &sources)?;
+    let trials = ask.flights.map(|flights| fly(ask, flights, &lots, &day)).transpose()?;
+    let prediction = trials.as_ref().map(|trials| {
+        predict(&lots, trials, ask.limit, ask.seed)
+            .ok_or_else(|| LearnError::Day("no flight was simulated: --flights is 0".to_owned()))
+    });
+    let prediction = prediction.transpose()?;
+    let reports = PROPERTIES.iter().zip(&lots).zip(&values).zip(&priors);
+    let reports = reports.map(|((((name, unit), lot), values), prior)| LotReport {
+        name,
+        unit,
+        burns: values.len(),
+        mean: lot.mean,
+        low: lot.mean - Z_95 * lot.mean_sigma(),
+        high: lot.mean + Z_95 * lot.mean_sigma(),
+        scatter: lot.scatter(),
+        next_sigma: lot.next_sigma(),
+        prior_sigma: prior.next_sigma(),
+    });
+    Ok(Learnt {
+        mission: mission.name.clone(),
+        motor: mission.motor_curve.name().to_owned(),
+        set: ask.set.0.to_owned(),
+        sources,
+        lots: reports.collect(),
+        airframe,
+        wind_m_s,
+        flights: trials.map_or(0, |trials| trials.len()),
+        prediction,
+        limit: ask.limit,
+        risk: ask.risk,
+        go: prediction.map(|found| found.risk <= ask.risk),
+        day,
+    })
+}
+
+/// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has no vehicle.
+fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<(), LearnError> {
+    for fit in fits {
+        for (found, known) in [&fit.mission, &fit.motor].into_iter().zip(known) {
+            if !found.is_empty() && found != known {
+                return Err(LearnError::Other {
+                    source_name: fit.source.clone(),
+                    found: found.clone(),
+                    known: known.to_owned(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Drag and gimbal; of one flight as it was found.
+fn airframe(fits: &[Fit]) -> Vec<Pooled> {
+    let wanted = ["drag_scale", "gimbal_delay", "gimbal_gain", "gimbal_play"];
+    let together = pooled(fits);
+    let one = |name: &str| {
+        let mean = fits.iter().find_map(|fit| fit.get(name))?.clone();
+        Some(Pooled { mean, flights: 1, scatter: 0.0 })
+    };
+    let found = wanted.into_iter().filter_map(|name| {
+        together.iter().find(|pooled| pooled.mean.name == name).cloned().or_else(|| one(name))
+    });
+    found.collect()
+}
+
+/// The mean wind of the next day: the prior's range is a mean and a deviation, the flights' winds are values of them, and the
+/// next value's deviation is a range again.
+fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
+    let [low, high] = set.wind_m_s;
+    let speeds: Vec<f64> = fits
+        .iter()
+        .filter_map(|fit| Some(libm::hypot(fit.get("wind_x")?.value, fit.get("wind_y")?.value)))
+        .collect();
+    if speeds.is_empty() || high <= low {
+        return set.wind_m_s;
+    }
+    let lot = Lot::prior(0.5 * (low + high), (high - low) / libm::sqrt(12.0)).with(&speeds);
+    let reach = libm::sqrt(3.0) * lot.next_sigma();
+    [(lot.mean - reach).max(0.0), lot.mean + reach]
+}
+
+/// Flies the day's flights, several at a time.
+fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<Trial>, LearnError> {
+    let law = Law::of(Controller::Nmpc, &day.mission);
+    let mut chance = Chance(ChaCha12Rng::seed_from_u64(ask.seed));
+    let motors: Vec<(u64, Vec<f64>)> =
+        (0..flights as u64).map(|number| (number, draw_next(lots, &mut chance))).collect();
+    let one = |(number, motor): &(u64, Vec<f64>)| -> Result<bool, SetUpError> {
+        let drawn = draw(&day.mission, &day.dispersion, ask.seed, *number);
+        let truth = Truth {
+            // The day's mission has the lot's means already.
+            impulse_scale: (motor[0] / lots[0].mean).clamp(0.1, 10.0),
+            burn_time_scale: (motor[1] / lots[1].mean).clamp(0.3, 10.0),
+            ignition_delay_s: motor[2].clamp(0.02, 60.0),
+            ..drawn.truth
+        };
+        let draw = Draw { truth, ..drawn };
+        Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw, law.clone())?.run().legs)
+    };
+    let stop = AtomicBool::new(false);
+    let (mut landed, mut failed) = (vec![false; motors.len()], None);
+    several(&motors, ask.jobs, &stop, one, |number, legs| match legs {
+        Ok(legs) => landed[number] = legs,
+        Err(error) => {
+            stop.store(true, Ordering::Relaxed);
+            failed = Some(error);
+        }
+    });
+    match failed {
+        Some(error) => Err(error.into()),
+        None => {
+            Ok(motors.into_iter().zip(landed).map(|((_, drawn), landed)| Trial { drawn, landed }).collect())
+        }
+    }
+}
+
+/// The files of the day.
+#[derive(Debug, Clone)]
+pub struct Day {
+    pub mission: Mission,
+    pub mission_toml: String,
+    pub dispersion: Dispersion,
+    pub dispersion_toml: String,
+}
+
+impl Day {
+    pub(super) fn of(
+        ask: &DayAsk<'_>,
+        mission: &Mission,
+        lots: &[Lot],
+        airframe: &[Pooled],
+        wind_m_s: [f64; 2],
+        sources: &[String],
+    ) -> Result<Self, LearnError> {
+        let [thrust, burn_time, delay] = lots else {
+            return Err(LearnError::Day("a lot has thrust, burn time and delay".to_owned()));
+        };
+        let curve = scaled(&mission.motor_curve, thrust.mean, burn_time.mean)
+            .ok_or_else(|| LearnError::Day("the lot's mean motor has no thrust".to_owned()))?;
+        let drag = airframe.iter().find(|pooled| pooled.mean.name == "drag_scale").map(|pooled| &pooled.mean);
+        let drag_scale = drag.map_or(1.0, |mean| mean.value);
+        let (body, fins) = (&mission.airframe.body, &mission.airframe.fins);
+        let float = |value: f64| toml::Value::Float(value);
+        let set = |path: &str, value: toml::Value| Setting { path: path.to_owned(), value, at_s: None };
+        let settings = [
+            set("airframe.motor", toml::Value::String(vehicles::thrust_curve::to_rasp(&curve))),
+            set("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
+            set(
+                "airframe.body.crossflow_drag_coefficient",
+                float(body.crossflow_drag_coefficient * drag_scale),
+            ),
+            set("airframe.fins.drag_coefficient", float(fins.drag_coefficient * drag_scale)),
+            set("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
+            set("ignition.delay_s", float(delay.mean)),
+            set("motor.impulse_sigma", float(thrust.next_sigma())),
+            set("motor.burn_time_sigma", float(burn_time.next_sigma())),
+        ];
+        let head = head("The mission", ask, sources);
+        let mission_toml = head + &mission_toml_with(ask.mission_toml, &settings)?;
+        let mission = mission_with(&mission_toml, &[])?;
+        let dispersion_toml =
+            dispersion_toml(ask, &mission, lots, drag.map(|mean| mean.sigma / mean.value), wind_m_s, sources)
+                .map_err(LearnError::Day)?;
+        // Read as the campaign reads it.
+        let dispersion = Dispersion::from_toml(&dispersion_toml, "the day's set")?;
+        Ok(Self { mission, mission_toml, dispersion, dispersion_toml })
+    }
+}
+
+fn head(what: &str, ask: &DayAsk<'_>, sources: &[String]) -> String {
+    let mut head =
+        format!("# {what} of the next flight, after {} with the prior {}:\n", sources.len(), ask.set.0);
+    for source in sources {
+        // Writing to a String cannot fail.
+        let _ = writeln!(head, "# {}", protocol::text::printable(source.as_bytes()));
+    }
+    head
+}
+
+fn dispersion_toml(
+    ask: &DayAsk<'_>,
+    mission: &Mission,
+    lots: &[Lot],
+    drag_share: Option<f64>,
+    wind_m_s: [f64; 2],
+    sources: &[String],
+) -> Result<String, String> {
+    let mut table: toml::Table = ask.set.1.parse().map_err(|error| format!("{}: {error}", ask.set.0))?;
+    let mut set = |key: &str, value: f64| table.insert(key.to_owned(), toml::Value::Float(value));
+    let [thrust, burn_time, delay] = lots else { return Err("a lot has three properties".to_owned()) };
+    // The thrust is per mass and has the mass's scatter in it. A set has normal deviations where the next burn has a Student
+    // t of the same variance.
+    set("impulse_share", thrust.next_sigma() / thrust.mean);
+    set("impulse_even_share", 0.0);
+    set("mass_share", 0.0);
+    set("burn_time_share", burn_time.next_sigma() / burn_time.mean);
+    // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
+    let apart_s = delay.mean - Truth::default().ignition_delay_s;
+    let scatter_scale = mission.airframe.igniter.scatter_scale.max(1e-3);
+    set("ignition_delay_s", libm::hypot(delay.next_sigma(), apart_s) / scatter_scale);
+    set("ignition_delay_even_s", 0.0);
+    if let Some(drag_share) = drag_share {
+        set("drag_share", drag_share);
+    }
+    table.insert("wind_m_s".to_owned(), toml::Value::Array(wind_m_s.map(toml::Value::Float).to_vec()));
+    let text = toml::to_string(&table).map_err(|error| error.to_string())?;
+    Ok(head("The dispersions", ask, sources) + &text)
+}
+
+/// A motor with another impulse in another time.
+fn scaled(curve: &ThrustCurve, impulse: f64, burn_time: f64) -> Option<ThrustCurve> {
+    let points = curve.points().iter().map(|point| ThrustPoint {
+        time_s: point.time_s * burn_time,
+        thrust_n: point.thrust_n * impulse / burn_time,
+    });
+    ThrustCurve::new(MotorData {
+        name: curve.name().to_owned(),
+        manufacturer: curve.manufacturer().to_owned(),
+        diameter_m: curve.diameter_m(),
+        length_m: curve.length_m(),
+        propellant_mass_kg: curve.propellant_mass_kg(),
+        total_mass_kg: curve.total_mass_kg(),
+        points: points.collect(),
+    })
+}
+
+/// Writes what was learnt as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
+    let Learnt { mission, motor, set, sources, .. } = learnt;
+    let logs = counted(sources.len() as u64, "fit");
+    writeln!(
+        output,
+        "next day: {} with {} after {logs}, prior {}",
+        shown(mission),
+        shown(motor),
+        shown(set)
+    )?;
+    writeln!(
+        output,
+        "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
+    )?;
+    for lot in &learnt.lots {
+        let interval = format!("{:.4} to {:.4}", lot.low, lot.high);
+        let text = format!(
+            "  {:<18} {:>5}  {:>8.4}   {interval:<18}  {:>12.4}   {:>17.4} {}",
+            lot.name, lot.burns, lot.mean, lot.next_sigma, lot.prior_sigma, lot.unit
+        );
+        writeln!(output, "{}", text.trim_end())?;
+    }
+    for pooled in &learnt.airframe {
+        let mean = &pooled.mean;
+        let text = format!(
+            "airframe  {:<16} {:.4}, {:.4} to {:.4} {}",
+            shown(&mean.name),
+            mean.value,
+            mean.low,
+            mean.high,
+            mean.unit
+        );
+        writeln!(output, "{}", text.trim_end())?;
+    }
+    let [low, high] = learnt.wind_m_s;
+    writeln!(output, "site      wind {low:.1} to {high:.1} m/s")?;
+    let Some(found) = &learnt.prediction else { return Ok(()) };
+    writeln!(
+        output,
+        "rate      {:.1} %, 95 % interval {:.1} to {:.1} %, from {} in {}",
+        100.0 * found.rate,
+        100.0 * found.low,
+        100.0 * found.high,
+        counted(learnt.flights as u64, "simulated flight"),
+        shown(set)
+    )?;
+    writeln!(
+        output,
+        "risk      {:.1} % that the rate is below {:.0} %; {:.0} % is taken",
+        100.0 * found.risk,
+        100.0 * learnt.limit,
+        100.0 * learnt.risk
+    )?;
+    match (learnt.go == Some(true), may_be_kinder(set)) {
+        (false, _) => writeln!(output, "NO-GO"),
+        (true, false) => writeln!(output, "GO"),
+        (true, true) => writeln!(output, "GO in {} only, which may be kinder than {DEFAULT}", shown(set)),
+    }
+}
+
+/// What is asked of the next day.
+#[derive(Debug, Args)]
+#[group(id = "learnt")]
+pub(super) struct Arguments {
+    /// Learn the motor lot, the airframe and the site, and write mission.toml and dispersion.toml of the next day into this
+    /// directory, for `onboard-sim campaign`. Existing files are kept.
+    #[arg(long, value_name = "DIR", conflicts_with = "write_mission")]
+    day: Option<PathBuf>,
+    /// Simulate this many flights of the next day for the landing rate, and GO or NO-GO; a thousand take some minutes.
+    #[arg(long, value_name = "N")]
+    flights: Option<usize>,
+    /// Mission of the next day: built-in or TOML file [default: that of the first log]. Scales of fits over other data of
+    /// the same vehicle and motor are converted.
+    #[arg(long, value_name = "NAME|FILE")]
+    mission: Option<String>,
+    /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
+    prior: String,
+    /// Seed of the simulated flights.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Landing rate that the club wants at least.
+    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    limit: f64,
+    /// Risk that is taken of flying below it: GO if the probability is no higher.
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    risk: f64,
+    /// Flights at the same time; the answer does not depend on it [default: all processors].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+}
+
+/// The files of the day.
+const FILES: [&str; 2] = ["mission.toml", "dispersion.toml"];
+
+impl Arguments {
+    pub(super) fn is_asked(&self) -> bool {
+        self.day.is_some() || self.flights.is_some()
+    }
+
+    /// Refuses, before the work, what cannot be answered or written.
+    pub(super) fn check(&self) -> Result<()> {
+        for (name, share) in [("--limit", self.limit), ("--risk", self.risk)] {
+            ensure!((0.0..=1.0).contains(&share), "{name} {share}: must be 0 to 1");
+        }
+        self.day.iter().try_for_each(|day| FILES.iter().try_for_each(|name| refuse_existing(&day.join(name))))
+    }
+
+    /// What the fits tell of the next day; `flown` is the mission of the first log.
+    pub(super) fn learn(&self, fits: &[Fit], flown: Option<String>) -> Result<Learnt> {
+        let mission_toml = match (&self.mission, flown) {
+            (Some(name), _) => text_of(name, vehicles::mission::BUILTIN, "mission")?,
+            (None, Some(flown)) => flown,
+            (None, None) => bail!("--mission is missing: fits do not hold their mission"),
+        };
+        let set = text_of(&self.prior, sim::dispersion::BUILTIN, "set of dispersions")?;
+        if let Some(flights) = self.flights {
+            say(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
+        }
+        let learnt = learn(
+            fits,
+            &DayAsk {
+                mission_toml: &mission_toml,
+                set: (&self.prior, &set),
+                flights: self.flights,
+                seed: self.seed,
+                limit: self.limit,
+                risk: self.risk,
+                jobs: jobs(self.jobs),
+            },
+        )?;
+        if let Some(directory) = &self.day {
+            let name = directory.display();
+            std::fs::create_dir_all(directory).with_context(|| format!("{name}: cannot be made"))?;
+            write_new(&directory.join(FILES[0]), &learnt.day.mission_toml)?;
+            write_new(&directory.join(FILES[1]), &learnt.day.dispersion_toml)?;
+            say(&format!(
+                "onboard-sim campaign --profile {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
+            ));
+        }
+        Ok(learnt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Parameter;
+
+    fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
+        let text = |text: &str| text.to_owned();
+        Fit {
+            source: text(source),
+            mission: text(mission),
+            motor: text(motor),
+            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
+            found,
+            not_found: Vec::new(),
+            damage: None,
+        }
+    }
+
+    #[test]
+    fn other_vehicles_and_other_motors_are_refused_and_a_stand_is_not() {
+        let fits = [fit("a", "mk2", "H45W", vec![]), fit("b", "", "H45W", vec![])];
+        assert!(one_vehicle(&fits, ["mk2", "H45W"]).is_ok());
+        let error = one_vehicle(&fits, ["mk2", "H53"]).unwrap_err().to_string();
+        assert!(error.starts_with("a is of H45W, and the mission of H53"), "{error}");
+    }
+
+    /// A range of 0 to 6 is 3 with 1.732; one flight in 5 m/s makes the mean 4 and the squares 3 + 2 (worth one value and one
+    /// more): the next deviation is the root of (3 + 2) / 3 * 1.5, the range 1.732 times that to both sides.
+    #[test]
+    fn val_hand_the_wind_of_the_next_day() {
+        let set = Dispersion { wind_m_s: [0.0, 6.0], ..Dispersion::default() };
+        let wind_x = Parameter::normal("wind_x", "m/s", 3.0, 0.1);
+        let wind_y = Parameter::normal("wind_y", "m/s", 4.0, 0.1);
+        let [low, high] = wind(&[fit("a", "mk2", "H45W", vec![wind_x, wind_y])], &set);
+        let reach = libm::sqrt(3.0) * libm::sqrt((3.0 + 2.0) / 3.0 * 1.5);
+        assert!(
+            (high - 4.0 - reach).abs() < 1e-9 && (low - (4.0 - reach).max(0.0)).abs() < 1e-9,
+            "{low} {high}"
+        );
+    }
+
+    #[test]
+    fn val_hand_a_scaled_motor() {
+        let curve = vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
+        let found = scaled(&curve, 1.1, 2.0).unwrap();
+        assert!(
+            (found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12
+        );
+        assert!((found.thrust_at_n(4.0) - 22.0).abs() < 1e-12);
+        assert!((found.propellant_mass_kg() - 0.12).abs() < 1e-12);
+    }
+}

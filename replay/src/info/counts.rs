@@ -1,0 +1,435 @@
+//! What is counted while a log is read: channels, frames, phases, solve times, and how the flight ended.
+
+use std::collections::BTreeMap;
+
+use flight::rules::phase::Phase;
+use protocol::dialect::TdInterlock;
+use protocol::log::flight_v1::PilotTiming;
+use protocol::log::reader::LogChannel;
+use serde::Serialize;
+use tick_log::computer::accepts_abort;
+
+use super::{Grade, GradeLevel, ProfileFacts, VerdictFacts};
+use crate::log::{Entry, FrameOrder, Gap, StampedEntry, TickRanges};
+
+/// A channel of a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ChannelFacts {
+    pub topic: String,
+    /// How its messages are encoded.
+    pub message_encoding: String,
+    /// The name of its schema.
+    pub schema: String,
+    /// Metadata of the channel: link, endpoint, dialect.
+    pub metadata: BTreeMap<String, String>,
+    pub messages: u64,
+    /// Messages that this build cannot read.
+    pub unreadable: u64,
+    /// Missing messages before the last one, by the gaps in the sequence numbers.
+    pub lost: u64,
+}
+
+/// Counts messages by channel.
+#[derive(Default)]
+pub(super) struct ChannelCounter {
+    counts: BTreeMap<u16, Counts>,
+}
+
+#[derive(Default)]
+struct Counts {
+    messages: u64,
+    unreadable: u64,
+    last_sequence: u32,
+}
+
+impl ChannelCounter {
+    pub(super) fn count(&mut self, stamped: &StampedEntry) {
+        let counts = self.counts.entry(stamped.channel_id).or_default();
+        counts.messages += 1;
+        counts.unreadable += u64::from(matches!(stamped.entry, Entry::Unreadable { .. }));
+        counts.last_sequence = counts.last_sequence.max(stamped.sequence);
+    }
+
+    pub(super) fn into_facts<'a>(
+        mut self,
+        channels: impl Iterator<Item = (u16, &'a LogChannel)>,
+    ) -> Vec<ChannelFacts> {
+        let mut facts: Vec<ChannelFacts> = channels
+            .map(|(id, channel)| {
+                let counts = self.counts.remove(&id).unwrap_or_default();
+                // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
+                let numbered =
+                    if counts.last_sequence == 0 { 0 } else { u64::from(counts.last_sequence) + 1 };
+                ChannelFacts {
+                    topic: channel.topic.clone(),
+                    message_encoding: channel.message_encoding.clone(),
+                    schema: channel.schema_name.clone(),
+                    metadata: channel.metadata.clone(),
+                    messages: counts.messages,
+                    unreadable: counts.unreadable,
+                    lost: numbered.saturating_sub(counts.messages),
+                }
+            })
+            .collect();
+        facts.sort_by(|a, b| (&a.topic, &a.metadata).cmp(&(&b.topic, &b.metadata)));
+        facts
+    }
+}
+
+/// The frames of the flight computer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FrameFacts {
+    /// The lowest number.
+    pub first: u64,
+    /// The highest number.
+    pub last: u64,
+    /// Ranges of numbers left out because the computer was dead.
+    pub restarts: usize,
+    /// Ranges that the log has lost.
+    pub lost: usize,
+    /// The first lost range: no frame after it can be re-executed.
+    pub first_lost: Option<Gap>,
+    pub repeated: u64,
+    /// Whether the log has the computer's start record.
+    pub start: bool,
+    /// Solve times of the planning frames; `None` for a flight simulated without a clock.
+    pub solve_time: Option<SolveTimes>,
+}
+
+/// Counts frames.
+#[derive(Debug, Default)]
+pub(super) struct FrameCounter {
+    frames: TickRanges,
+    order: FrameOrder,
+    lost: usize,
+    first_lost: Option<Gap>,
+    solve_times: SolveTimeCounter,
+    /// Notes the start record of the flight computer.
+    start: bool,
+}
+
+impl FrameCounter {
+    pub(super) fn let_go(&mut self) {
+        self.start = true;
+    }
+
+    /// Counts a frame; `record` is the sequence number of its record in the channel.
+    pub(super) fn count(&mut self, frame: u64, record: u32) {
+        self.frames.insert(frame);
+        if let Some(gap) = self.order.note(frame, record) {
+            self.lost += 1;
+            self.first_lost.get_or_insert(gap);
+        }
+    }
+
+    pub(super) fn time(&mut self, timing: &PilotTiming) {
+        self.solve_times.count(timing.solve_time_s, timing.deadline_s);
+    }
+
+    pub(super) fn into_facts(self) -> Option<FrameFacts> {
+        let (first, last) = self.frames.bounds()?;
+        // A loss before the first frame is not a gap between frames.
+        let lost_between = self.lost - usize::from(self.first_lost.is_some_and(|gap| gap.after == 0));
+        Some(FrameFacts {
+            first,
+            last,
+            restarts: self.frames.gaps().count().saturating_sub(lost_between),
+            lost: self.lost,
+            first_lost: self.first_lost,
+            repeated: self.frames.repeated(),
+            start: self.start,
+            solve_time: self.solve_times.into_facts(),
+        })
+    }
+}
+
+impl Grade {
+    pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
+        let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
+        match profile {
+            _ if !frames.start => numeric("no start record of the flight computer"),
+            None => numeric("no attachment profile.toml to build the flight computer from"),
+            Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
+            Some(ProfileFacts { name, .. }) => {
+                Self::of_replayable_frames(frames, name.as_deref().unwrap_or_default())
+            }
+        }
+    }
+
+    /// The grade of a log whose frames can be executed again up to the first loss.
+    fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
+        let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
+        let level = GradeLevel::BitExact;
+        let reason = match first_lost {
+            Some(Gap { after: 0, before }) => {
+                let reason =
+                    format!("frames, but they begin with frame {before}, and those before it are lost");
+                return Self { level: GradeLevel::Numeric, reason };
+            }
+            Some(Gap { after, before }) => {
+                let more = if *lost > 1 { format!(", the first of {lost} gaps") } else { String::new() };
+                format!(
+                    "up to frame {after} of {last}: those up to frame {before} are lost{more}, and nothing after them can be run again; mission {mission}"
+                )
+            }
+            None if *repeated > 0 => format!(
+                "frames {first} to {last} of the flight computer up to the first that is there twice; mission {mission}"
+            ),
+            None => {
+                let restarted = match restarts {
+                    0 => String::new(),
+                    1 => ", restarted once".to_owned(),
+                    times => format!(", restarted {times} times"),
+                };
+                format!(
+                    "frames {first} to {last} of the flight computer{restarted}, its start and its mission {mission}"
+                )
+            }
+        };
+        Self { level, reason }
+    }
+}
+
+/// Limit on the phase changes kept; a flight has about ten.
+const SPANS_KEPT: usize = 200;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PhaseSource {
+    /// The vehicle's own frames.
+    Vehicle,
+    /// A ground station's telemetry.
+    Telemetry,
+}
+
+impl PhaseSource {
+    /// The source's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vehicle => "vehicle's frames",
+            Self::Telemetry => "ground station's telemetry",
+        }
+    }
+}
+
+/// The phases from one source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhaseTimeline {
+    pub source: PhaseSource,
+    /// The phases in order.
+    pub spans: Vec<PhaseSpan>,
+    /// Number of changes that are not listed because there were too many.
+    pub further_changes: u64,
+}
+
+/// A time in one phase.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhaseSpan {
+    /// Its name, or `unknown (n)`.
+    pub phase: String,
+    /// The source's time of its first record, s.
+    pub from_s: f64,
+    /// The source's time of its last record, s.
+    pub until_s: f64,
+}
+
+/// Follows the phase through a log.
+#[derive(Default)]
+pub(super) struct PhaseTracker {
+    current: Option<u32>,
+    spans: Vec<PhaseSpan>,
+    further_changes: u64,
+}
+
+impl PhaseTracker {
+    pub(super) fn note(&mut self, time_s: f64, phase: u32) {
+        if self.current != Some(phase) {
+            self.current = Some(phase);
+            if self.spans.len() < SPANS_KEPT {
+                self.spans.push(PhaseSpan { phase: phase_name(phase), from_s: time_s, until_s: time_s });
+            } else {
+                self.further_changes += 1;
+            }
+        } else if self.further_changes == 0
+            && let Some(span) = self.spans.last_mut()
+        {
+            span.until_s = time_s;
+        }
+    }
+
+    pub(super) fn into_timeline(self, source: PhaseSource) -> Option<PhaseTimeline> {
+        let Self { spans, further_changes, .. } = self;
+        (!spans.is_empty()).then_some(PhaseTimeline { source, spans, further_changes })
+    }
+}
+
+fn phase_name(number: u32) -> String {
+    let known = u8::try_from(number).ok().and_then(Phase::from_index);
+    known.map_or_else(|| format!("unknown ({number})"), |phase| phase.name().to_owned())
+}
+
+/// Begins the event of a start that was refused.
+const REFUSED: &str = "REFUSED: ";
+
+/// Whether an abort is latched, in the interlocks of telemetry.
+fn has_latched_abort(interlocks: u32) -> bool {
+    interlocks & u32::from(TdInterlock::TD_INTERLOCK_ABORT_LATCHED.bits()) != 0
+}
+
+/// Follows what decides how a flight ended.
+#[derive(Debug, Default)]
+pub(super) struct EndingTracker {
+    aborted: bool,
+    refused: Option<String>,
+    last_phase: Option<u32>,
+}
+
+impl EndingTracker {
+    pub(super) fn note(&mut self, entry: &Entry) {
+        let phase = match entry {
+            Entry::ComputerFrame(frame) => {
+                self.aborted |= accepts_abort(frame);
+                frame.output.phase
+            }
+            Entry::PilotTick(tick) => {
+                self.aborted |= tick.input.abort;
+                tick.output.phase
+            }
+            Entry::Telemetry(telemetry) => {
+                self.aborted |= telemetry.interlocks.is_some_and(has_latched_abort);
+                let Some(phase) = telemetry.phase else { return };
+                phase
+            }
+            Entry::Event(event) => {
+                if let Some(reason) = event.message.strip_prefix(REFUSED) {
+                    self.refused = Some(reason.to_owned());
+                }
+                return;
+            }
+            _ => return,
+        };
+        self.last_phase = Some(phase);
+    }
+
+    /// The sentence; `None` for a log that ends in flight without saying anything.
+    pub(super) fn words(&self, verdict: Option<&VerdictFacts>) -> Option<String> {
+        if let Some(verdict) = verdict {
+            return Some(verdict.ending.clone());
+        }
+        let phase = self.last_phase.and_then(|phase| u8::try_from(phase).ok()).and_then(Phase::from_index);
+        let name = phase.map_or("an unknown phase", Phase::name);
+        if let Some(reason) = &self.refused {
+            return Some(format!("REFUSED: {reason}"));
+        }
+        if self.aborted {
+            return Some(format!("ABORTED in {name}"));
+        }
+        match phase {
+            Some(Phase::Chute) => Some("under the parachute when the log ends; no verdict".to_owned()),
+            Some(phase) if phase.on_pad() => Some(format!("NOT FLOWN: the log ends in {name}")),
+            _ => None,
+        }
+    }
+}
+
+/// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
+const TIMES_KEPT: usize = 1_000_000;
+
+/// Durations of the ticks that solve, as measured on board.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SolveTimes {
+    /// Number of measurements.
+    pub count: u64,
+    pub median_s: f64,
+    /// 99th percentile, s.
+    pub p99_s: f64,
+    /// The longest, s.
+    pub max_s: f64,
+    /// The shortest deadline, s.
+    pub deadline_s: f64,
+    /// Number of ticks that missed their deadline.
+    pub over_deadline: u64,
+}
+
+/// Counts solve times.
+#[derive(Debug, Default)]
+pub(super) struct SolveTimeCounter {
+    times_s: Vec<f64>,
+    count: u64,
+    deadline_s: Option<f64>,
+    over_deadline: u64,
+}
+
+impl SolveTimeCounter {
+    pub(super) fn count(&mut self, time_s: f64, deadline_s: f64) {
+        self.count += 1;
+        if self.times_s.len() < TIMES_KEPT {
+            self.times_s.push(time_s);
+        }
+        self.deadline_s = Some(self.deadline_s.map_or(deadline_s, |least_s| least_s.min(deadline_s)));
+        self.over_deadline += u64::from(time_s > deadline_s);
+    }
+
+    /// `None` if nothing was measured.
+    pub(super) fn into_facts(mut self) -> Option<SolveTimes> {
+        self.times_s.sort_by(f64::total_cmp);
+        Some(SolveTimes {
+            count: self.count,
+            median_s: percentile(&self.times_s, 50),
+            p99_s: percentile(&self.times_s, 99),
+            max_s: percentile(&self.times_s, 100),
+            deadline_s: self.deadline_s?,
+            over_deadline: self.over_deadline,
+        })
+    }
+}
+
+/// The smallest element that at least `percent` of 100 do not exceed (nearest rank).
+fn percentile(sorted: &[f64], percent: usize) -> f64 {
+    let rank = (sorted.len() * percent).div_ceil(100);
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_change_begins_a_span_and_an_unknown_phase_keeps_its_number() {
+        let mut tracker = PhaseTracker::default();
+        for (time_s, phase) in [(0.0, 1), (0.1, 1), (0.2, 9), (0.3, 1), (0.4, 99)] {
+            tracker.note(time_s, phase);
+        }
+        let spans = tracker.into_timeline(PhaseSource::Vehicle).unwrap().spans;
+        let shown: Vec<_> =
+            spans.iter().map(|span| (span.phase.as_str(), span.from_s, span.until_s)).collect();
+        assert_eq!(
+            shown,
+            [
+                ("PAD_IDLE", 0.0, 0.1),
+                ("POWERED", 0.2, 0.2),
+                ("PAD_IDLE", 0.3, 0.3),
+                ("unknown (99)", 0.4, 0.4)
+            ]
+        );
+    }
+
+    #[test]
+    fn a_flickering_phase_does_not_fill_the_memory() {
+        let mut tracker = PhaseTracker::default();
+        (0..10_000_u32).for_each(|n| tracker.note(f64::from(n), n % 2));
+        let timeline = tracker.into_timeline(PhaseSource::Vehicle).unwrap();
+        assert_eq!(timeline.spans.len(), SPANS_KEPT);
+        assert_eq!(timeline.further_changes, 10_000 - SPANS_KEPT as u64);
+    }
+
+    #[test]
+    fn percentiles_use_the_nearest_rank() {
+        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
+        for (percent, expected) in [(50, 50.0), (99, 99.0), (100, 100.0)] {
+            assert_eq!(percentile(&hundred, percent).to_bits(), f64::to_bits(expected));
+            assert_eq!(percentile(&[7.0], percent).to_bits(), 7.0_f64.to_bits());
+        }
+        assert!(percentile(&[], 50).is_nan());
+    }
+}

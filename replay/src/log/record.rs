@@ -1,0 +1,229 @@
+//! One record of a log; decoded if replay needs its content.
+
+use std::sync::LazyLock;
+
+use prost::Message;
+use prost_reflect::{
+    Cardinality, DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMessage as _, Value,
+};
+use protocol::log::reader::LogChannel;
+use protocol::log::record::{
+    ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_EVENTS,
+    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+};
+use protocol::log::{
+    DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, computer_v1, flight_v1, v1,
+};
+
+/// A record and its position in the log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StampedEntry {
+    /// Its channel; see [`FlightLog::channels`](super::FlightLog::channels).
+    pub channel_id: u16,
+    /// Nanoseconds since the Unix epoch.
+    pub log_time_ns: u64,
+    /// Sequence number in its channel.
+    pub sequence: u32,
+    /// Its bytes.
+    pub data: Vec<u8>,
+    /// Its content.
+    pub entry: Entry,
+}
+
+/// One record of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// The data from which the flight computer was built at power-up.
+    ComputerStart(Box<computer_v1::ComputerStart>),
+    /// A frame of the flight computer, from power-up on.
+    ComputerFrame(Box<computer_v1::ComputerFrame>),
+    /// The start record of the flight computer: its estimate at its release.
+    PilotStart(Box<flight_v1::PilotStart>),
+    /// A frame of the flight computer from its release on.
+    PilotTick(Box<flight_v1::PilotTick>),
+    /// Solve time of a planning frame.
+    PilotTiming(flight_v1::PilotTiming),
+    /// What the flight computer believed after a frame.
+    Estimate(Box<flight_v1::Estimate>),
+    /// The simulated world.
+    World(Box<flight_v1::TruthSample>),
+    /// The landing verdict.
+    Verdict(Box<v1::LandingVerdict>),
+    /// The values that a ground station knew.
+    Telemetry(Box<v1::Telemetry>),
+    /// A raw frame: see the record's own bytes.
+    RawFrame,
+    /// An operator's action: see the record's own bytes.
+    Operator,
+    /// An event, as text for people; many programs write such records.
+    Event(Box<foxglove::messages::Log>),
+    /// A record on one of our topics that this build cannot read.
+    Unreadable { reason: String },
+    /// Anything else: transforms and records of other programs.
+    Other,
+}
+
+impl Entry {
+    /// Whether such a record occurs only in flight logs.
+    pub(super) fn is_ours(&self) -> bool {
+        !matches!(self, Self::Event(_) | Self::Other)
+    }
+
+    /// The content of a message on `channel`.
+    pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8]) -> Self {
+        let Some(channel) = channel else {
+            return Self::Other;
+        };
+        match channel.topic.as_str() {
+            TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
+            TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, Self::ComputerFrame),
+            TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
+            TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
+            TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
+                Self::PilotTiming(*timing)
+            }),
+            TOPIC_ESTIMATE => decoded(channel, "Estimate", data, Self::Estimate),
+            TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
+            TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
+            TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
+            TOPIC_OPERATOR => {
+                decoded::<v1::OperatorAction>(channel, "OperatorAction", data, |_| Self::Operator)
+            }
+            TOPIC_EVENTS if channel.schema_name == "foxglove.Log" => foxglove::messages::Log::decode(data)
+                .map_or(Self::Other, |event| Self::Event(Box::new(event))),
+            TOPIC_RAW_RX | TOPIC_RAW_TX if channel.message_encoding == ENCODING_MAVLINK => Self::RawFrame,
+            _ => Self::Other,
+        }
+    }
+}
+
+fn decoded<M: Message + Default>(
+    channel: &LogChannel,
+    message_name: &str,
+    data: &[u8],
+    kind: impl FnOnce(Box<M>) -> Entry,
+) -> Entry {
+    let package = match message_name {
+        "ComputerStart" | "ComputerFrame" => PACKAGE_COMPUTER,
+        "PilotStart" | "PilotTick" | "PilotTiming" | "Estimate" | "TruthSample" => PACKAGE_FLIGHT,
+        _ => PACKAGE,
+    };
+    let accepted = format!("{package}.{message_name}");
+    if channel.schema_name != accepted {
+        // Another program may use the same topic name.
+        return if channel.schema_name.starts_with("touchdown.") {
+            let found = &channel.schema_name;
+            let reason = format!("{} holds {found}; this build reads {accepted}", channel.topic);
+            Entry::Unreadable { reason }
+        } else {
+            Entry::Other
+        };
+    }
+    let message = match M::decode(data) {
+        Ok(message) => message,
+        Err(error) => {
+            return Entry::Unreadable { reason: format!("{}: {error}", channel.topic) };
+        }
+    };
+    // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would give different bytes.
+    if message.encode_to_vec() != data
+        && let Some(complaint) = complaint(&accepted, data)
+    {
+        return Entry::Unreadable { reason: format!("{}: {complaint}", channel.topic) };
+    }
+    kind(Box::new(message))
+}
+
+/// Package of the log's own records.
+pub(super) const PACKAGE: &str = "touchdown.log.v1";
+
+/// Package of the records of the flight from apogee.
+pub(super) const PACKAGE_FLIGHT: &str = "touchdown.flight.v1";
+
+/// Package of the flight computer's frames from power-up on.
+pub(super) const PACKAGE_COMPUTER: &str = "touchdown.computer.v1";
+
+static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
+    let mut pool = DescriptorPool::decode(DESCRIPTORS_V1).unwrap_or_default();
+    // A schema that cannot be added would be missing, and the crate's tests would notice.
+    let _ = pool.decode_file_descriptor_set(DESCRIPTORS_FLIGHT_V1);
+    let _ = pool.decode_file_descriptor_set(DESCRIPTORS_COMPUTER_V1);
+    pool
+});
+
+/// Describes a frame of the flight computer.
+pub(crate) fn pilot_descriptor() -> Option<MessageDescriptor> {
+    POOL.get_message_by_name("touchdown.flight.v1.PilotTick")
+}
+
+/// Descriptor of a frame of the flight computer from power-up on.
+pub(crate) fn computer_descriptor() -> Option<MessageDescriptor> {
+    POOL.get_message_by_name("touchdown.computer.v1.ComputerFrame")
+}
+
+/// Why a record cannot be understood exactly: a missing or an unknown field. `None` if it can.
+pub(super) fn complaint(full_name: &str, data: &[u8]) -> Option<String> {
+    let descriptor = POOL.get_message_by_name(full_name)?;
+    match DynamicMessage::decode(descriptor, data) {
+        Ok(message) => message_complaint(&message, ""),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+fn message_complaint(message: &DynamicMessage, path: &str) -> Option<String> {
+    if let Some(unknown) = message.unknown_fields().next() {
+        let place = if path.is_empty() { "the record" } else { path.trim_end_matches('.') };
+        return Some(format!(
+            "{place} has a field number {} that this build does not know: a newer version wrote it",
+            unknown.number()
+        ));
+    }
+    message.descriptor().fields().find_map(|field| {
+        let name = format!("{path}{}", field.name());
+        if field.cardinality() == Cardinality::Required && !message.has_field(&field) {
+            return Some(format!("{name} is missing; this build needs it"));
+        }
+        match message.get_field(&field).as_ref() {
+            Value::Message(inner) if message.has_field(&field) => {
+                message_complaint(inner, &format!("{name}."))
+            }
+            Value::List(items) => items.iter().enumerate().find_map(|(index, item)| {
+                message_complaint(item.as_message()?, &format!("{name}[{index}]."))
+            }),
+            _ => None,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::log::{flight_v1, v1};
+
+    #[test]
+    fn every_record_is_described() {
+        for name in ["LandingVerdict", "Telemetry", "OperatorAction"] {
+            assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
+        }
+        assert!(pilot_descriptor().is_some() && computer_descriptor().is_some());
+    }
+
+    #[test]
+    fn a_missing_field_is_named() {
+        let tick = "touchdown.flight.v1.PilotTick";
+        assert_eq!(complaint(tick, &flight_v1::PilotTick::default().encode_to_vec()), None);
+        assert_eq!(complaint(tick, &[]).unwrap(), "input is missing; this build needs it");
+        // Field 1, a message of no bytes.
+        assert_eq!(complaint(tick, &[0x0a, 0x00]).unwrap(), "input.frame is missing; this build needs it");
+    }
+
+    #[test]
+    fn an_unknown_field_is_named_with_its_place() {
+        let mut action = v1::OperatorAction::default().encode_to_vec();
+        // Field 15, a varint.
+        action.extend([0x78, 0x01]);
+        let complaint = complaint("touchdown.log.v1.OperatorAction", &action).unwrap();
+        assert!(complaint.contains("field number 15"), "{complaint}");
+    }
+}

@@ -1,0 +1,469 @@
+//! Flies many settings over many flights in closed loop and ranks them by the worst flight's margin.
+//!
+//! A point is one choice of every varied setting; a job is one point on one flight. Jobs are independent and their
+//! results are put in the order of the points, so the answer does not depend on how many run at the same time. With a
+//! state file every finished job is kept, and a sweep that was stopped can be continued.
+
+use std::io::{self, Write};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context as _, Result, ensure};
+use clap::Args;
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha12Rng;
+use serde::Serialize;
+
+pub use super::jobs::{State, StateError, sweep};
+use super::{FlownHow, ReflyError, StartAt, can_be_flown};
+use crate::cli::{Answer, answer, jobs, say, show_progress, warn_of_what_is_missing};
+use crate::digest::{START, digest};
+use crate::log::Recording;
+use crate::print::{counted, print_json, shown};
+use crate::settings::Setting;
+
+/// Why a sweep could not be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    /// A flight cannot be flown again at some point.
+    #[error("{settings}")]
+    Refly {
+        /// The settings of the point.
+        settings: String,
+        /// What is wrong.
+        source: Box<ReflyError>,
+    },
+    /// The state file cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
+
+/// The outcome of one flight at one point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FlightOutcome {
+    /// Inside every touchdown limit.
+    pub landed: bool,
+    /// Distance to the nearest limit as a fraction of it; see [`ReflyReport::margin`](crate::refly::ReflyReport).
+    /// `None` if the vehicle did not come down.
+    pub margin: Option<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointOutcome {
+    /// Its number among the points.
+    pub point: usize,
+    pub settings: Vec<String>,
+    /// Flights that landed.
+    pub landed: usize,
+    /// The worst flight's margin; `None` if one did not come down.
+    pub worst_margin: Option<f64>,
+    pub worst_flight: String,
+    /// Every flight, in the order given.
+    pub flights: Vec<FlightOutcome>,
+}
+
+/// The result of a sweep.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SweepReport {
+    /// Marks the report as closed loop.
+    pub kind: &'static str,
+    pub flights: Vec<String>,
+    /// The flights of this run that this build, with nothing changed, does not fly as recorded.
+    pub not_reproduced: Vec<String>,
+    /// The points, the best first.
+    pub points: Vec<PointOutcome>,
+}
+
+impl SweepReport {
+    /// Ranks the points by largest worst-case margin, then by number of landings, then in the given order.
+    pub(super) fn ranked(
+        flights: Vec<String>,
+        not_reproduced: Vec<String>,
+        mut points: Vec<PointOutcome>,
+    ) -> Self {
+        let margin = |point: &PointOutcome| point.worst_margin.unwrap_or(f64::NEG_INFINITY);
+        points.sort_by(|a, b| {
+            margin(b).total_cmp(&margin(a)).then(b.landed.cmp(&a.landed)).then(a.point.cmp(&b.point))
+        });
+        Self { kind: "closed loop: flown again in simulation", flights, not_reproduced, points }
+    }
+}
+
+/// Most points of one sweep: more would take days.
+const POINTS_MAX: usize = 1_000_000;
+
+/// A setting and the values it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vary {
+    /// The setting, as in `powered.weights.theta`.
+    pub path: String,
+    pub values: Values,
+}
+
+/// The values of a varied setting.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// A list of values.
+    Listed(Vec<toml::Value>),
+    /// A range: evenly spaced values for a grid, or random values inside it.
+    Range {
+        /// The first.
+        from: f64,
+        /// The last.
+        to: f64,
+        /// Number of values; ignored for random points.
+        count: usize,
+    },
+}
+
+/// Why the values cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum VaryError {
+    /// The text cannot be parsed.
+    #[error(
+        "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in powered.weights.theta=50:110:7"
+    )]
+    Form { given: String },
+    /// Too many points.
+    #[error("{points} points; at most {POINTS_MAX} are allowed in one sweep")]
+    TooMany { points: usize },
+    /// Random points need a range, not a list.
+    #[error("{path}: random points need a range PATH=FROM:TO, not a list")]
+    NoRange {
+        /// The setting.
+        path: String,
+    },
+}
+
+/// The settings of one point.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Choice {
+    /// Settings of controller and plant.
+    pub settings: Vec<Setting>,
+    /// Settings of the plant only.
+    pub plant_settings: Vec<Setting>,
+}
+
+impl FromStr for Vary {
+    type Err = VaryError;
+
+    fn from_str(given: &str) -> Result<Self, VaryError> {
+        let form = || VaryError::Form { given: given.to_owned() };
+        let (path, text) = given.split_once('=').ok_or_else(form)?;
+        let (path, text) = (path.trim().to_owned(), text.trim());
+        if path.is_empty() || text.is_empty() {
+            return Err(form());
+        }
+        let parts: Vec<&str> = text.split(':').collect();
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        let values = match parts.as_slice() {
+            [_] => {
+                let listed = text.split(',').map(|value| format!("{path}={value}").parse::<Setting>());
+                let listed = listed.map(|setting| setting.ok().filter(|setting| setting.at_s.is_none()));
+                Values::Listed(
+                    listed
+                        .map(|setting| Some(setting?.value))
+                        .collect::<Option<Vec<_>>>()
+                        .ok_or_else(form)?,
+                )
+            }
+            [from, to] => Values::Range {
+                from: number(from).ok_or_else(form)?,
+                to: number(to).ok_or_else(form)?,
+                count: 2,
+            },
+            [from, to, count] => Values::Range {
+                from: number(from).ok_or_else(form)?,
+                to: number(to).ok_or_else(form)?,
+                count: count.trim().parse().ok().filter(|count| *count >= 1).ok_or_else(form)?,
+            },
+            _ => return Err(form()),
+        };
+        Ok(Self { path, values })
+    }
+}
+
+impl Vary {
+    fn count(&self) -> usize {
+        match &self.values {
+            Values::Listed(values) => values.len(),
+            Values::Range { count, .. } => *count,
+        }
+    }
+
+    /// The value at this index of the grid.
+    fn at(&self, place: usize) -> Setting {
+        let value = match &self.values {
+            Values::Listed(values) => values.get(place).cloned().unwrap_or(toml::Value::Boolean(false)),
+            Values::Range { from, to, count } => {
+                let share = if *count > 1 { place as f64 / (*count - 1) as f64 } else { 0.0 };
+                toml::Value::Float(from + share * (to - from))
+            }
+        };
+        Setting { path: self.path.clone(), value, at_s: None }
+    }
+}
+
+/// Every combination; the last setting changes fastest.
+///
+/// # Errors
+/// There are too many points.
+pub fn grid(vary: &[Vary], plant: &[Vary]) -> Result<Vec<Choice>, VaryError> {
+    let all: Vec<&Vary> = vary.iter().chain(plant).collect();
+    let points = all.iter().map(|vary| vary.count()).fold(1, usize::saturating_mul);
+    if points > POINTS_MAX {
+        return Err(VaryError::TooMany { points });
+    }
+    let choice = |point: usize| {
+        let mut rest = point;
+        let mut settings: Vec<Setting> = Vec::new();
+        for vary in all.iter().rev() {
+            settings.push(vary.at(rest % vary.count()));
+            rest /= vary.count();
+        }
+        settings.reverse();
+        let plant_settings = settings.split_off(vary.len());
+        Choice { settings, plant_settings }
+    };
+    Ok((0..points).map(choice).collect())
+}
+
+/// Uniformly random points in the ranges; the same seed gives the same points.
+///
+/// # Errors
+/// There are too many points, or a setting has a list instead of a range.
+pub fn random(vary: &[Vary], plant: &[Vary], points: usize, seed: u64) -> Result<Vec<Choice>, VaryError> {
+    if points > POINTS_MAX {
+        return Err(VaryError::TooMany { points });
+    }
+    let mut numbers = ChaCha12Rng::seed_from_u64(seed);
+    let mut draw = |vary: &Vary| match vary.values {
+        Values::Listed(_) => Err(VaryError::NoRange { path: vary.path.clone() }),
+        Values::Range { from, to, .. } => {
+            // 53 random bits.
+            let share = (numbers.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+            let value = toml::Value::Float(from + share * (to - from));
+            Ok(Setting { path: vary.path.clone(), value, at_s: None })
+        }
+    };
+    (0..points)
+        .map(|_| {
+            let settings = vary.iter().map(&mut draw).collect::<Result<Vec<_>, _>>()?;
+            let plant_settings = plant.iter().map(&mut draw).collect::<Result<Vec<_>, _>>()?;
+            Ok(Choice { settings, plant_settings })
+        })
+        .collect()
+}
+
+/// Writes the best points of a sweep as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) -> io::Result<()> {
+    let flights = report.flights.len();
+    writeln!(
+        output,
+        "{}: {} on {}, ranked by the worst flight's margin",
+        report.kind,
+        counted(report.points.len() as u64, "point"),
+        counted(flights as u64, "flight")
+    )?;
+    for name in &report.not_reproduced {
+        not_reproduced(name, output)?;
+    }
+    writeln!(output, "{:>4} {:>9} {:>9}  settings; worst flight", "rank", "margin", "landed")?;
+    for (rank, point) in report.points.iter().enumerate().take(top) {
+        let PointOutcome { settings, landed, worst_flight, .. } = point;
+        writeln!(
+            output,
+            "{:>4} {:>9} {:>9}  {}; {}",
+            rank + 1,
+            margin_words(point.worst_margin),
+            format!("{landed}/{flights}"),
+            shown(&settings.join(" ")),
+            shown(worst_flight)
+        )?;
+    }
+    if report.points.len() > top {
+        writeln!(output, "and {} more; --top shows more, --csv all", report.points.len() - top)?;
+    }
+    Ok(())
+}
+
+/// Writes every point of a sweep on every flight as CSV, the best point first.
+///
+/// # Errors
+/// The output failed.
+pub fn print_sweep_csv(report: &SweepReport, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "rank,point,settings,flight,landed,margin,worst_margin")?;
+    for (rank, point) in report.points.iter().enumerate() {
+        for (name, flight) in report.flights.iter().zip(&point.flights) {
+            let number = |margin: Option<f64>| margin.map(|margin| format!("{margin:?}")).unwrap_or_default();
+            writeln!(
+                output,
+                "{},{},{},{},{},{},{}",
+                rank + 1,
+                point.point,
+                quoted(&point.settings.join(" ")),
+                quoted(name),
+                flight.landed,
+                number(flight.margin),
+                number(point.worst_margin)
+            )?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn not_reproduced(name: &str, output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "{}: with nothing changed this build does not fly it as recorded", shown(name))
+}
+
+pub(super) fn margin_words(margin: Option<f64>) -> String {
+    margin.map_or_else(|| "not down".to_owned(), |margin| format!("{margin:.4}"))
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// What is varied.
+#[derive(Debug, Args)]
+#[group(id = "varied")]
+pub(super) struct Arguments {
+    /// A setting of controller and plant to vary: PATH=FROM:TO:COUNT, PATH=A,B,C, or PATH=FROM:TO with --random. May be
+    /// given more than once; every combination is flown.
+    #[arg(long, value_name = "PATH=VALUES", conflicts_with = "flip")]
+    vary: Vec<Vary>,
+    /// A setting of the plant alone to vary, in the same form.
+    #[arg(long, value_name = "PATH=VALUES", conflicts_with = "flip")]
+    vary_plant: Vec<Vary>,
+    /// Use this many random points in the ranges instead of a grid.
+    #[arg(long, value_name = "POINTS")]
+    random: Option<usize>,
+    /// Seed of the random points.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    random_seed: u64,
+    /// Flights flown at the same time; the answer does not depend on it [default: all processors].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Keep every finished flight in this file, and continue from it if it exists.
+    #[arg(long, value_name = "FILE")]
+    state: Option<PathBuf>,
+    /// Points to show.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    top: usize,
+    /// Answer as CSV, with every point on every flight.
+    #[arg(long)]
+    csv: bool,
+}
+
+impl Arguments {
+    pub(super) fn is_asked(&self) -> bool {
+        !(self.vary.is_empty() && self.vary_plant.is_empty())
+            || self.random.is_some()
+            || self.csv
+            || self.state.is_some()
+    }
+
+    pub(super) fn run(&self, files: &[PathBuf], how: &FlownHow, json: bool) -> Result<Answer> {
+        ensure!(
+            !(self.vary.is_empty() && self.vary_plant.is_empty()),
+            "nothing to vary; give --vary powered.weights.theta=50:110:7 or the like"
+        );
+        let points = match self.random {
+            Some(count) => random(&self.vary, &self.vary_plant, count, self.random_seed)?,
+            None => grid(&self.vary, &self.vary_plant)?,
+        };
+        let options = how.options(StartAt::Landing)?;
+        let mut flights = Vec::new();
+        for file in files {
+            let opened = Recording::open(file).map_err(ReflyError::from);
+            match opened.and_then(|flight| can_be_flown(&flight).map(|()| flight)) {
+                Ok(flight) => {
+                    warn_of_what_is_missing(&flight);
+                    flights.push(flight);
+                }
+                Err(error) if files.len() == 1 => return Err(error.into()),
+                Err(error) => say(&format!("skipped: {:#}", anyhow::Error::from(error))),
+            }
+        }
+        ensure!(!flights.is_empty(), "none of the {} logs can be flown again", files.len());
+        let all_jobs = points.len() * flights.len();
+        let mut state = match &self.state {
+            None => State::in_memory(all_jobs),
+            Some(path) => State::open(path, &Self::identity(files, how, &points)?, all_jobs)?,
+        };
+        let report = sweep(&flights, &points, &options, jobs(self.jobs), &mut state, &mut show_progress)?;
+        answer(|output| match () {
+            () if json => print_json(&report, output),
+            () if self.csv => print_sweep_csv(&report, output),
+            () => print_sweep(&report, self.top, output),
+        })?;
+        Ok(Answer::Given)
+    }
+
+    /// Identifies the sweep: content of the flights, points, options, and the build.
+    fn identity(files: &[PathBuf], how: &FlownHow, points: &[Choice]) -> Result<String> {
+        let mut facts = format!("{how:?} {points:?} {:?}", protocol::log::build::build_info());
+        for path in how.settings.settings.iter().chain(files) {
+            let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+            facts = format!("{facts} {} {:016x}", path.display(), digest(START, &bytes));
+        }
+        Ok(format!(
+            "replay sweep {:016x}, {} points on {} flights",
+            digest(START, facts.as_bytes()),
+            points.len(),
+            files.len()
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(choices: &[Choice]) -> Vec<String> {
+        let words = |choice: &Choice| {
+            let all = choice.settings.iter().chain(&choice.plant_settings);
+            all.map(ToString::to_string).collect::<Vec<_>>().join(" ")
+        };
+        choices.iter().map(words).collect()
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_in_order() {
+        let points = grid(&["a=1:3:3".parse().unwrap()], &["b=x,y".parse().unwrap()]).unwrap();
+        assert_eq!(
+            shown(&points),
+            [
+                "a=1.0 b=\"x\"",
+                "a=1.0 b=\"y\"",
+                "a=2.0 b=\"x\"",
+                "a=2.0 b=\"y\"",
+                "a=3.0 b=\"x\"",
+                "a=3.0 b=\"y\""
+            ]
+        );
+        assert!(points[0].plant_settings[0].path == "b");
+        assert!(grid(&["a=0:1:2000".parse().unwrap(), "b=0:1:2000".parse().unwrap()], &[]).is_err());
+    }
+
+    #[test]
+    fn random_points_lie_in_their_range_and_repeat() {
+        let vary: [Vary; 1] = ["a=2:3".parse().unwrap()];
+        let points = random(&vary, &[], 50, 7).unwrap();
+        assert_eq!(points, random(&vary, &[], 50, 7).unwrap());
+        assert_ne!(points, random(&vary, &[], 50, 8).unwrap());
+        assert!(points.iter().all(|p| (2.0..3.0).contains(&p.settings[0].value.as_float().unwrap())));
+        assert!(random(&["a=1,2".parse().unwrap()], &[], 1, 7).is_err());
+    }
+
+    #[test]
+    fn a_malformed_range_is_refused() {
+        for bad in ["a", "a=", "=1:2", "a=1:2:0", "a=1:x", "a=1:2:3:4", "a=1:inf"] {
+            assert!(bad.parse::<Vary>().is_err(), "{bad}");
+        }
+    }
+}

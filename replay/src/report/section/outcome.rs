@@ -1,0 +1,307 @@
+//! How the flight ended: verdict, phases, events, link, and what the log holds.
+
+use flight::rules::phase::Phase;
+
+use super::rms_and_max;
+use crate::info::{Info, PhaseSpan, VerdictLimit};
+use crate::log::{Clock, ClockTime};
+use crate::report::chart::{Chart, Line};
+use crate::report::html::{charts, escaped, paragraph, put, table, table_of_limits};
+use crate::report::track::Flight;
+
+pub(super) fn verdict(_: &Flight, info: &Info) -> String {
+    let Some(verdict) = &info.verdict else {
+        let ending = info.ending.as_deref().unwrap_or("No verdict in this log");
+        return format!("<p class=\"verdict\">{}</p>\n", escaped(ending))
+            + &paragraph(
+                "The vehicle did not touch down while it was recorded, or its verdict was not recorded.",
+            );
+    };
+    let class = if verdict.landed { "good" } else { "bad" };
+    let contact = info.clocks.words(verdict.contact());
+    let mut html = format!("<p class=\"verdict {class}\">{}</p>\n", escaped(&verdict.ending))
+        + &paragraph(&format!("Touchdown at {contact}."));
+    if verdict.table_2.is_empty() {
+        html += &limits("touchdown", &verdict.limits);
+    } else {
+        html += &limits("by the limits of the legs", &verdict.limits);
+        html += &limits("by the landing paper's Table 2", &verdict.table_2);
+    }
+    html
+}
+
+fn limits(title: &str, limits: &[VerdictLimit]) -> String {
+    let row = |limit: &VerdictLimit| {
+        let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
+        vec![
+            escaped(&limit.name),
+            format!("{:.3}", limit.value + 0.0),
+            format!("{} to {}", short(limit.minimum), short(limit.maximum)),
+            escaped(&limit.unit),
+            format!("<span class=\"{class}\">{word}</span>"),
+            bar(limit),
+        ]
+    };
+    let rows: Vec<Vec<String>> = limits.iter().map(row).collect();
+    table_of_limits(&[title, "#value", "#limit", "unit", "", "share of the limit"], &rows)
+}
+
+/// Rounds away the error of converting degrees to radians and back.
+fn short(limit: f64) -> String {
+    format!("{}", (1e6 * limit).round() / 1e6 + 0.0)
+}
+
+/// Where the value lies in its range, the grey strip; a value outside is drawn at the end of the strip.
+fn bar(limit: &VerdictLimit) -> String {
+    const WIDTH: f64 = 160.0;
+    let share = (limit.value - limit.minimum) / (limit.maximum - limit.minimum);
+    if !share.is_finite() {
+        return String::new();
+    }
+    let at = 4.0 + share.clamp(-0.02, 1.02) * (WIDTH - 8.0);
+    let class = if limit.passed { "bar" } else { "barbad" };
+    format!(
+        "<svg viewBox=\"0 0 {WIDTH} 14\" style=\"width:{WIDTH}px\" aria-hidden=\"true\"><rect class=\"room\" x=\"4\" \
+         y=\"4\" width=\"{}\" height=\"6\"/><rect class=\"{class}\" x=\"{:.1}\" y=\"1\" width=\"4\" height=\"12\"/></svg>",
+        WIDTH - 8.0,
+        at - 2.0
+    )
+}
+
+pub(super) fn completeness(info: &Info) -> String {
+    let found = &info.completeness;
+    let complete = if found.complete {
+        "<span class=\"good\">yes: ended properly, every checksum holds</span>".to_owned()
+    } else {
+        "<span class=\"bad\">NO</span>".to_owned()
+    };
+    let mut rows = vec![
+        vec!["complete".to_owned(), complete],
+        vec!["grade".to_owned(), escaped(&format!("{}: {}", info.grade.level.name(), info.grade.reason))],
+    ];
+    let mut row = |name: &str, value: Option<String>| {
+        rows.extend(value.map(|value| vec![name.to_owned(), escaped(&value)]));
+    };
+    row("damage", found.damage.clone());
+    row("the flight", found.cut.as_ref().map(ToString::to_string));
+    let readable_s = found.readable_until_s.filter(|_| found.damage.is_some());
+    row("readable until", readable_s.map(|until_s| format!("{until_s:.3} s after the first record")));
+    row("lost after that", found.missing_s.map(|missing_s| format!("{missing_s:.3} s")));
+    row("messages missing", Some(found.messages_lost.to_string()));
+    row("size", info.size_bytes.map(|bytes| format!("{bytes} bytes")));
+    row(
+        "profile",
+        info.profile.as_ref().map(|profile| {
+            let words = profile.name.clone().zip(profile.summary.clone());
+            words.map_or_else(
+                || format!("cannot be used: {}", profile.problem.clone().unwrap_or_default()),
+                |(name, summary)| format!("{name}: {summary}"),
+            )
+        }),
+    );
+    row("written by", Some(info.library.clone()));
+    for (fact, value) in &info.build {
+        row(&format!("build: {fact}"), Some(value.clone()));
+    }
+    let channels: Vec<Vec<String>> = info
+        .channels
+        .iter()
+        .map(|channel| {
+            vec![
+                escaped(&channel.topic),
+                escaped(&channel.schema),
+                channel.messages.to_string(),
+                channel.lost.to_string(),
+                channel.unreadable.to_string(),
+            ]
+        })
+        .collect();
+    table(&["", ""], &rows)
+        + &table(&["channel", "schema", "#messages", "#missing", "#unreadable"], &channels)
+}
+
+/// Most events that a page lists.
+const SHOWN: usize = 200;
+
+pub(super) fn events(flight: &Flight) -> String {
+    let events = &flight.recording.events;
+    if events.is_empty() {
+        return paragraph("The log has no events.");
+    }
+    let clocks = &flight.recording.clocks;
+    let (clock, heading) =
+        if clocks.flight_zero_s.is_some() { (Clock::Flight, "#T+, s") } else { (Clock::Log, "#log, s") };
+    let rows: Vec<Vec<String>> = events
+        .iter()
+        .take(SHOWN)
+        .map(|(log_s, event)| {
+            let time = clocks.convert(ClockTime { clock: Clock::Log, time_s: *log_s }, clock);
+            let time_s = time.map_or(*log_s, |time| time.time_s);
+            vec![format!("{:.3}", time_s + 0.0), escaped(&event.name), escaped(&event.message)]
+        })
+        .collect();
+    let more = events.len().saturating_sub(SHOWN);
+    let rest = if more > 0 { paragraph(&format!("And {more} more.")) } else { String::new() };
+    table(&[heading, "from", "event"], &rows) + &rest
+}
+
+pub(super) fn phases(flight: &Flight, info: &Info) -> String {
+    let Some(timeline) = info.phases.first() else {
+        return paragraph("The log has no phases.");
+    };
+    let mut html = strip(flight, &timeline.spans);
+    html.push_str(&times(flight, &timeline.spans));
+    let known = moments(flight).into_iter().filter_map(|(what, time_s)| Some((what, time_s?)));
+    let mut rows: Vec<Vec<String>> =
+        known.map(|(what, time_s)| vec![escaped(what), format!("{time_s:.3} s")]).collect();
+    if let (Some(through_s), Some(touchdown_s)) = (thrust_through_weight_s(flight), flight.touchdown_s) {
+        let words = if through_s <= touchdown_s { "before" } else { "after" };
+        rows.push(vec![
+            "thrust fell through weight".to_owned(),
+            format!("{:.3} s {words} touchdown", (touchdown_s - through_s).abs()),
+        ]);
+    }
+    if rows.is_empty() {
+        return html + &paragraph("The log has no ignition of the landing motor.");
+    }
+    html + &table(&["moment", "#"], &rows)
+}
+
+/// The phases as a strip, with their times.
+fn strip(flight: &Flight, spans: &[PhaseSpan]) -> String {
+    const WIDTH: f64 = 1040.0;
+    let Some((first, last)) = spans.first().zip(spans.last()) else {
+        return String::new();
+    };
+    let length_s = (last.until_s - first.from_s).max(1e-9);
+    let mut svg = format!(
+        "<figure class=\"full\"><svg viewBox=\"0 0 {WIDTH} 76\" role=\"img\" aria-label=\"phases\">\n"
+    );
+    let at = |time_s: f64| 4.0 + (time_s - first.from_s) / length_s * (WIDTH - 8.0);
+    for (place, span) in spans.iter().enumerate() {
+        let until_s = spans.get(place + 1).map_or(span.until_s, |next| next.from_s);
+        let (left, right) = (at(span.from_s), at(until_s));
+        let class = ["fa", "fb", "fc", "fd"][place % 4];
+        put(
+            &mut svg,
+            format_args!(
+                "<rect class=\"{class}\" x=\"{left:.1}\" y=\"22\" width=\"{:.1}\" height=\"16\"/>",
+                (right - left).max(1.5)
+            ),
+        );
+        // Labels of short neighbouring phases are put on different lines.
+        let y = [14.0, 54.0, 70.0][place % 3];
+        let anchor = if left > 0.85 * WIDTH { "end" } else { "start" };
+        put(
+            &mut svg,
+            format_args!(
+                "<text x=\"{left:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{} {:.2} s</text>\n",
+                escaped(&span.phase),
+                rounded(flight.axis_s(span.from_s))
+            ),
+        );
+    }
+    svg.push_str("</svg></figure>\n");
+    svg + &format!("<p class=\"muted\">Times in {}.</p>\n", flight.axis_name())
+}
+
+/// The same in numbers, for narrow screens and screen readers.
+fn times(flight: &Flight, spans: &[PhaseSpan]) -> String {
+    let seconds = |time_s: f64| format!("{:.2} s", rounded(time_s));
+    let rows: Vec<Vec<String>> = spans
+        .iter()
+        .enumerate()
+        .map(|(place, span)| {
+            let until_s = spans.get(place + 1).map_or(span.until_s, |next| next.from_s);
+            vec![escaped(&span.phase), seconds(flight.axis_s(span.from_s)), seconds(until_s - span.from_s)]
+        })
+        .collect();
+    table(&["phase", "#from", "#for"], &rows)
+}
+
+/// To hundredths, without a negative zero.
+fn rounded(time_s: f64) -> f64 {
+    (100.0 * time_s).round() / 100.0 + 0.0
+}
+
+/// The key figures of the flight.
+fn moments(flight: &Flight) -> Vec<(&'static str, Option<f64>)> {
+    let lit_s = thrust_above_half_s(flight);
+    let delay_s = lit_s.zip(flight.ignition_s).map(|(lit_s, command_s)| lit_s - command_s);
+    let confirmed = flight.track.iter().find(|sample| sample.phase == Some(Phase::Powered));
+    let confirmed_s = confirmed.map(|sample| sample.time_s).zip(flight.ignition_s).map(|(a, b)| a - b);
+    let burn_s = flight.touchdown_s.zip(flight.ignition_s).map(|(a, b)| a - b);
+    vec![
+        ("ignition command, T+", flight.ignition_s),
+        ("ignition delay: command to half of nominal thrust", delay_s),
+        ("command to thrust confirmed on board", confirmed_s),
+        ("command to touchdown", burn_s),
+    ]
+}
+
+fn thrust_above_half_s(flight: &Flight) -> Option<f64> {
+    let half_n = flight.vehicle.as_ref()?.half_thrust_n;
+    let lit = flight.plant.iter().find(|plant| plant.thrust_n >= half_n)?;
+    Some(lit.sample.time_s)
+}
+
+/// The last time thrust falls from above the weight to below it.
+fn thrust_through_weight_s(flight: &Flight) -> Option<f64> {
+    let gravity_m_s2 = flight.vehicle.as_ref()?.gravity_m_s2;
+    let last = flight.plant.iter().rposition(|plant| plant.thrust_n > plant.mass_kg * gravity_m_s2)?;
+    let after = flight.plant.get(last + 1)?.sample;
+    after.phase.map(|_| after.time_s)
+}
+
+pub(super) fn link(flight: &Flight, info: &Info) -> String {
+    let frames: Vec<Vec<String>> = info
+        .channels
+        .iter()
+        .filter(|channel| channel.message_encoding == protocol::log::record::ENCODING_MAVLINK)
+        .map(|channel| {
+            let fact = |key: &str| channel.metadata.get(key).map(|text| escaped(text)).unwrap_or_default();
+            vec![
+                escaped(&channel.topic),
+                fact("endpoint"),
+                fact("link"),
+                channel.messages.to_string(),
+                channel.lost.to_string(),
+            ]
+        })
+        .collect();
+    let heard = &flight.recording.telemetry;
+    if frames.is_empty() && heard.is_empty() {
+        return paragraph("The log has neither frames nor a ground station's telemetry.");
+    }
+    let mut html = String::new();
+    if !frames.is_empty() {
+        html.push_str(&table(&["frames", "recorded by", "link", "#count", "#missing in the log"], &frames));
+    }
+    if heard.is_empty() {
+        return html
+            + &paragraph("No ground station wrote into this log, so the link's age and loss are not known.");
+    }
+    let of = |value: &dyn Fn(&protocol::log::v1::Telemetry) -> Option<f64>| -> Vec<(f64, f64)> {
+        heard.iter().filter_map(|told| Some((flight.axis_s(told.time_s), value(told)?))).collect()
+    };
+    let series = [
+        ("Age of the last heartbeat, s", of(&|told| told.link_age_s)),
+        ("Frames lost, %", of(&|told| told.link_loss.map(|loss| 100.0 * loss))),
+        ("Received, bytes/s", of(&|told| told.link_rx_bytes_s)),
+    ];
+    let mut rows = Vec::new();
+    let mut pictures = Vec::new();
+    for (name, points) in series {
+        if let Some((_, max)) = rms_and_max(points.iter().map(|point| point.1)) {
+            rows.push(vec![name.to_owned(), format!("{max:.2}")]);
+        }
+        let lines = vec![Line { name: "", class: "a", points }];
+        let title = name.to_owned();
+        pictures.push(
+            Chart { title, x_label: flight.axis_name(), lines, marks: flight.marks(), ..Chart::default() }
+                .svg(),
+        );
+    }
+    html.push_str(&table(&["as the ground station knew it", "#largest"], &rows));
+    html + &charts(&pictures)
+}

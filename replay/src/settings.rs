@@ -1,0 +1,712 @@
+//! Other settings for a recorded flight, named as in its mission and checked against the known names.
+//!
+//! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A file of settings is a
+//! TOML file with the structure of the mission and only the keys to change. An unknown name is refused, and the most
+//! similar known name is suggested.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{Context as _, Result};
+use clap::Args;
+use flight::guidance::baseline::UnknownController;
+use flight::vehicle::airframe::Airframe;
+use flight::vehicle::mission::Mission;
+use serde::Deserialize;
+use serde::de::value::{Error, StrDeserializer};
+use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
+use world::Truth;
+
+/// A value for one key of the mission.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// The key, as in `powered.weights.theta`.
+    pub path: String,
+    pub value: toml::Value,
+    /// Vehicle time from which it applies, s; `None`: from the beginning.
+    pub at_s: Option<f64>,
+}
+
+/// Why a setting cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SettingError {
+    /// The log names a controller of the landing burn that this build does not have.
+    #[error(transparent)]
+    Law(#[from] UnknownController),
+    /// Not of the form `path=value`.
+    #[error(
+        "setting `{given}`: must be path=value or path=value@seconds, as in powered.weights.theta=90@6.5"
+    )]
+    Form { given: String },
+    /// The key is unknown.
+    #[error("no setting `{given}`: did you mean `{nearest}`?")]
+    Unknown {
+        given: String,
+        /// The most similar known name.
+        nearest: String,
+    },
+    /// The path names a section, not a key.
+    #[error("`{given}` is a section; its settings are {}", keys.join(", "))]
+    Section { given: String, keys: Vec<String> },
+    /// A fraction for a key that takes whole numbers.
+    #[error("setting `{given}`: must be a whole number")]
+    NotWhole { given: String },
+    /// The log's mission or a settings file is not TOML.
+    #[error("{origin}: {reason}")]
+    Toml {
+        /// Which text.
+        origin: String,
+        /// The parser's message.
+        reason: String,
+    },
+    /// The mission or the truth is invalid with the settings.
+    #[error("with {settings}: {reason}")]
+    Mission { settings: String, reason: String },
+}
+
+impl FromStr for Setting {
+    type Err = SettingError;
+
+    fn from_str(given: &str) -> Result<Self, SettingError> {
+        let form = || SettingError::Form { given: given.to_owned() };
+        let (path, text) = given.split_once('=').ok_or_else(form)?;
+        let (path, text) = (path.trim(), text.trim());
+        if path.is_empty() || text.is_empty() {
+            return Err(form());
+        }
+        let timed = text.rsplit_once('@').and_then(|(value, at)| {
+            let at_s = at.trim_end_matches('s').trim().parse::<f64>().ok()?;
+            Some((value.trim(), at_s))
+        });
+        let (text, at_s) = match timed {
+            Some((value, at_s)) if at_s.is_finite() && !value.is_empty() => (value, Some(at_s)),
+            Some(_) => return Err(form()),
+            None => (text, None),
+        };
+        Ok(Self { path: path.to_owned(), value: parsed_value(text), at_s })
+    }
+}
+
+/// Parses a TOML value, or else takes the text: `consistent` needs no quotes on a command line.
+fn parsed_value(text: &str) -> toml::Value {
+    let table = format!("value = {text}").parse::<toml::Table>();
+    let value = table.ok().filter(|table| table.len() == 1).and_then(|mut table| table.remove("value"));
+    value.unwrap_or_else(|| toml::Value::String(text.to_owned()))
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}={}", self.path, self.value)?;
+        self.at_s.map_or(Ok(()), |at_s| write!(formatter, "@{at_s}"))
+    }
+}
+
+/// Every key of a settings file, as settings. `origin` is used in messages only.
+///
+/// # Errors
+/// The text is not TOML.
+pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
+    let table = parsed_table(text, origin)?;
+    let mut settings = Vec::new();
+    collect_leaves("", &table, &mut |path, value| {
+        settings.push(Setting { path, value: value.clone(), at_s: None });
+    });
+    Ok(settings)
+}
+
+/// Puts settings into a table, if each is a known name or in it already.
+fn set(table: &mut toml::Table, settings: &[Setting], names: Names) -> Result<(), SettingError> {
+    let names = names.with_those_in(table);
+    for setting in settings {
+        names.check(&setting.path)?;
+        insert(table, &setting.path, names.value_of(setting)?);
+    }
+    Ok(())
+}
+
+fn text_of(table: &toml::Table) -> Result<String, SettingError> {
+    toml::to_string(table)
+        .map_err(|error| SettingError::Toml { origin: "profile.toml".to_owned(), reason: error.to_string() })
+}
+
+fn listed(settings: &[Setting]) -> String {
+    settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
+}
+
+fn value_in(table: toml::Table, path: &str) -> Option<toml::Value> {
+    let mut value = toml::Value::Table(table);
+    for key in path.split('.') {
+        value = value.as_table_mut()?.remove(key)?;
+    }
+    Some(value)
+}
+
+fn parsed_table(text: &str, origin: &str) -> Result<toml::Table, SettingError> {
+    text.parse::<toml::Table>()
+        .map_err(|error| SettingError::Toml { origin: origin.to_owned(), reason: error.to_string() })
+}
+
+fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(String, &toml::Value)) {
+    for (key, value) in table {
+        let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        match value {
+            toml::Value::Table(inner) => collect_leaves(&path, inner, take),
+            value => take(path, value),
+        }
+    }
+}
+
+/// Puts a value at a path and creates the sections on the way.
+fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
+    match path.split_once('.') {
+        None => {
+            table.insert(path.to_owned(), value);
+        }
+        Some((section, rest)) => {
+            let inner = table.entry(section).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+            if let toml::Value::Table(inner) = inner {
+                insert(inner, rest, value);
+            }
+        }
+    }
+}
+
+/// The section of the airframe.
+const AIRFRAME: &str = "airframe";
+/// The section of the random draw.
+const TRUTH: &str = "truth.";
+
+/// Every key that a mission may have, as in `powered.weights.theta` and `airframe.mass.loaded_kg`.
+pub fn known_mission_paths() -> BTreeSet<String> {
+    names().paths
+}
+
+/// The keys that a mission and its airframe may have.
+fn names() -> Names {
+    Names::of::<Mission>("").and(Names::of::<Airframe>(AIRFRAME))
+}
+
+/// Whether a key of a mission, of its airframe or of the truth takes whole numbers only.
+///
+/// # Errors
+/// The name is unknown, or the text is not TOML.
+pub fn is_whole_in_mission(mission_toml: &str, path: &str) -> Result<bool, SettingError> {
+    let names = if path.starts_with(TRUTH) {
+        Names::of::<Truth>("truth")
+    } else {
+        let mut table = parsed_table(mission_toml, "profile.toml")?;
+        expand_airframe(&mut table)?;
+        names().with_those_in(&table)
+    };
+    names.check(path)?;
+    Ok(names.is_whole(path))
+}
+
+/// The mission of this text with other settings; their times are ignored.
+///
+/// # Errors
+/// A name is unknown, or the result is not a valid mission.
+pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission, SettingError> {
+    let text = mission_toml_with(mission_toml, settings)?;
+    vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
+        let reason = error.to_string();
+        match settings {
+            [] => SettingError::Toml { origin: "profile.toml".to_owned(), reason: explained(&reason) },
+            _ => SettingError::Mission { settings: listed(settings), reason },
+        }
+    })
+}
+
+/// The text of a mission with other settings.
+///
+/// # Errors
+/// A name is unknown, or the text is not TOML.
+pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
+    if settings.is_empty() {
+        // Without settings the text stays the same, byte for byte.
+        return Ok(mission_toml.to_owned());
+    }
+    let mut table = parsed_table(mission_toml, "profile.toml")?;
+    if settings.iter().any(|setting| setting.path.starts_with("airframe.")) {
+        expand_airframe(&mut table)?;
+    }
+    set(&mut table, settings, names())?;
+    text_of(&table)
+}
+
+/// The random draw with other settings: those of the section `truth`. Other settings are ignored.
+///
+/// # Errors
+/// A name is unknown, or the result is not a valid truth.
+pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingError> {
+    let wrong = |reason: String| SettingError::Mission { settings: listed(settings), reason };
+    let mut table = toml::Table::try_from(truth).map_err(|error| wrong(error.to_string()))?;
+    let known = Names::of::<Truth>("truth");
+    for setting in settings {
+        let Some(key) = setting.path.strip_prefix(TRUTH) else { continue };
+        known.check(&setting.path)?;
+        insert(&mut table, key, as_number(&setting.value));
+    }
+    table.try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))
+}
+
+/// The value of a key of a mission's text, of its airframe or of the truth, if there is one.
+pub fn mission_value_of(mission_toml: &str, truth: &Truth, path: &str) -> Option<toml::Value> {
+    if let Some(key) = path.strip_prefix(TRUTH) {
+        return value_in(toml::Table::try_from(truth).ok()?, key);
+    }
+    let mut table = mission_toml.parse::<toml::Table>().ok()?;
+    if path.starts_with("airframe.") {
+        expand_airframe(&mut table).ok()?;
+    }
+    value_in(table, path)
+}
+
+/// Replaces the name of a built-in airframe by its text.
+fn expand_airframe(table: &mut toml::Table) -> Result<(), SettingError> {
+    if let Some(name) = table.get(AIRFRAME).and_then(toml::Value::as_str)
+        && let Some(text) = vehicles::airframe::builtin_toml(name)
+    {
+        let airframe = parsed_table(text, name)?;
+        table.insert(AIRFRAME.to_owned(), toml::Value::Table(airframe));
+    }
+    Ok(())
+}
+
+/// Every number of the truth is a real number: `4` means `4.0`.
+fn as_number(value: &toml::Value) -> toml::Value {
+    value.as_integer().map_or_else(|| value.clone(), |whole| toml::Value::Float(whole as f64))
+}
+
+/// The placeholder for a mission's airframe, which may be a name or a table.
+const NAME_OR_TABLE: &str = "mk2";
+
+/// The keys that a type may have.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Names {
+    /// All keys.
+    pub(super) paths: BTreeSet<String>,
+    /// Keys that take whole numbers.
+    whole: BTreeSet<String>,
+}
+
+impl Names {
+    /// The keys that a type may have, after a prefix.
+    pub(super) fn of<'de, T: Deserialize<'de>>(prefix: &str) -> Self {
+        let names = RefCell::default();
+        // Placeholders may not be valid for every type; the keys noted so far are kept.
+        let _ = T::deserialize(Walker { path: prefix.to_owned(), names: &names });
+        names.into_inner()
+    }
+
+    /// Adds the keys of another type.
+    pub(super) fn and(mut self, other: Self) -> Self {
+        self.paths.extend(other.paths);
+        self.whole.extend(other.whole);
+        self
+    }
+
+    /// Adds the keys that a table has already.
+    pub(super) fn with_those_in(mut self, table: &toml::Table) -> Self {
+        collect_leaves("", table, &mut |path, _| {
+            self.paths.insert(path);
+        });
+        self
+    }
+
+    /// Refuses an unknown name and suggests the most similar one.
+    pub(super) fn check(&self, given: &str) -> Result<(), SettingError> {
+        check(given, &self.paths)
+    }
+
+    /// Whether a key takes whole numbers.
+    pub(super) fn is_whole(&self, path: &str) -> bool {
+        self.whole.contains(path)
+    }
+
+    /// Converts a value to the type of its key: `10.0` from a range means `10` for a key that takes whole numbers.
+    pub(super) fn value_of(&self, setting: &Setting) -> Result<toml::Value, SettingError> {
+        match setting.value {
+            toml::Value::Float(number) if self.is_whole(&setting.path) => {
+                let whole = libm::trunc(number) as i64;
+                if (whole as f64).to_bits() == number.to_bits() {
+                    Ok(toml::Value::Integer(whole))
+                } else {
+                    Err(SettingError::NotWhole { given: setting.to_string() })
+                }
+            }
+            _ => Ok(setting.value.clone()),
+        }
+    }
+}
+
+/// Refuses an unknown name and suggests the most similar one.
+fn check(given: &str, known: &BTreeSet<String>) -> Result<(), SettingError> {
+    if known.contains(given) {
+        return Ok(());
+    }
+    let section = format!("{given}.");
+    let keys: Vec<String> = known.iter().filter(|path| path.starts_with(&section)).cloned().collect();
+    if !keys.is_empty() {
+        return Err(SettingError::Section { given: given.to_owned(), keys });
+    }
+    let nearest = known.iter().max_by(|a, b| {
+        strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)).then_with(|| b.cmp(a))
+    });
+    Err(SettingError::Unknown { given: given.to_owned(), nearest: nearest.cloned().unwrap_or_default() })
+}
+
+/// Answers every request with a placeholder and notes its path.
+struct Walker<'a> {
+    path: String,
+    names: &'a RefCell<Names>,
+}
+
+impl Walker<'_> {
+    fn note(&self) {
+        self.names.borrow_mut().paths.insert(self.path.clone());
+    }
+
+    fn note_whole(&self) {
+        self.note();
+        self.names.borrow_mut().whole.insert(self.path.clone());
+    }
+}
+
+/// Number methods: note the path and give zero.
+macro_rules! numbers {
+    ($note:ident: $($method:ident $visit:ident $nought:expr),* $(,)?) => {
+        $(fn $method<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+            self.$note();
+            visitor.$visit($nought)
+        })*
+    };
+}
+
+impl<'de> Deserializer<'de> for Walker<'_> {
+    type Error = Error;
+
+    numbers! { note_whole:
+        deserialize_i8 visit_i8 0,
+        deserialize_i16 visit_i16 0,
+        deserialize_i32 visit_i32 0,
+        deserialize_i64 visit_i64 0,
+        deserialize_u8 visit_u8 0,
+        deserialize_u16 visit_u16 0,
+        deserialize_u32 visit_u32 0,
+        deserialize_u64 visit_u64 0,
+    }
+
+    numbers! { note:
+        deserialize_bool visit_bool false,
+        deserialize_f32 visit_f32 0.0,
+        deserialize_f64 visit_f64 0.0,
+        deserialize_char visit_char ' ',
+        deserialize_str visit_str "",
+        deserialize_string visit_str "",
+        deserialize_bytes visit_bytes &[],
+        deserialize_byte_buf visit_bytes &[],
+    }
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_str(NAME_OR_TABLE)
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_unit<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+
+    fn deserialize_unit_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_seq(serde::de::value::SeqDeserializer::new(std::iter::empty::<f64>()))
+    }
+
+    fn deserialize_tuple<V: Visitor<'de>>(self, len: usize, visitor: V) -> Result<V::Value, Error> {
+        self.note();
+        visitor.visit_seq(serde::de::value::SeqDeserializer::new(std::iter::repeat_n(0.0_f64, len)))
+    }
+
+    fn deserialize_tuple_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        len: usize,
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        self.deserialize_tuple(len, visitor)
+    }
+
+    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_map(Fields { names: [].iter(), next: None, walker: self })
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        visitor.visit_map(Fields { names: fields.iter(), next: None, walker: self })
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Error> {
+        self.note();
+        let first: StrDeserializer<'_, Error> =
+            variants.first().copied().unwrap_or_default().into_deserializer();
+        visitor.visit_enum(first)
+    }
+
+    fn deserialize_identifier<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_str("")
+    }
+
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
+        visitor.visit_unit()
+    }
+}
+
+/// The fields of a struct, one after the other.
+struct Fields<'a> {
+    names: std::slice::Iter<'static, &'static str>,
+    next: Option<&'static str>,
+    walker: Walker<'a>,
+}
+
+impl<'de> MapAccess<'de> for Fields<'_> {
+    type Error = Error;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, Error> {
+        self.next = self.names.next().copied();
+        self.next
+            .map(|name| {
+                let name: StrDeserializer<'_, Error> = name.into_deserializer();
+                seed.deserialize(name)
+            })
+            .transpose()
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Error> {
+        let name = self.next.unwrap_or_default();
+        let above = &self.walker.path;
+        let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
+        seed.deserialize(Walker { path, names: self.walker.names })
+    }
+}
+
+/// A controller's settings over a flight: those of the beginning, and changes at given times.
+#[derive(Debug, Clone)]
+pub struct Schedule<T> {
+    base: T,
+    /// By time; each stage includes all earlier changes.
+    changes: Vec<(f64, T)>,
+    next: usize,
+}
+
+impl<T> Schedule<T> {
+    /// Calls `build` for the settings from the beginning, then again with each timed one from its time.
+    ///
+    /// # Errors
+    /// Those of `build`.
+    pub fn of(
+        settings: &[Setting],
+        build: impl Fn(&[Setting]) -> Result<T, SettingError>,
+    ) -> Result<Self, SettingError> {
+        let mut timed: Vec<&Setting> = settings.iter().filter(|setting| setting.at_s.is_some()).collect();
+        timed.sort_by(|a, b| a.at_s.unwrap_or(0.0).total_cmp(&b.at_s.unwrap_or(0.0)));
+        let mut so_far: Vec<Setting> =
+            settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
+        let base = build(&so_far)?;
+        let mut changes: Vec<(f64, T)> = Vec::new();
+        for setting in timed {
+            so_far.push(setting.clone());
+            let at_s = setting.at_s.unwrap_or(0.0);
+            let stage = build(&so_far)?;
+            match changes.last_mut() {
+                // Changes at the same moment are one change.
+                Some((before_s, before)) if before_s.to_bits() == at_s.to_bits() => *before = stage,
+                _ => changes.push((at_s, stage)),
+            }
+        }
+        Ok(Self { base, changes, next: 0 })
+    }
+
+    /// The settings of the beginning.
+    pub fn base(&self) -> &T {
+        &self.base
+    }
+
+    /// The settings that take effect at this vehicle time, s, if any; times must not decrease.
+    pub fn due(&mut self, time_s: f64) -> Option<&T> {
+        let due = self.changes.iter().skip(self.next).take_while(|(at_s, _)| *at_s <= time_s).count();
+        self.next += due;
+        if due == 0 { None } else { self.changes.get(self.next - 1).map(|(_, stage)| stage) }
+    }
+}
+
+/// The message, and what a missing or an unknown key means for a log.
+pub(crate) fn explained(message: &str) -> String {
+    let remark = if message.contains("unknown field") {
+        "another release wrote this profile, and this build does not know that key; without it the computer would not be \
+         the one that flew. The log's `build` says which release reads it"
+    } else if message.contains("missing field") {
+        "another release wrote this profile, and this build needs that key; no value is known to be the one that flew. \
+         The log's `build` says which release reads it"
+    } else {
+        return message.to_owned();
+    };
+    format!("{}: {remark}", message.trim_end())
+}
+
+/// Other settings than the recorded ones.
+#[derive(Debug, Args)]
+pub(crate) struct SettingArguments {
+    /// Another setting, named as in the mission; with @SECONDS it applies from that vehicle time on. May be given more
+    /// than once.
+    #[arg(long = "set", value_name = "PATH=VALUE[@SECONDS]")]
+    pub(crate) set: Vec<Setting>,
+    /// File of settings: a TOML file with the structure of the mission and the keys to change. --set overrides it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) settings: Vec<PathBuf>,
+}
+
+impl SettingArguments {
+    /// All settings, those from files first.
+    pub(crate) fn all(&self) -> Result<Vec<Setting>> {
+        let mut all = Vec::new();
+        for path in &self.settings {
+            all.extend(read(path)?);
+        }
+        all.extend(self.set.iter().cloned());
+        Ok(all)
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<Setting>> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    Ok(settings_of_file(&text, &name)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_is_a_path_a_value_and_perhaps_a_time() {
+        let setting: Setting = "powered.weights.theta=90".parse().unwrap();
+        assert_eq!((setting.path.as_str(), setting.at_s), ("powered.weights.theta", None));
+        assert_eq!(setting.value, toml::Value::Integer(90));
+        let timed: Setting = "powered.weights.theta = 9.5e1 @ 6.5s".parse().unwrap();
+        assert_eq!((timed.value, timed.at_s), (toml::Value::Float(95.0), Some(6.5)));
+        let word: Setting = "airframe.motor=as-printed".parse().unwrap();
+        assert_eq!(word.value, toml::Value::String("as-printed".to_owned()));
+        for bad in ["powered.weights.theta", "=3", "a=", "a=3@nan", "a=@3"] {
+            assert!(bad.parse::<Setting>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_settings_has_the_missions_shape() {
+        let settings =
+            settings_of_file("powered.weights.theta = 90\n[ignition]\ndelay_s = 0.2\n", "x.toml").unwrap();
+        let shown: Vec<String> = settings.iter().map(ToString::to_string).collect();
+        assert_eq!(shown, ["ignition.delay_s=0.2", "powered.weights.theta=90"]);
+        assert!(settings_of_file("= 3", "x.toml").unwrap_err().to_string().starts_with("x.toml: "));
+    }
+
+    fn toml() -> &'static str {
+        vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap().1
+    }
+
+    fn with(given: &[&str]) -> Result<Mission, SettingError> {
+        let settings: Vec<Setting> = given.iter().map(|text| text.parse().unwrap()).collect();
+        mission_with(toml(), &settings)
+    }
+
+    #[test]
+    fn a_set_value_reaches_mission_and_airframe_and_nothing_else_changes() {
+        let mut expected = with(&[]).unwrap();
+        expected.powered.weights.theta = 150.0;
+        expected.airframe.mass.loaded_kg = 2.5;
+        expected.ignition.fixed_height_m = Some(31.0);
+        let given =
+            ["powered.weights.theta=150", "airframe.mass.loaded_kg=2.5", "ignition.fixed_height_m=31.0"];
+        assert_eq!(with(&given).unwrap(), expected);
+        assert_eq!(
+            with(&["airframe=mk2-h53"]).unwrap().airframe,
+            vehicles::airframe::builtin("mk2-h53").unwrap()
+        );
+    }
+
+    #[test]
+    fn every_key_of_the_built_in_missions_is_known_and_others_are_refused_with_the_nearest() {
+        let known = known_mission_paths();
+        for (name, text) in vehicles::mission::BUILTIN {
+            let mut table = text.parse::<toml::Table>().unwrap();
+            expand_airframe(&mut table).unwrap();
+            super::collect_leaves("", &table, &mut |path, _| {
+                assert!(known.contains(&path), "{name}: {path}");
+            });
+        }
+        assert!(known.contains("estimator.frame_s") && known.contains("ignition.fixed_height_m"));
+        let refusal = |given: &str| with(&[given]).unwrap_err().to_string();
+        assert_eq!(
+            refusal("powered.wieghts.theta=1"),
+            "no setting `powered.wieghts.theta`: did you mean `powered.weights.theta`?"
+        );
+        assert!(refusal("airframe.mass.loaded=1").contains("`airframe.mass.loaded_kg`"));
+        assert!(refusal("airframe.motor=X1").contains("X1"));
+    }
+
+    #[test]
+    fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
+        assert_eq!(with(&["powered.solver.max_iterations=12.0"]).unwrap().powered.solver.max_iterations, 12);
+        let refusal = with(&["powered.solver.max_iterations=12.5"]).unwrap_err().to_string();
+        assert_eq!(refusal, "setting `powered.solver.max_iterations=12.5`: must be a whole number");
+        assert!(is_whole_in_mission(toml(), "powered.solver.max_iterations").unwrap());
+        assert!(!is_whole_in_mission(toml(), "powered.weights.theta").unwrap());
+        assert!(is_whole_in_mission(toml(), "powered.solver.max_iteration").is_err());
+    }
+
+    #[test]
+    fn the_truth_is_set_by_its_own_names() {
+        let set = |given: &str| truth_with(&Truth::default(), &[given.parse().unwrap()]);
+        let expected = Truth { wind_m_s: 4.0, ..Truth::default() };
+        assert_eq!(set("truth.wind_m_s=4").unwrap(), expected);
+        assert_eq!(set("powered.gimbal_deg=4").unwrap(), Truth::default());
+        assert!(set("truth.wind=4").unwrap_err().to_string().contains("`truth.wind_m_s`"));
+        assert!(set("truth.wind_m_s=much").unwrap_err().to_string().contains("truth.wind_m_s"));
+        let value = |path| mission_value_of(toml(), &expected, path).and_then(|value| value.as_float());
+        assert_eq!(value("truth.wind_m_s"), Some(4.0));
+        assert_eq!(value("powered.gimbal_deg"), Some(5.0));
+        assert!(value("airframe.mass.loaded_kg").is_some() && value("airframe.nothing").is_none());
+    }
+}

@@ -1,0 +1,341 @@
+//! Verifies a flight and flies it again.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use protocol::log::build::build_info;
+use serde::{Deserialize, Serialize};
+use sim::dispersion::Dispersion;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use tick_log::sortie;
+
+use super::{Checked, Flown, Found, Outcome, SeasonError};
+use crate::digest::{START, digest, digest_of_file};
+use crate::info::VerdictFacts;
+use crate::log::{Entry, FlightLog, LogError, Recording};
+use crate::refly::{ReflyOptions, StartAt, margin, refly};
+use crate::several::several;
+use crate::verify::{Obstacle, Verification, verify};
+
+/// This many of the first records of the flight computer name a flight: its power-up and half a second.
+const NAMING_RECORDS: usize = 100;
+
+/// What this build makes of a flight. Whatever is wrong is part of the outcome.
+pub(super) fn fly(found: &Found) -> Outcome {
+    match found.number {
+        None => log(&found.path),
+        Some(number) => fly_campaign(&found.path, number).unwrap_or_else(|error| Outcome {
+            flight: None,
+            checked: Checked::Unverified,
+            flown: None,
+            problem: Some(words(error)),
+        }),
+    }
+}
+
+fn log(path: &Path) -> Outcome {
+    let (checked, mut problem) = match verify(path) {
+        // What cannot be read now may still be a flight.
+        Err(error @ LogError::Read { .. }) => (Checked::Unverified, Some(words(error))),
+        Err(error) => return no_flight(words(error)),
+        Ok(reports) if reports.iter().all(|report| report.obstacle == Some(Obstacle::NoTicks)) => {
+            return no_flight(Obstacle::NoTicks.to_string());
+        }
+        Ok(reports) => {
+            let all = |wanted: Verification| reports.iter().all(|report| report.outcome == wanted);
+            let obstacle = reports.iter().find_map(|report| {
+                report.obstacle.as_ref().map(ToString::to_string).or_else(|| report.damage.clone())
+            });
+            match () {
+                () if reports.iter().any(|report| report.outcome == Verification::Diverged) => {
+                    let first = reports.iter().find_map(|report| report.first_divergence.as_ref());
+                    (Checked::Diverged, first.map(|first| format!("first different at tick {}", first.tick)))
+                }
+                () if all(Verification::Identical) => (Checked::Identical, None),
+                () => (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned()))),
+            }
+        }
+    };
+    let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
+        // From its first frame on, the whole flight is this build's.
+        let start = recording.frames.first().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
+        refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
+    });
+    let flown = match again {
+        Ok(report) => report.reflown.map(|verdict| Flown {
+            landed: verdict.landed,
+            margin: Some(format!("{:?}", margin(&verdict))),
+            ending: verdict.ending,
+        }),
+        Err(error) => {
+            problem.get_or_insert(words(error));
+            None
+        }
+    };
+    Outcome { flight: flight_of(path), checked, flown, problem }
+}
+
+/// Which flight a log holds: its run and the first records of its flight computer.
+fn flight_of(path: &Path) -> Option<String> {
+    let mut log = FlightLog::open(path).ok()?;
+    let mut records = Vec::new();
+    while records.len() < NAMING_RECORDS
+        && let Ok(Some(stamped)) = log.next_entry()
+    {
+        if matches!(stamped.entry, Entry::ComputerStart(_) | Entry::ComputerFrame(_) | Entry::PilotTick(_)) {
+            records.push(stamped.data);
+        }
+    }
+    let run = log.head().run.iter().flat_map(|(fact, value)| [fact.as_bytes(), value.as_bytes()]);
+    (!records.is_empty()).then(|| name_of(run.chain(records.iter().map(Vec::as_slice))))
+}
+
+fn no_flight(why: String) -> Outcome {
+    Outcome { flight: None, checked: Checked::NoFlight, flown: None, problem: Some(why) }
+}
+
+/// An error and its causes.
+fn words(error: impl std::error::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(deeper) = cause {
+        let more = deeper.to_string();
+        if !words.contains(&more) {
+            words = format!("{words}: {more}");
+        }
+        cause = deeper.source();
+    }
+    words
+}
+
+/// The file that makes a directory a campaign's.
+pub(super) const MANIFEST: &str = "manifest.json";
+const ROWS: &str = "flights.csv";
+
+/// The facts of a campaign that its flights are made from.
+#[derive(Deserialize)]
+struct Manifest {
+    dispersion: String,
+    seed: u64,
+    controller: String,
+    steered: bool,
+    faults: Vec<String>,
+}
+
+/// What a row says about how its flight ended.
+#[derive(Deserialize)]
+struct Row {
+    number: u64,
+    legs: bool,
+    strict: bool,
+    failure: String,
+    touchdown_time_s: Option<f64>,
+    touchdown_vertical_m_s: Option<f64>,
+}
+
+/// The numbers of the flights in a campaign's directory.
+pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SeasonError> {
+    Ok(rows(directory)?.into_iter().map(|row| row.number).collect())
+}
+
+/// Flies one flight of a campaign.
+fn fly_campaign(directory: &Path, number: u64) -> Result<Outcome, SeasonError> {
+    let recipe = recipe(directory)?;
+    let row = rows(directory)?.into_iter().find(|row| row.number == number).ok_or_else(|| {
+        SeasonError::Campaign { path: directory.join(ROWS), reason: format!("has no flight {number}") }
+    })?;
+    let mut flight = Sortie::new(&recipe, number)
+        .map_err(|error| SeasonError::Campaign { path: directory.to_owned(), reason: error.to_string() })?;
+    let outcome = flight.run();
+    let bits = |value: Option<f64>| value.map(f64::to_bits);
+    let touchdown = outcome.touchdown.as_ref();
+    let same = row.legs == outcome.legs
+        && row.strict == outcome.strict
+        && row.failure == outcome.failure.map_or("", |failure| failure.name())
+        && bits(row.touchdown_time_s) == bits(touchdown.map(|touchdown| touchdown.time_s))
+        && bits(row.touchdown_vertical_m_s) == bits(touchdown.map(|touchdown| touchdown.vertical_m_s));
+    let verdict = sortie::verdict(&flight).as_ref().map(VerdictFacts::of);
+    let (seed, number) = (recipe.seed.to_le_bytes(), number.to_le_bytes());
+    let parts = [recipe.mission_toml.as_bytes(), recipe.dispersion_toml.as_bytes(), &seed, &number];
+    Ok(Outcome {
+        flight: Some(name_of(parts)),
+        checked: if same { Checked::Identical } else { Checked::Diverged },
+        flown: verdict.map(|verdict| Flown {
+            landed: verdict.landed,
+            margin: Some(format!("{:?}", margin(&verdict))),
+            ending: verdict.ending,
+        }),
+        problem: None,
+    })
+}
+
+fn recipe(directory: &Path) -> Result<Recipe, SeasonError> {
+    let wrong = |name: &str, reason: String| SeasonError::Campaign { path: directory.join(name), reason };
+    let manifest: Manifest = serde_json::from_str(&text(directory.join(MANIFEST))?)
+        .map_err(|error| wrong(MANIFEST, error.to_string()))?;
+    let mission_toml = text(directory.join("mission.toml"))?;
+    let dispersion_toml = text(directory.join("dispersion.toml"))?;
+    let mut mission = vehicles::mission::from_toml(&mission_toml, "mission.toml")
+        .map_err(|error| wrong("mission.toml", error.to_string()))?;
+    mission.steered = manifest.steered;
+    let faults = manifest.faults.iter().map(|fault| fault.parse().map_err(|error| format!("{error}")));
+    Ok(Recipe {
+        mission,
+        mission_toml,
+        dispersion: Dispersion::from_toml(&dispersion_toml, "dispersion.toml")
+            .map_err(|error| wrong("dispersion.toml", error.to_string()))?,
+        dispersion_name: manifest.dispersion,
+        dispersion_toml,
+        seed: manifest.seed,
+        controller: manifest
+            .controller
+            .parse()
+            .map_err(|error| wrong(MANIFEST, format!("controller: {error}")))?,
+        faults: faults.collect::<Result<_, _>>().map_err(|reason| wrong(MANIFEST, reason))?,
+    })
+}
+
+fn rows(directory: &Path) -> Result<Vec<Row>, SeasonError> {
+    let path = directory.join(ROWS);
+    let csv = text(path.clone())?;
+    let rows: Result<Vec<Row>, csv::Error> = csv::Reader::from_reader(csv.as_bytes()).deserialize().collect();
+    rows.map_err(|error| SeasonError::Campaign { path, reason: error.to_string() })
+}
+
+fn text(path: PathBuf) -> Result<String, SeasonError> {
+    std::fs::read_to_string(&path).map_err(|source| SeasonError::Read { path, source })
+}
+
+/// The outcome of every flight, `jobs` at a time; stops early if `stop` is set, with the outcomes until then.
+///
+/// # Errors
+/// The state cannot be written.
+pub fn fly_all(
+    flights: &[Found],
+    jobs: NonZeroUsize,
+    state: &mut SeasonState,
+    stop: &AtomicBool,
+    progress: &mut dyn FnMut(usize, usize),
+) -> io::Result<BTreeMap<String, Outcome>> {
+    let mut outcomes = BTreeMap::new();
+    let mut missing = Vec::new();
+    for found in flights {
+        let key = key(found).ok();
+        match key.as_ref().and_then(|key| state.outcome(key)) {
+            Some(known) => {
+                outcomes.insert(found.name.clone(), known.clone());
+            }
+            None => missing.push((found, key)),
+        }
+    }
+    progress(outcomes.len(), flights.len());
+    let mut noted = Ok(());
+    several(
+        &missing,
+        jobs,
+        stop,
+        |(found, _)| fly(found),
+        |place, outcome| {
+            let Some((found, key)) = missing.get(place) else { return };
+            // A file that cannot be read now may be readable the next time.
+            if let Some(key) = key.clone().filter(|_| outcome.checked != Checked::Unverified)
+                && let Err(error) = state.note(key, outcome.clone())
+            {
+                stop.store(true, Ordering::Relaxed);
+                noted = Err(error);
+            }
+            outcomes.insert(found.name.clone(), outcome);
+            progress(outcomes.len(), flights.len());
+        },
+    );
+    noted.map(|()| outcomes)
+}
+
+/// The outcomes known so far, by what was flown and by which build.
+#[derive(Debug, Default)]
+pub struct SeasonState {
+    known: BTreeMap<String, Outcome>,
+    file: Option<File>,
+}
+
+/// A line of the file.
+#[derive(Serialize, Deserialize)]
+struct Line {
+    key: String,
+    outcome: Outcome,
+}
+
+/// How every line begins that is not empty.
+const LINE_BEGINS: &str = "{\"key\":";
+
+impl SeasonState {
+    /// A state in memory only.
+    pub fn in_memory() -> Self {
+        Self::default()
+    }
+
+    /// A state in a file, continued if the file exists. What another build or another content left there is not used.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or holds something else; then it is left as it is.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let mut file = File::options().read(true).append(true).create(true).open(path)?;
+        let mut known = BTreeMap::new();
+        for line in BufReader::new(file.try_clone()?).lines() {
+            let line = line?;
+            // The last line of a killed run may be incomplete; its flight is then flown again.
+            if let Ok(Line { key, outcome }) = serde_json::from_str(&line) {
+                known.insert(key, outcome);
+            } else if !(line.starts_with(LINE_BEGINS) || LINE_BEGINS.starts_with(&line)) {
+                let words = "holds something else than the state of a season; give another file";
+                return Err(io::Error::new(io::ErrorKind::InvalidData, words));
+            }
+        }
+        // An incomplete line must not be joined with the next one.
+        writeln!(file)?;
+        Ok(Self { known, file: Some(file) })
+    }
+
+    /// The outcome of this key, if it is known.
+    pub(super) fn outcome(&self, key: &str) -> Option<&Outcome> {
+        self.known.get(key)
+    }
+
+    pub(super) fn note(&mut self, key: String, outcome: Outcome) -> io::Result<()> {
+        let line = Line { key, outcome };
+        if let Some(file) = &mut self.file {
+            writeln!(file, "{}", serde_json::to_string(&line)?)?;
+        }
+        self.known.insert(line.key, line.outcome);
+        Ok(())
+    }
+}
+
+/// Identifies a flight, its content and this build.
+pub(super) fn key(found: &Found) -> io::Result<String> {
+    let mut digest_so_far = START;
+    let files: &[&str] = if found.number.is_some() {
+        &["manifest.json", "mission.toml", "dispersion.toml", "flights.csv"]
+    } else {
+        &[""]
+    };
+    for name in files {
+        let path = if name.is_empty() { found.path.clone() } else { found.path.join(name) };
+        digest_so_far = digest_of_file(digest_so_far, &mut File::open(path)?)?;
+    }
+    let build = build_info()
+        .into_iter()
+        .fold(START, |hash, (fact, value)| digest(digest(hash, fact.as_bytes()), value.as_bytes()));
+    Ok(format!("{} {digest_so_far:016x} {build:016x}", found.name))
+}
+
+/// Names a flight by its content.
+pub(super) fn name_of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
+    format!("{:016x}", parts.into_iter().fold(START, digest))
+}

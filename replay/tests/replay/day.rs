@@ -1,0 +1,99 @@
+//! What flights so far tell of the next one, through the command.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::command_line::run;
+use crate::from_apogee::LANDED;
+
+fn learn(arguments: &[&str]) -> (i32, String, String) {
+    let few = ["--flights", "6", "--jobs", "2"];
+    run(Command::new(env!("CARGO_BIN_EXE_replay")).arg("fit").args(arguments).args(few))
+}
+
+/// A fit of one burn, as `replay fit --json` writes it.
+fn fits(path: &Path, thrusts: &[f64]) {
+    let parameter = |name: &str, value: f64| {
+        serde_json::json!({
+            "name": name, "unit": "", "value": value, "sigma": 0.002, "low": value - 0.004, "high": value + 0.004,
+        })
+    };
+    let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let basis = serde_json::to_value(replay::fit::Basis::of(&mission)).unwrap();
+    let fit = |(place, thrust): (usize, &f64)| {
+        serde_json::json!({
+            "basis": basis, "source": format!("flight {place}"), "mission": "mk2", "motor": "H45W", "not_found": [], "damage": null,
+            "found": [parameter("thrust_scale", *thrust), parameter("burn_time_scale", 1.0),
+                      parameter("ignition_delay", 0.16), parameter("drag_scale", 1.02)],
+        })
+    };
+    let all: Vec<_> = thrusts.iter().enumerate().map(fit).collect();
+    std::fs::write(path, serde_json::json!({ "fits": all, "together": [] }).to_string()).unwrap();
+}
+
+#[test]
+fn five_burns_become_a_day_that_the_campaigns_readers_take() {
+    let directory = tempfile::tempdir().unwrap();
+    let (file, out) = (directory.path().join("fits.json"), directory.path().join("day"));
+    fits(&file, &[1.01, 1.02, 0.99, 1.00, 1.03]);
+    let arguments = [file.to_str().unwrap(), "--mission", "mk2", "--day", out.to_str().unwrap(), "--json"];
+    let (code, stdout, stderr) = learn(&arguments);
+    let answer: serde_json::Value =
+        serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stdout}{stderr}"));
+    let answer = &answer["day"];
+    assert_eq!(code, i32::from(answer["go"] != true), "{stderr}");
+    let thrust = &answer["lots"][0];
+    // The prior's 1 counts as one more burn.
+    assert!((thrust["mean"].as_f64().unwrap() - 6.05 / 6.0).abs() < 1e-12, "{thrust}");
+    assert!(thrust["next_sigma"].as_f64() < thrust["prior_sigma"].as_f64(), "{thrust}");
+    let text = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let mission = vehicles::mission::from_toml(&text("mission.toml"), "day").unwrap();
+    let built_in = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let impulse = |mission: &flight::vehicle::mission::Mission| mission.motor_curve.total_impulse_n_s();
+    assert!((impulse(&mission) / impulse(&built_in) - 6.05 / 6.0).abs() < 1e-9);
+    let set = sim::dispersion::Dispersion::from_toml(&text("dispersion.toml"), "day").unwrap();
+    assert!(set.impulse_share < 0.027 && set.mass_share.abs() < 1e-12 && set.sensors, "{set:?}");
+    assert!(text("dispersion.toml").contains("# flight 3\n"), "{}", text("dispersion.toml"));
+    // The same question again gives the same answer, and replaces nothing.
+    let (code, _, stderr) = learn(&arguments);
+    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    let again = [&arguments[..3], &arguments[5..]].concat();
+    assert_eq!(learn(&again).1, stdout);
+}
+
+#[test]
+fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
+    let (code, stdout, stderr) = learn(&[LANDED.log.to_str().unwrap()]);
+    assert!(code < 2, "{stderr}");
+    assert!(stdout.ends_with(if code == 0 { "\nGO\n" } else { "\nNO-GO\n" }), "{stdout}");
+    assert!(stdout.contains("risk ") && stdout.contains("95 % interval"), "{stdout}");
+    // A careful club's day, and not the kindest, unless it is asked for.
+    assert!(stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real\n"), "{stdout}");
+    let asked = [LANDED.log.to_str().unwrap(), "--prior", "field", "--limit", "0.01"];
+    let (code, stdout, stderr) = learn(&asked);
+    assert!(
+        code == 0 && stdout.ends_with("\nGO in field only, which may be kinder than real\n"),
+        "{stdout}{stderr}"
+    );
+}
+
+#[test]
+fn what_cannot_be_learnt_is_refused_with_the_reason() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("fits.json");
+    fits(&file, &[1.0]);
+    let file = file.to_str().unwrap();
+    let refused = |arguments: &[&str], words: &str| {
+        let (code, _, stderr) = learn(arguments);
+        assert!(code == 2 && stderr.contains(words), "{stderr}");
+    };
+    refused(&[file], "--mission is missing");
+    refused(&[file, "--mission", "mk2", "--limit", "95"], "--limit 95: must be 0 to 1");
+    refused(&[file, "--mission", "mk9"], "'mk9' is neither a built-in mission");
+    let broken = directory.path().join("broken.json");
+    std::fs::write(&broken, "{}").unwrap();
+    refused(&[broken.to_str().unwrap(), "--mission", "mk2"], "is no answer of `replay fit --json`");
+    let nothing = directory.path().join("nothing.json");
+    fits(&nothing, &[]);
+    refused(&[nothing.to_str().unwrap(), "--mission", "mk2"], "no burn was found in 0 fits");
+}
