@@ -579,8 +579,8 @@ pub(crate) struct Ask {
     #[arg(long, conflicts_with = "junit")]
     json: bool,
     /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
-    junit: Option<Option<PathBuf>>,
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
+    junit: Option<PathBuf>,
     /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
     /// flight did.
     #[arg(
@@ -611,10 +611,11 @@ impl Ask {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, tick, self.json);
         }
-        let junit = self.junit.as_ref().and_then(Option::as_deref);
+        let to_stdout = |path: &Path| path.as_os_str() == "-";
+        let junit = self.junit.as_deref().filter(|path| !to_stdout(path));
         let junit = junit.map(|path| print::junit_file(path, self.force)).transpose()?;
-        let kind = match self.junit {
-            Some(None) => Printed::Junit,
+        let kind = match &self.junit {
+            Some(path) if to_stdout(path) => Printed::Junit,
             _ if self.json => Printed::Json,
             _ => Printed::Text,
         };
