@@ -16,7 +16,8 @@ struct Flight {
 fn fly_to(phase: TdPhase) -> Flight {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
-    let vehicle = Running::start(vehicle(folder.path(), &[&ground.link()]).arg("--stay"));
+    let vehicle =
+        Running::start(vehicle(folder.path(), &[&ground.link()]).args(["--stay", "--dispersion", "none"]));
     ground.wait_until_ready();
     if phase != TdPhase::TD_PHASE_PAD_IDLE {
         assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
@@ -74,6 +75,8 @@ fn an_abort_under_thrust_lands_on_the_ground_below_and_reports_that_no_cut_off_e
     assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
     flight.ground.wait_for_phase(TdPhase::TD_PHASE_TOUCHDOWN);
+    // It is judged at rest.
+    flight.vehicle.wait_for_line("limits of the legs kept");
     let ended = ended(flight);
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);

@@ -44,7 +44,7 @@ fn wait_for_uplink(ground: &mut BareGround, wanted: impl Fn(&TD_UPLINK_DATA) -> 
 #[test]
 fn a_silent_uplink_holds_the_countdown() {
     // The last one hangs below a drone.
-    for profile in ["paper-calibrated", "mk2", "vlr"] {
+    for profile in ["mk2", "vlr"] {
         let mut flight = Countdown::of(profile);
         let heard = wait_for_uplink(&mut flight.ground, |_| true);
         assert_eq!((heard.target_system, heard.target_component, heard.commands), (255, 190, 1));
@@ -80,7 +80,7 @@ fn a_silent_uplink_holds_the_countdown() {
 #[test]
 fn a_countdown_continues_when_half_of_the_datagrams_are_lost() {
     for _ in 0..3 {
-        let mut flight = Countdown::of("paper-calibrated");
+        let mut flight = Countdown::of("mk2");
         flight.proxy.impair(Impairment { lost_per_1000: 500, ..Impairment::default() });
         let released = flight.ground.wait_for_status("a release", |status| {
             assert_eq!(status.hold, TdHold::TD_HOLD_NONE);

@@ -55,8 +55,7 @@ fn an_abort_is_received_while_the_line_takes_no_bytes_of_the_vehicle() {
     let mut command = |command, param1| {
         radio.write_all(command_frame(&mut encoder, command, param1).as_bytes()).unwrap();
     };
-    flight.wait_for_line("PAD_IDLE");
-    command(ARM, 1.0);
+    // Its heartbeats come with an arming, which is refused until the landing is rehearsed.
     flight.wait_for_line("PAD_ARMED");
     command(START, 0.0);
     // By the end of the countdown the vehicle has sent more bytes than the terminal's buffer holds.
@@ -72,7 +71,7 @@ fn an_abort_is_received_while_the_line_takes_no_bytes_of_the_vehicle() {
     assert!(at("no cut-off exists") < at("burn-out"), "{}", ended.output);
 }
 
-/// Sends a ground station's heartbeat ten times a second until it is dropped.
+/// Sends a ground station's heartbeat and an arming ten times a second until it is dropped.
 struct HeartbeatSender(Arc<AtomicBool>);
 
 impl HeartbeatSender {
@@ -85,6 +84,7 @@ impl HeartbeatSender {
                 let mut encoder = Encoder::new(GROUND);
                 while !ends.load(Ordering::Relaxed)
                     && radio.write_all(heartbeat_frame(&mut encoder, 0).as_bytes()).is_ok()
+                    && radio.write_all(command_frame(&mut encoder, ARM, 1.0).as_bytes()).is_ok()
                 {
                     std::thread::sleep(Duration::from_millis(100));
                 }
@@ -103,15 +103,9 @@ impl Drop for HeartbeatSender {
 #[test]
 fn both_report_a_flight_that_misses_its_limits() {
     let folder = tempfile::tempdir().unwrap();
-    let listed =
-        Running::to_end(program(Program::OnboardSim).args(["profiles", "--show", "paper-calibrated"]));
-    assert_eq!(listed.code, Some(0));
-    // The motor is 8 % weaker than the controller assumes.
-    let weak = format!("{}\n[plant]\nthrust_scale = 0.92\n", listed.output);
-    std::fs::write(folder.path().join("weak.toml"), weak).unwrap();
     let mut station = Running::start(&mut auto_ground(folder.path(), &["udpin:127.0.0.1:0"]));
     let mut weak = vehicle(folder.path(), &[&station.udp_link()]);
-    let flight = Running::start(weak.args(["--profile", "weak.toml"]));
+    let flight = Running::start(weak.args(["--fault", "weak-motor:0.8@0"]));
     let (station, flight) = (station.wait(), flight.wait());
     assert_eq!(station.code, Some(3), "{}", station.output);
     assert_eq!(flight.code, Some(3), "{}", flight.output);

@@ -96,7 +96,7 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
     let vehicles = ["one", "two"].map(|name| {
         let folder = folder.path().join(name);
         std::fs::create_dir(&folder).unwrap();
-        Running::start(vehicle(&folder, &[&link]).args(["--stay", "--profile", "paper-calibrated"]))
+        Running::start(vehicle(&folder, &[&link]).args(["--stay", "--profile", "mk2"]))
     });
     screen.wait_until("two vehicles", |window| {
         let rows = window.rows();
@@ -135,8 +135,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
         port,
     );
     let link = format!("udpout:127.0.0.1:{port}");
-    let vehicle =
-        Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "paper-calibrated"]));
+    let vehicle = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
     screen.wait_for("GO: every arming check passes");
     screen.type_until(b"0AARM\r", "ARM acknowledged: accepted");
     assert!(!other.was_sent(ARM), "the other vehicle was armed, too");
@@ -189,7 +188,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
     }
     std::fs::write(folder.path().join("crew.toml"), CREW).unwrap();
     let mut fly = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
-    fly.args(["--profile", "paper-calibrated", "--stay", "--key", "flight.key", "--crew", "crew.toml"]);
+    fly.args(["--profile", "mk2", "--stay", "--key", "flight.key", "--crew", "crew.toml"]);
     let mut vehicle = Running::start(&mut fly);
     let link = vehicle.udp_link();
     let laptop = |operator: &str| {
@@ -245,7 +244,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
 fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_until_it_is_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
-    let mut vehicle = Running::start(command.args(["--stay", "--profile", "paper-calibrated"]));
+    let mut vehicle = Running::start(command.args(["--stay", "--profile", "mk2"]));
     let link = vehicle.udp_link();
     let mut daemon =
         Running::start(&mut ground(folder.path(), &["daemon", "--connect", &link, "--log", "none"]));
@@ -286,7 +285,7 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
 #[test]
 fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_alive() {
     let folder = tempfile::tempdir().unwrap();
-    let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/vehicles/profiles/paper-calibrated.toml");
+    let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/vehicles/missions/mk2.toml");
     let profile = std::fs::read_to_string(of).unwrap();
     let countdown = profile.lines().find(|line| line.starts_with("countdown_s")).unwrap();
     // The second station joins within it, however busy the machine is.

@@ -12,8 +12,9 @@ use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
 use simulated_vehicle::fly;
-use simulated_vehicle::fly::{DeadlinePolicy, FlyOptions, LoadedFlight, OnTheWire};
+use simulated_vehicle::fly::{FlyOptions, OnTheWire};
 pub use simulated_vehicle::fly::{LogClock, Speed};
+use simulated_vehicle::vehicle::RocketFlight;
 use tokio::sync::{oneshot, watch};
 
 use crate::cli::Demonstration;
@@ -24,26 +25,26 @@ const STOP_WITHIN: Duration = Duration::from_secs(3);
 /// What is simulated.
 #[derive(Debug, Clone)]
 pub struct DemoOptions {
-    pub profile: LoadedFlight,
-    /// Seed of its dispersions.
-    pub seed: u64,
+    pub flight: RocketFlight,
     pub speed: Speed,
     pub system_id: u8,
 }
 
 impl DemoOptions {
-    /// Reads the profile or mission. A mission that has a launch begins on its pad, unless a start is given.
+    /// Reads the mission. A mission that has a launch begins on its pad, unless a start is given.
     ///
     /// # Errors
-    /// There is no profile of that name, or it is invalid.
+    /// There is no mission of that name, or it is invalid.
     pub fn load(demonstration: &Demonstration<'_>, system_id: u8) -> anyhow::Result<Self> {
         let Demonstration { profile, start, seed, speed } = *demonstration;
-        Ok(Self { profile: fly::load_flight(profile)?.starting_at(start)?, seed, speed, system_id })
+        let mut flight = fly::load_flight(profile)?.starting_at(start)?;
+        flight.recipe.seed = seed;
+        Ok(Self { flight, speed, system_id })
     }
 
     /// The header of the log that contains both sides.
     pub fn log_header(&self, start_unix_ns: u64) -> LogHeader {
-        fly::log_header("ground", &self.profile, self.seed, start_unix_ns)
+        self.flight.log_header("ground", start_unix_ns)
     }
 }
 
@@ -66,18 +67,16 @@ impl Demo {
         log_clock: LogClock,
     ) -> io::Result<Self> {
         let fly_options = FlyOptions {
-            profile: options.profile.clone(),
+            flight: options.flight.clone(),
             system_id: options.system_id,
             links: vec![link],
             key_file: None,
             crew: None,
             recorder,
             on_the_wire: OnTheWire::drawn(),
-            seed: options.seed,
             speed: options.speed,
             auto_start: false,
             exit_when_safed: false,
-            deadline_policy: DeadlinePolicy::Observe,
             board: None,
             log_clock: Some(log_clock),
         };

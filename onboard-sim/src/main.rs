@@ -11,7 +11,7 @@ use anyhow::Context as _;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
-use simulated_vehicle::fly::{builtins, load_flight};
+use simulated_vehicle::fly::load_flight;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]
@@ -158,11 +158,11 @@ fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
-        out.write_all(load_flight(name)?.toml().as_bytes())?;
+        out.write_all(load_flight(name)?.recipe.mission_toml.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
-    for (name, _) in builtins() {
-        writeln!(out, "{name:<20} {}", load_flight(name)?.summary())?;
+    for (name, _) in vehicles::mission::BUILTIN {
+        writeln!(out, "{name:<20} {}", load_flight(name)?.recipe.mission.summary)?;
     }
     Ok(ExitCode::SUCCESS)
 }

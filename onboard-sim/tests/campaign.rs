@@ -90,7 +90,7 @@ fn a_logged_flight_flies_again_bit_for_bit() {
 
     let (mission, start) = (vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
     let believed = state_from_log(&start.believed);
-    let mut computer = Computer::in_space(&mission, Law::Nmpc, &believed).released();
+    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released();
     let (mut expected_frame, mut restarts) = (1, 0);
     for tick in &ticks {
         let input = input_from_log(&tick.input).unwrap();

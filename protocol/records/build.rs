@@ -22,7 +22,6 @@ fn generate_log_records(out_dir: &Path, package: &str) -> Result<()> {
     let mut config = prost_build::Config::new();
     if package == "computer" {
         // What it imports is generated already.
-        config.extern_path(".touchdown.log.v1", "crate::v1");
         config.extern_path(".touchdown.flight.v1", "crate::flight_v1");
     }
     config.compile_fds(descriptors).with_context(|| file.clone())?;

@@ -8,12 +8,12 @@ use proptest::prelude::*;
 use prost::Message as _;
 use protocol::log::reader::{Damage, LogItem, LogReader};
 use protocol::log::record::{
-    Direction, Event, EventLevel, RawFrame, Record, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PLANT_TRUTH,
-    TOPIC_RAW_RX,
+    Direction, Event, EventLevel, RawFrame, Record, TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_RAW_RX,
+    TOPIC_TRUTH_SAMPLE,
 };
 use protocol::log::recorder::{Recorder, RecorderError};
-use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::log::{flight_v1, v1};
 
 fn header() -> LogHeader {
     LogHeader {
@@ -78,21 +78,21 @@ fn a_whole_log_is_read_as_written() {
         bytes: vec![0xFD, 1, 2],
     };
     let event = Event { level: EventLevel::Fatal, name: "vehicle".to_owned(), message: "abort".to_owned() };
-    let truth = v1::PlantTruth { fin_actual_rad: vec![0.5; 4], ..v1::PlantTruth::default() };
+    let truth = flight_v1::TruthSample { fins_actual_rad: vec![0.5; 4], ..flight_v1::TruthSample::default() };
     let bytes = written(&[
         operator(1),
         Record::RawFrame(frame),
         Record::Event(event),
-        Record::PlantTruth(Box::new(truth.clone())),
+        Record::TruthSample(Box::new(truth.clone())),
     ]);
     let contents = read(&bytes);
     assert_eq!(contents.damage, None);
     assert_eq!(contents.metadata, ["build", "schema", "run"]);
     assert_eq!(contents.attachments, ["profile.toml", "touchdown.xml"]);
     let topics: Vec<_> = contents.messages.iter().map(|(topic, _)| topic.as_str()).collect();
-    assert_eq!(topics, [TOPIC_OPERATOR, TOPIC_RAW_RX, TOPIC_EVENTS, TOPIC_PLANT_TRUTH, "/tf"]);
+    assert_eq!(topics, [TOPIC_OPERATOR, TOPIC_RAW_RX, TOPIC_EVENTS, TOPIC_TRUTH_SAMPLE, "/tf"]);
     assert_eq!(contents.messages[1].1, [0xFD, 1, 2]);
-    assert_eq!(v1::PlantTruth::decode(contents.messages[3].1.as_slice()).unwrap(), truth);
+    assert_eq!(flight_v1::TruthSample::decode(contents.messages[3].1.as_slice()).unwrap(), truth);
 }
 
 /// An encoder may drop a field that equals its default, and -0.0 equals 0.0; our schema must prevent that.
@@ -102,11 +102,14 @@ fn both_zeros_and_every_nan_survive() {
         [0.0f64.to_bits(), (-0.0f64).to_bits(), f64::NAN.to_bits(), 0x7FF0_0000_0000_0001, u64::MAX, 1]
     {
         let state = v1::PlanarState { u_m_s: f64::from_bits(bits), ..v1::PlanarState::default() };
-        let plan = v1::Plan { gimbal_rad: vec![f64::from_bits(bits)], ..v1::Plan::default() };
+        let truth = flight_v1::TruthSample {
+            fins_actual_rad: vec![f64::from_bits(bits)],
+            ..flight_v1::TruthSample::default()
+        };
         let state = v1::PlanarState::decode(state.encode_to_vec().as_slice()).unwrap();
-        let plan = v1::Plan::decode(plan.encode_to_vec().as_slice()).unwrap();
+        let truth = flight_v1::TruthSample::decode(truth.encode_to_vec().as_slice()).unwrap();
         assert_eq!(state.u_m_s.to_bits(), bits);
-        assert_eq!(plan.gimbal_rad[0].to_bits(), bits);
+        assert_eq!(truth.fins_actual_rad[0].to_bits(), bits);
     }
 }
 

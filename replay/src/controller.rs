@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use flight::computer::pilot::{Pilot, PilotInput, PilotOutput};
 use flight::computer::{Computer, Input, flight_time_s};
 use flight::guidance::baseline::{Controller, Law, UnknownController};
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::{LandingSolved, Plane};
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
@@ -88,10 +88,6 @@ pub enum StartError {
     Setting(#[from] SettingError),
     #[error("controller {0}")]
     Controller(#[from] UnknownController),
-    #[error(
-        "its record /computer/start is of another vehicle than a rocket in space, and no other is run again"
-    )]
-    OtherVehicle,
 }
 
 /// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order.
@@ -109,10 +105,10 @@ impl LoggedComputer {
         start: &computer_v1::ComputerStart,
         run: &BTreeMap<String, String>,
     ) -> Result<Self, StartError> {
-        let start = start.in_space.as_ref().ok_or(StartError::OtherVehicle)?;
+        let start = &start.start;
         let schedule = LoggedPilot::schedule(toml, start, &[])?;
         let controller = run.get("controller").map(|name| name.parse::<Controller>()).transpose()?;
-        Ok(Self(RecordedComputer::in_space(schedule.base(), start, controller.unwrap_or_default())))
+        Ok(Self(RecordedComputer::at_power_up(schedule.base(), start, controller.unwrap_or_default())))
     }
 
     /// The pilot's part of the last frame, as a log has it; `None` on the pad.
@@ -202,7 +198,7 @@ impl LoggedPilot {
         let other_law = at_frame.zip(law_of(REFLOWN_BY)?);
         let law = Law::of(controller, schedule.base());
         let believed = state_from_log(&start.believed);
-        let computer = Computer::in_space(schedule.base(), law, &believed);
+        let computer = Computer::at_power_up(schedule.base(), law, &believed);
         let computer = match &start.gyro_bias_rad_s {
             Some(bias) => computer.standing(&believed, vector_from_log(bias)),
             None => computer,
@@ -237,11 +233,8 @@ impl LoggedPilot {
     }
 
     /// The pilot in the flight computer.
-    ///
-    /// # Panics
-    /// Never: the computer of a rocket in space has a pilot.
     pub fn pilot(&self) -> &Pilot {
-        self.computer.pilot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
+        self.computer.pilot()
     }
 
     /// Runs one frame.

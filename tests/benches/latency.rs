@@ -18,7 +18,6 @@ use ground::update::{Action, Msg, update};
 use protocol::dialect::MavMessage;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
-use sim::plane::DeadlinePolicy;
 use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
 use simulated_vehicle::vehicle::VehicleEvent;
 use tokio::sync::watch;
@@ -38,17 +37,15 @@ fn start_vehicle(
     let ticks = Arc::clone(ticks);
     let options = FlyOptions {
         system_id: 1,
-        profile: load_flight("paper-calibrated")?,
+        flight: load_flight("mk2")?,
         links: vec![link],
         key_file: None,
         crew: None,
         recorder: None,
         on_the_wire: OnTheWire::drawn(),
-        seed: 1,
         speed: Speed::Factor(1.0),
         auto_start: true,
         exit_when_safed: true,
-        deadline_policy: DeadlinePolicy::Observe,
         board: None,
         log_clock: None,
     };
@@ -56,7 +53,7 @@ fn start_vehicle(
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let (_stop, stopped) = watch::channel(false);
         let observe = move |time_s: f64, event: &VehicleEvent| {
-            if matches!(event, VehicleEvent::Tick(_)) {
+            if matches!(event, VehicleEvent::Planned { .. }) {
                 let boot_ms = (1_000.0 * time_s).round() as u32;
                 ticks.lock().unwrap_or_else(PoisonError::into_inner).insert(boot_ms, now());
             }

@@ -25,7 +25,7 @@ pub use flight::{
     auto_ground, expect_identical_replay, expect_landing, landed_vehicle, last_time_s, vehicle,
 };
 pub use keys::{keygen, signing_with_key_in};
-pub use log_file::{raw_frames_of, rewrite_log, ticks_of};
+pub use log_file::{frames_of, raw_frames_of};
 pub use nix::sys::signal::Signal;
 pub use ports::{Bound, unshared_address};
 pub use process::{Ended, Running, resident_bytes, status_of};

@@ -13,7 +13,7 @@ use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
-use simulated_vehicle::fly::{LoadedFlight, load_flight};
+use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
 use crate::footprint::GROWTH_MAX_BYTES;
@@ -51,14 +51,12 @@ pub(crate) fn day(hours: u32) -> Result<Vec<String>, Failure> {
 
 /// One hour with one vehicle. Returns whether it landed and the station knows.
 fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Failure> {
-    let LoadedFlight::InSpace(mut flight) = load_flight("mk2")? else {
-        return Err("mk2 does not fly in space".into());
-    };
+    let mut flight = load_flight("mk2")?;
     flight.number = u64::from(hour);
-    let mut vehicle = Vehicle::in_space(&flight)?;
+    let mut vehicle = Vehicle::on_the_pad(&flight)?;
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     vehicle.set_pin_out(true);
-    let mut endpoint = VehicleEndpoint::sending(vehicle.standard()).booted(hour + 1);
+    let mut endpoint = VehicleEndpoint::new().booted(hour + 1);
     let mut armed = false;
     for frame in 0..(HOUR.as_millis() / FRAME.as_millis()) as u32 {
         let at = FRAME * frame;

@@ -18,7 +18,7 @@ const BAD: Impairment = Impairment {
 
 #[test]
 fn with_heavy_loss_arming_works_and_the_abort_arrives() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("PAD_IDLE");
     rig.proxy.impair(BAD);
     let climbed = rig.arm();
@@ -49,7 +49,7 @@ fn with_heavy_loss_arming_works_and_the_abort_arrives() {
 
 #[test]
 fn an_abort_whose_answers_are_lost_is_repeated_and_reported_as_observed() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
     rig.abort();
@@ -64,7 +64,7 @@ fn an_abort_whose_answers_are_lost_is_repeated_and_reported_as_observed() {
 
 #[test]
 fn an_arm_whose_answer_is_lost_is_not_sent_again_and_the_heartbeat_decides() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("GO: every arming check passes");
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
     rig.terminal.type_by_hand(b"AARM\r");
@@ -75,7 +75,7 @@ fn an_arm_whose_answer_is_lost_is_not_sent_again_and_the_heartbeat_decides() {
 
 #[test]
 fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_repeated() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
     rig.terminal.wait_for(" POWERED");

@@ -49,7 +49,7 @@ fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
         (|terminal| terminal.signal(Signal::SIGINT), false),
     ];
     for (end, tells_repeats) in endings {
-        let mut rig = Rig::on_terminal("paper-calibrated", tells_repeats, "xterm-256color");
+        let mut rig = Rig::on_terminal("mk2", tells_repeats, "xterm-256color");
         rig.terminal.wait_for("GO: every arming check passes");
         assert!(!rig.terminal.is_restored(), "the screen is not open");
         rig.terminal.type_bytes(b"5");
@@ -66,7 +66,7 @@ fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
 
 #[test]
 fn while_armed_the_screen_quits_only_by_a_typed_word_and_the_station_continues() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.terminal.type_by_hand(b"q");
     rig.terminal.wait_for("QUIT although armed or in flight");
@@ -88,7 +88,7 @@ fn while_armed_the_screen_quits_only_by_a_typed_word_and_the_station_continues()
 
 #[test]
 fn after_a_hangup_the_station_continues_and_another_screen_shows_everything() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.terminal.signal(Signal::SIGHUP);
     rig.terminal.wait_until("the terminal as it was", |window| (!window.is_held()).then_some(()));
@@ -120,7 +120,7 @@ fn after_a_hangup_the_station_continues_and_another_screen_shows_everything() {
 /// After Ctrl-S or in a hanging session nobody reads the program's output.
 #[test]
 fn a_terminal_that_reads_nothing_blocks_neither_link_nor_abort_nor_log() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     let not_reading = rig.terminal.stop_reading();
     // Whole screens of the largest size are several times what the terminal's buffer holds.

@@ -70,7 +70,7 @@ fn parameter(index: u16, bytes: &[u8]) -> MavMessage {
 
 #[test]
 fn texts_of_a_vehicle_never_control_the_terminal() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("GO: every arming check passes");
     let mut encoder = Encoder::new(VEHICLE);
     for page in ["[1Pad]", "[6Texts]", "[7Params]"] {
@@ -103,7 +103,7 @@ fn texts_of_a_vehicle_never_control_the_terminal() {
 /// A full screen drops characters without a cell, but lines are written as they are.
 #[test]
 fn texts_of_a_vehicle_never_control_a_terminal_without_a_screen() {
-    let rig = Rig::on_terminal("paper-calibrated", false, "dumb");
+    let rig = Rig::on_terminal("mk2", false, "dumb");
     rig.terminal.wait_for("PAD_IDLE");
     let mut encoder = Encoder::new(VEHICLE);
     for attack in ATTACKS {

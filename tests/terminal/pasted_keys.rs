@@ -25,7 +25,7 @@ impl Rig {
 
 #[test]
 fn a_paste_into_an_armed_station_starts_nothing() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.terminal.paste(NOTE);
     rig.terminal.wait_for("a paste was dropped");
@@ -36,7 +36,7 @@ fn a_paste_into_an_armed_station_starts_nothing() {
 /// A connection that holds typed keys back for half a second at a time.
 #[test]
 fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("GO: every arming check passes");
     rig.terminal.type_in_bunches(b"AARM\r", &[2, 3]);
     assert!(rig.terminal.confirm_if_asked(" ARMED "), "keys that came together were taken for typed ones");
@@ -53,7 +53,7 @@ fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
 /// A console that does not put brackets around pasted text.
 #[test]
 fn bytes_that_arrive_faster_than_typing_start_nothing() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     for text in [NOTE.replace('\n', "\r"), "SSTART\r".to_owned()] {
         rig.terminal.type_bytes(text.as_bytes());
@@ -65,7 +65,7 @@ fn bytes_that_arrive_faster_than_typing_start_nothing() {
 #[test]
 fn ten_kilobytes_of_text_neither_quit_nor_command() {
     for marked in [true, false] {
-        let mut rig = Rig::new("paper-calibrated");
+        let mut rig = Rig::new("mk2");
         rig.terminal.wait_for("GO: every arming check passes");
         if marked {
             rig.terminal.paste(&long_text());
@@ -104,7 +104,7 @@ fn the_rest_of_a_paste_does_not_reach_the_shell() {
 
 #[test]
 fn a_held_q_does_not_quit_while_armed() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.arm();
     rig.terminal.hold(b'q', 60);
     assert!(!rig.terminal.window().is_closed(), "the station has quit");

@@ -44,7 +44,7 @@ fn assert_whole(rig: &mut Rig, size: (u16, u16)) {
 
 #[test]
 fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
-    let mut rig = Rig::new("paper-calibrated");
+    let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("GO: every arming check passes");
     let mut number = 1_u32;
     for _ in 0..STORM {
@@ -68,7 +68,7 @@ fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
     rig.terminal.wait_until("a flight's end, and nothing left over", |window| {
         let shown = window.rows();
         let top = shown[1].starts_with(" TOUCHDOWN ") && shown[1].contains(" disarmed ");
-        let table = shown.iter().any(|row| row.starts_with(" Verdict  "));
+        let table = shown.iter().any(|row| row.starts_with(" Verdict by the legs "));
         (top && table && shown[23].contains("[4Review]")).then_some(())
     });
     let before = without_numbers(&rig.terminal.window());

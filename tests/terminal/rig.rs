@@ -103,7 +103,7 @@ pub(crate) struct Pad {
 impl Pad {
     pub(crate) fn new() -> Self {
         let proxy = UdpProxy::new();
-        let vehicle = vehicle("paper-calibrated", &proxy);
+        let vehicle = vehicle("mk2", &proxy);
         Self { folder: tempfile::tempdir().unwrap(), proxy, _vehicle: vehicle }
     }
 

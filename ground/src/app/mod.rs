@@ -183,7 +183,7 @@ async fn start(
         role: Role::Station,
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         key_owner: owner,
-        mission: mission.map(|mission| MissionHash::of(mission.toml())),
+        mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
         pad: cli.pad,
         here: cli.here,

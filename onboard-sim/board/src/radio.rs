@@ -5,17 +5,16 @@ use alloc::vec::Vec;
 use flight::computer::crew::People;
 use flight::computer::news::News;
 use flight::computer::pilot::Sensed;
-use flight::computer::{Computer, FRAME_S, Feeling, Input, Output};
+use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::rules::operator::Operator;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StateWeights;
+use flight::vehicle::mission::StateWeights;
 use protocol::frame::Framer;
 use protocol::mission::MissionHash;
 use tick_log::computer::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
 use vehicle_link::endpoint::{Heard, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
 use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};
-use vehicle_link::streams::FROM_APOGEE;
 use vehicle_link::vehicle::{MissionName, Vehicle};
 
 use crate::stream::{self, OnTheAir};
@@ -70,7 +69,7 @@ impl Crewed {
     /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml` its text.
     pub(crate) fn new(on_the_air: &OnTheAir, mission: Mission, toml: &str) -> Self {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
-        let endpoint = VehicleEndpoint::sending(&FROM_APOGEE)
+        let endpoint = VehicleEndpoint::new()
             .booted(on_the_air.boot_number)
             .over_links(&[on_the_air.budget_bytes_s])
             .of_system(system_id);
@@ -100,7 +99,7 @@ impl Crewed {
         computer: &Computer,
         radio: &mut impl Radio,
     ) -> stream::Heard {
-        if let Feeling::InSpace(Sensed::Measured(measured)) = &input.feeling {
+        if let Sensed::Measured(measured) = &input.sensed {
             self.vehicle.sensors.take(measured, input.frame);
         }
         self.vehicle.parachute_ejected |= output.commands.parachute;
@@ -190,6 +189,6 @@ impl Vehicle for Flown<'_> {
             parachute_ejected: self.vehicle.parachute_ejected,
             took_s: 0.0,
         };
-        seen.snapshot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
+        seen.snapshot()
     }
 }

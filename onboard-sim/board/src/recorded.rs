@@ -114,9 +114,7 @@ pub fn fly<L: Link>(
             _ => return Err(FlyError::TwoInputs { after: frames }),
         };
         send(link, &answer, &mut buffer)?;
-        if let Some(saved) = computer.computer().saved() {
-            watch.save(&saved);
-        }
+        watch.save(&computer.computer().saved());
         frames += 1;
     }
     Ok(frames)
@@ -130,22 +128,15 @@ fn power_up(begin: &Begin) -> Result<(RecordedComputer, Option<Crewed>), String>
         mission.map_err(|error| error.to_string()).map(|mission| mission_flown(mission, start))
     };
     match (&begin.at_power_up, &begin.in_the_air, &begin.on_the_air) {
-        (Some(ComputerStart { in_space: Some(start), in_plane: None }), None, on_the_air) => {
+        (Some(ComputerStart { start }), None, on_the_air) => {
             let mission = mission(start)?;
-            let computer = RecordedComputer::in_space(&mission, start, controller);
+            let computer = RecordedComputer::at_power_up(&mission, start, controller);
             let crewed = on_the_air.as_ref().map(|on_the_air| Crewed::new(on_the_air, mission, &begin.toml));
             Ok((computer, crewed))
-        }
-        (Some(ComputerStart { in_space: None, in_plane: Some(release) }), None, None) => {
-            let profile =
-                vehicles::profile::from_toml(&begin.toml, "profile").map_err(|error| error.to_string())?;
-            let computer =
-                RecordedComputer::in_plane(&profile, release).map_err(|error| error.to_string())?;
-            Ok((computer, None))
         }
         (None, Some(start), None) => {
             Ok((RecordedComputer::in_the_air(&mission(start)?, start, controller), None))
         }
-        _ => Err("must name one start, of one vehicle, with a radio only from power-up on in space".into()),
+        _ => Err("must name one start, with a radio only from power-up on".into()),
     }
 }

@@ -6,7 +6,7 @@
 #![expect(clippy::print_stdout, reason = "the hashes are its output")]
 
 use campaign::run::in_parallel;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sha2::{Digest as _, Sha256};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;

@@ -9,7 +9,7 @@ use flight::computer::{AbortEffect, FRAME_MS};
 use flight::rules::phase::Phase;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use sim::draw::Chance;

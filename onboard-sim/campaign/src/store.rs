@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
 use sim::recipe::Recipe;
 
-use crate::summary::PICTURES;
 use crate::row::{self, Row};
+use crate::summary::PICTURES;
 
 /// A campaign's order.
 #[derive(Debug, Clone)]
@@ -391,10 +391,7 @@ pub fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
 ///
 /// # Errors
 /// The parts belong to different campaigns, contradict each other, or some flights are missing.
-pub fn merge(
-    parts: &[PathBuf],
-    out: &Path,
-) -> Result<(Store, Order), StoreError> {
+pub fn merge(parts: &[PathBuf], out: &Path) -> Result<(Store, Order), StoreError> {
     let nothing = || StoreError::Missing { from: 0, to: 0 };
     let first = parts.first().ok_or_else(nothing)?;
     let whole = |directory: &Path| -> Result<Manifest, StoreError> {

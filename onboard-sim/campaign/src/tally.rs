@@ -3,7 +3,7 @@
 
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::guidance::baseline::{Controller, Law};
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use nmpc::SolveStatus;

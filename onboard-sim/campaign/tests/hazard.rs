@@ -3,7 +3,7 @@
 
 use campaign::hazard::{Flights, Impact, Radius, Way, fly, study, widest};
 use campaign::run::threads;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 

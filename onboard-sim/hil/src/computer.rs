@@ -13,7 +13,7 @@
 
 use flight::computer::pilot::Sensed;
 use flight::computer::saved::Saved;
-use flight::computer::{Computer, Feeling, Input, LogState, Output, flight_time_s};
+use flight::computer::{Computer, Input, LogState, Output, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
 use flight::rules::arming::Uplink;
@@ -73,7 +73,7 @@ pub struct RemoteComputer {
 impl RemoteComputer {
     /// The computer of a flight, which has just started.
     pub fn new(mission: &Mission, law: Law, start: &Start) -> Self {
-        let computer = Computer::in_space(mission, law, &start.believed).released();
+        let computer = Computer::at_power_up(mission, law, &start.believed).released();
         let answer = Answer {
             flight_id: start.flight_id,
             frame: 0,
@@ -97,7 +97,7 @@ impl RemoteComputer {
     }
 
     /// What is kept through a reset, after each frame.
-    pub fn saved(&self) -> Option<Saved> {
+    pub fn saved(&self) -> Saved {
         self.computer.saved()
     }
 
@@ -189,7 +189,7 @@ impl RemoteComputer {
         self.computer.step(&Input {
             frame,
             time_s: flight_time_s(frame),
-            feeling: Feeling::InSpace(Sensed::Measured(readings.measured)),
+            sensed: Sensed::Measured(readings.measured),
             gimbal_rad,
             fins_rad,
             contact: switches.contact,
@@ -203,7 +203,6 @@ impl RemoteComputer {
             people: None,
             requests: &[],
             rehearsed: None,
-            late: false,
         })
     }
 
@@ -323,7 +322,7 @@ mod tests {
         for pace in [Pace::Lockstep, Pace::RealTime] {
             let before = after(pace, &(1..=40).collect::<Vec<_>>());
             let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
-            let saved = before.saved().unwrap();
+            let saved = before.saved();
             let woken = || RemoteComputer::resumed(&mission, Law::Nmpc, before.start(), &saved);
             // The answer to the last frame was lost on the way.
             let again = woken().take(7, 40, &frame(40)).unwrap();

@@ -2,16 +2,16 @@
 //!
 //! The station in command may set the rate of each message, in hertz, at any time, as with
 //! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The weights of the landing cost are
-//! read-only: they come from the profile, which the log holds, so that a replay uses the same ones. Safety limits are
+//! read-only: they come from the mission, which the log holds, so that a replay uses the same ones. Safety limits are
 //! not parameters. The list of names never changes.
 
 use alloc::format;
 use alloc::string::String;
-use flight::vehicle::profile::StateWeights;
+use flight::vehicle::mission::StateWeights;
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::parameter::{ParamId, ParamKey, is_real32, value_message};
 
-use crate::streams::Streams;
+use crate::streams::{STANDARD, Streams};
 
 /// A weight of the landing cost, by its parameter's name.
 struct Weight {
@@ -19,7 +19,7 @@ struct Weight {
     of: fn(&StateWeights) -> f64,
 }
 
-/// The weights of the landing cost (a profile's `nmpc.weights`, a mission's `powered.weights`).
+/// The weights of the landing cost (a mission's `powered.weights`).
 const WEIGHTS: [Weight; 7] = [
     Weight { name: "NMPC_W_X", of: |weights| weights.x },
     Weight { name: "NMPC_W_Z", of: |weights| weights.z },
@@ -31,9 +31,7 @@ const WEIGHTS: [Weight; 7] = [
 ];
 
 /// Number of parameters; their indices are 0 to this number minus one. Rates first, then weights.
-pub fn count(streams: &Streams) -> u16 {
-    (streams.messages().len() + WEIGHTS.len()) as u16
-}
+pub const COUNT: u16 = (STANDARD.len() + WEIGHTS.len()) as u16;
 
 /// Why a parameter keeps its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,30 +43,28 @@ pub struct Refusal {
 }
 
 /// The index of a parameter in the list, if it exists.
-pub fn place_of(key: ParamKey, streams: &Streams) -> Option<u16> {
-    let count = count(streams);
+pub fn place_of(key: ParamKey) -> Option<u16> {
     match key {
-        ParamKey::Index(index) => u16::try_from(index).ok().filter(|index| *index < count),
-        ParamKey::Name(id) => (0..count).find(|place| id.is(name(*place, streams))),
+        ParamKey::Index(index) => u16::try_from(index).ok().filter(|index| *index < COUNT),
+        ParamKey::Name(id) => (0..COUNT).find(|place| id.is(name(*place))),
     }
 }
 
-fn name(place: u16, streams: &Streams) -> &'static str {
-    let (place, messages) = (usize::from(place), streams.messages());
-    match messages.get(place) {
+fn name(place: u16) -> &'static str {
+    let place = usize::from(place);
+    match STANDARD.get(place) {
         Some(stream) => stream.parameter,
-        None => WEIGHTS[place - messages.len()].name,
+        None => WEIGHTS[place - STANDARD.len()].name,
     }
 }
 
-/// PARAM_VALUE of the parameter at an index below [`count`].
+/// PARAM_VALUE of the parameter at an index below [`COUNT`].
 pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessage {
-    let messages = streams.messages();
-    let found = match messages.get(usize::from(place)) {
+    let found = match STANDARD.get(usize::from(place)) {
         Some(stream) => streams.rate_hz(stream.message_id),
-        None => (WEIGHTS[usize::from(place) - messages.len()].of)(weights),
+        None => (WEIGHTS[usize::from(place) - STANDARD.len()].of)(weights),
     };
-    value_message(name(place, streams), found as f32, place, count(streams))
+    value_message(name(place), found as f32, place, COUNT)
 }
 
 /// Sets a parameter; `forbidden` says why this station may set none now. Returns the index of the parameter, whose
@@ -84,20 +80,20 @@ pub fn set(
     streams: &mut Streams,
     now_s: f64,
 ) -> Result<(u16, Option<Refusal>), Refusal> {
-    let Some(place) = place_of(ParamKey::Name(id), streams) else {
+    let Some(place) = place_of(ParamKey::Name(id)) else {
         let reason = format!("parameter {}: no parameter has this name", id.printable());
         return Err(Refusal { error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, reason });
     };
-    let name = name(place, streams);
+    let name = name(place);
     let refuse = |error, why: &str| Some(Refusal { error, reason: format!("{name} not set: {why}") });
-    let refusal = match (streams.messages().get(usize::from(place)), forbidden) {
+    let refusal = match (STANDARD.get(usize::from(place)), forbidden) {
         _ if !is_real32(value_type) => refuse(
             MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH,
             "its type is REAL32 (MAV_PARAM_TYPE 9), as every parameter's here",
         ),
         (None, _) => refuse(
             MavParamError::MAV_PARAM_ERROR_READ_ONLY,
-            "it comes from the profile (weights of the landing cost); fly another profile",
+            "it comes from the mission (weights of the landing cost); fly another mission",
         ),
         (Some(_), Some(why)) => refuse(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED, &why),
         (Some(_), None) if !(value.is_finite() && value >= 0.0) => {
@@ -118,37 +114,24 @@ pub fn set(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::streams::{FROM_APOGEE, STANDARD};
-
-    fn every() -> [Streams; 2] {
-        [Streams::of(&STANDARD), Streams::of(&FROM_APOGEE)]
-    }
 
     #[test]
     fn names_fit_their_field_and_are_unique() {
-        for streams in every() {
-            let count = count(&streams);
-            let name = |place| name(place, &streams);
-            let place_of = |key| place_of(key, &streams);
-            for place in 0..count {
-                assert!((1..=ParamId::MAX_LEN).contains(&name(place).len()), "{}", name(place));
-                assert_eq!(place_of(ParamKey::Name(ParamId::new(name(place)))), Some(place));
-                assert_eq!(place_of(ParamKey::Index(place.cast_signed())), Some(place));
-            }
-            assert!((0..count).any(|place| name(place).len() == ParamId::MAX_LEN), "one has no terminator");
-            for outside in [-2, count.cast_signed(), i16::MAX, i16::MIN] {
-                assert_eq!(place_of(ParamKey::Index(outside)), None);
-            }
+        for place in 0..COUNT {
+            assert!((1..=ParamId::MAX_LEN).contains(&name(place).len()), "{}", name(place));
+            assert_eq!(place_of(ParamKey::Name(ParamId::new(name(place)))), Some(place));
+            assert_eq!(place_of(ParamKey::Index(place.cast_signed())), Some(place));
+        }
+        assert!((0..COUNT).any(|place| name(place).len() == ParamId::MAX_LEN), "one has no terminator");
+        for outside in [-2, COUNT.cast_signed(), i16::MAX, i16::MIN] {
+            assert_eq!(place_of(ParamKey::Index(outside)), None);
         }
     }
 
     #[test]
     fn no_limit_is_a_parameter() {
-        for streams in every() {
-            for place in 0..count(&streams) {
-                let name = name(place, &streams);
-                assert!(name.starts_with("RATE_") || name.starts_with("NMPC_W_"));
-            }
+        for place in 0..COUNT {
+            assert!(name(place).starts_with("RATE_") || name(place).starts_with("NMPC_W_"));
         }
     }
 }

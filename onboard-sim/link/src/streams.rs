@@ -113,44 +113,11 @@ impl Standard {
     }
 }
 
-/// The periodic messages of the planar vehicle. If the budget runs short, the last ones are dropped first.
-pub const STANDARD: [Standard; 25] = [
-    standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
-    standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
-    // More often whenever something changes.
-    standard::<TD_CREW_DATA>("RATE_CREW", 1.0).of_crew(),
-    standard::<TD_OPERATOR_DATA>("RATE_OPERATOR", 0.5).of_crew(),
-    standard::<TD_LANDING_VERDICT_DATA>("RATE_VERDICT", 0.5),
-    // Without its optional offset quaternion.
-    standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 10.0).cut_to(32),
-    standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 10.0),
-    standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 5.0),
-    standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 4.0),
-    standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
-    standard::<TD_TOUCHDOWN_PREDICTION_DATA>("RATE_PREDICTION", 2.0),
-    standard::<TD_PREDICTED_PATH_DATA>("RATE_PATH", 1.0),
-    standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
-    standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
-    standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
-    standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // For other clients. A radio has no room for all of them: the messages above already have this data.
-    standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
-    standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0).on_network(1.0),
-    standard::<ATTITUDE_DATA>("RATE_EULER", 0.0).on_network(4.0),
-    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0).on_network(4.0),
-    standard::<HOME_POSITION_DATA>("RATE_HOME", 0.0).on_network(1.0),
-    // Without its extensions, which are not known here.
-    standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30).on_network(1.0),
-    standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0).on_network(1.0),
-    standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
-    STORAGE,
-];
-
 /// Without its extensions, which have nothing to say here.
 const STORAGE: Standard = standard::<STORAGE_INFORMATION_DATA>("RATE_STORAGE", 0.1).cut_to(27);
 
-/// The periodic messages of the rocket from apogee, in the same order.
-pub const FROM_APOGEE: [Standard; 29] = [
+/// The periodic messages. If the budget runs short, the last ones are dropped first.
+pub const STANDARD: [Standard; 29] = [
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
     // More often whenever something changes.
@@ -172,7 +139,7 @@ pub const FROM_APOGEE: [Standard; 29] = [
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // The same, and what is off until requested.
+    // For other clients. A radio has no room for all of them: the messages above already have this data.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0).on_network(1.0),
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
@@ -220,7 +187,6 @@ pub(crate) struct Due {
 /// Every stream of a vehicle over one link, in the order of its messages.
 #[derive(Debug, Clone)]
 pub struct Streams {
-    messages: &'static [Standard],
     signature_len: usize,
     crew: bool,
     capacity_bytes_s: u32,
@@ -229,23 +195,24 @@ pub struct Streams {
 
 impl Streams {
     /// Every message at its default rate, within a radio's budget.
-    pub fn of(messages: &'static [Standard]) -> Self {
-        Self::over_a_radio(messages, 0, false)
+    #[expect(clippy::new_without_default, reason = "a link is one of three kinds, and none is the usual one")]
+    pub fn new() -> Self {
+        Self::over_a_radio(0, false)
     }
 
     /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget holds.
-    pub fn signed(messages: &'static [Standard]) -> Self {
-        Self::over_a_radio(messages, SIGNATURE_LEN, false)
+    pub fn signed() -> Self {
+        Self::over_a_radio(SIGNATURE_LEN, false)
     }
 
     /// The same for a vehicle with operators.
-    pub fn with_crew(messages: &'static [Standard]) -> Self {
-        Self::over_a_radio(messages, SIGNATURE_LEN, true)
+    pub fn with_crew() -> Self {
+        Self::over_a_radio(SIGNATURE_LEN, true)
     }
 
-    fn over_a_radio(messages: &'static [Standard], signature_len: usize, crew: bool) -> Self {
+    fn over_a_radio(signature_len: usize, crew: bool) -> Self {
         let mut place = 0_usize;
-        let streams = messages.iter().map(|standard| {
+        let streams = STANDARD.iter().map(|standard| {
             // Spread in time, so that the slow messages are not all due at the same instant.
             let due_s = 0.02 * place as f64;
             place += usize::from(crew || !standard.of_crew);
@@ -260,13 +227,9 @@ impl Streams {
             }
         });
         let each = streams.collect();
-        let mut streams = Self { messages, signature_len, crew, capacity_bytes_s: 0, each };
+        let mut streams = Self { signature_len, crew, capacity_bytes_s: 0, each };
         streams.set_capacity(RADIO_BUDGET_BYTES_S);
         streams
-    }
-
-    pub fn messages(&self) -> &'static [Standard] {
-        self.messages
     }
 
     /// The default rates for this budget, Hz: as high as they fit.
@@ -286,7 +249,7 @@ impl Streams {
                 (if network { network_hz.max(*rate_hz) } else { *rate_hz }).min(most_hz)
             }
         };
-        self.messages.iter().map(rate).collect()
+        STANDARD.iter().map(rate).collect()
     }
 
     /// The rates for a line slower than a radio: less often in the same proportion, vital messages less so.

@@ -6,7 +6,7 @@ use flight::computer::Computer;
 use flight::computer::crew::People;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
-use flight::vehicle::profile::StateWeights;
+use flight::vehicle::mission::StateWeights;
 use protocol::mission::MissionHash;
 
 use crate::snapshot::Snapshot;

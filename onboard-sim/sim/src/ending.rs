@@ -7,7 +7,7 @@ use core::fmt;
 pub struct FlightEnding<'a> {
     /// An abort was latched.
     pub aborted: bool,
-    /// Within the limits that decide: those of the legs, or of a planar landing.
+    /// Within the limits that decide: those of the legs.
     pub landed: bool,
     /// Also inside the landing paper's Table 2; `None` if that is not known.
     pub table_2: Option<bool>,

@@ -14,7 +14,6 @@
 //! * [`limits`]: what counts as a landing.
 //! * [`ending`]: how the flight ended, in words.
 //! * [`outcome`]: how the flight ended, judged by the limits of the legs and by the landing paper's Table 2.
-//! * [`plane`]: one flight of the landing paper's planar vehicle.
 
 pub mod dispersion;
 pub mod draw;
@@ -23,7 +22,6 @@ pub mod fault;
 pub mod limits;
 pub mod outcome;
 pub mod outside;
-pub mod plane;
 pub mod recipe;
 pub mod remote;
 pub mod sortie;

@@ -1,7 +1,7 @@
 //! Everything that a flight is made from. The same recipe and flight number give the same flight, bit for bit.
 
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use vehicles::file_error::FileError;
 use vehicles::mission::MissionError;
 

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use flight::computer::pilot::Sensed;
-use flight::computer::{Computer, Feeling, Input, Output};
+use flight::computer::{Computer, Input, Output};
 use flight::estimation::estimator::Measurements;
 use flight::rules::phase::Phase;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::outside::{Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -51,10 +51,9 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let frames = frames.0;
     let flown = phases(computer.clone(), frames.iter().copied());
     assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::AeroDescent]), "{flown:?}");
-    let Feeling::InSpace(Sensed::Measured(standing)) = frames[0].feeling else { panic!("measured") };
+    let Sensed::Measured(standing) = frames[0].sensed else { panic!("measured") };
     let standing = Measurements { gnss: None, ..standing };
-    let stood =
-        frames.iter().map(|frame| Input { feeling: Feeling::InSpace(Sensed::Measured(standing)), ..*frame });
+    let stood = frames.iter().map(|frame| Input { sensed: Sensed::Measured(standing), ..*frame });
     let told = phases(computer, stood);
     assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::AeroDescent), "{told:?}");
 }

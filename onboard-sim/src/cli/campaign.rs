@@ -17,7 +17,7 @@ use campaign::summary::to_text;
 use campaign::tally;
 use clap::{Args, Subcommand};
 use flight::guidance::baseline::Controller;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use protocol::log::build::build_info;
 use serde_json::json;
 use sha2::Digest as _;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use clap::Args;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use hil::computer::Counts;
 use hil::start::Pace;
 use protocol::identity::VEHICLE;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Args;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
@@ -15,10 +15,8 @@ use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::TimedFault;
-use sim::plane::DeadlinePolicy;
 use simulated_vehicle::fly::{
-    FlightEnd, FlightSummary, FlyOptions, LoadedFlight, OnTheWire, Speed, fly_observed, load_flight,
-    log_header,
+    FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed, load_flight,
 };
 use simulated_vehicle::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
@@ -30,8 +28,8 @@ pub(super) const WIND_MAX_M_S: f64 = 30.0;
 
 #[derive(Args)]
 pub(crate) struct FlyArguments {
-    /// Built-in profile or TOML file: paper profiles start at ignition, missions (mk2, mk3) where they say, or as --start says.
-    #[arg(long, default_value = "paper-calibrated", value_name = "NAME|FILE")]
+    /// Built-in mission or TOML file.
+    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
     profile: String,
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once.
@@ -66,19 +64,19 @@ pub(crate) struct FlyArguments {
     /// Seed of the dispersions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Missions: which flight of the seed, as in campaign --only.
-    #[arg(long, value_name = "NUMBER")]
-    flight: Option<u64>,
-    /// Missions: where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
+    /// Which flight of the seed, as in campaign --only.
+    #[arg(long, default_value_t = 0, value_name = "NUMBER")]
+    flight: u64,
+    /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Missions: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
     #[arg(long, value_name = "NAME|FILE")]
     dispersion: Option<String>,
-    /// Missions: mean wind 10 m above the ground, m/s, instead of the set's.
+    /// Mean wind 10 m above the ground, m/s, instead of the set's.
     #[arg(long, value_name = "M_S")]
     wind: Option<f64>,
-    /// Missions: break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
+    /// Break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<TimedFault>,
     /// Speed of simulated time: a factor, or max.
@@ -90,14 +88,11 @@ pub(crate) struct FlyArguments {
     /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
     #[arg(long)]
     stay: bool,
-    /// Missions: the flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
+    /// The flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
     /// folder, and speaks MAVLink on its own radio (onboard-sim/board/emulate). A frame that it decides otherwise ends the
     /// flight.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto_start"])]
     board: Option<PathBuf>,
-    /// Drop a controller output that took longer than one sample period, as hardware would.
-    #[arg(long)]
-    enforce_deadline: bool,
 }
 
 pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
@@ -106,30 +101,13 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 }
 
 impl FlyArguments {
-    /// Applies the options to a mission. A start at ignition has its dispersions in its profile.
-    fn choose(&self, profile: &mut LoadedFlight) -> anyhow::Result<()> {
-        let LoadedFlight::InSpace(flight) = profile else {
-            let given = [
-                (self.start.is_some(), "--start"),
-                (self.flight.is_some(), "--flight"),
-                (self.dispersion.is_some(), "--dispersion"),
-                (self.wind.is_some(), "--wind"),
-                (!self.faults.is_empty(), "--fault"),
-            ];
-            if let Some((_, option)) = given.iter().find(|(given, _)| *given) {
-                anyhow::bail!(
-                    "{option} is for missions; {} starts at ignition, and its dispersions are in its profile",
-                    profile.name()
-                );
-            }
-            return Ok(());
-        };
+    /// The flight that the options describe.
+    fn flight(&self) -> anyhow::Result<RocketFlight> {
+        let RocketFlight { mut recipe, .. } = load_flight(&self.profile)?;
         if let Some(start) = self.start {
-            **flight =
-                RocketFlight { recipe: flight.recipe.clone().starting_at(start)?, ..(**flight).clone() };
+            recipe = recipe.starting_at(start)?;
         }
-        let recipe = &mut flight.recipe;
-        flight.number = self.flight.unwrap_or(0);
+        recipe.seed = self.seed;
         if let Some(name) = &self.dispersion {
             recipe.dispersion_toml = text_of(name, dispersion::BUILTIN, "set of dispersions")?;
             recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, name)?;
@@ -145,20 +123,16 @@ impl FlyArguments {
             recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, &recipe.dispersion_name)?;
         }
         recipe.faults.clone_from(&self.faults);
-        Ok(())
+        Ok(RocketFlight { recipe, number: self.flight })
     }
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
-    let mut profile = load_flight(&arguments.profile)?;
-    arguments.choose(&mut profile)?;
+    let flight = arguments.flight()?;
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let recorder = match &arguments.log {
         None => None,
-        Some(path) => {
-            let header = log_header("onboard-sim", &profile, arguments.seed, unix_ns());
-            Some(Recorder::create(path, &header)?)
-        }
+        Some(path) => Some(Recorder::create(path, &flight.log_header("onboard-sim", unix_ns()))?),
     };
     let drawn = OnTheWire::drawn();
     let on_the_wire = OnTheWire {
@@ -168,21 +142,15 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     };
     let options = FlyOptions {
         on_the_wire,
-        profile,
+        flight,
         auto_start: arguments.auto_start || (arguments.mavlink.is_empty() && arguments.board.is_none()),
         system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,
         crew,
         recorder: recorder.clone(),
-        seed: arguments.seed,
         speed: arguments.speed,
         exit_when_safed: !arguments.stay,
-        deadline_policy: if arguments.enforce_deadline {
-            DeadlinePolicy::Enforce
-        } else {
-            DeadlinePolicy::Observe
-        },
         board: arguments.board,
         log_clock: None,
     };
@@ -246,7 +214,7 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
     let words = match event {
         VehicleEvent::Text { text, .. } => text.clone(),
         VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
-        VehicleEvent::Tick(_) | VehicleEvent::Planned { .. } | VehicleEvent::Verdict { .. } => return,
+        VehicleEvent::Planned { .. } | VehicleEvent::Verdict { .. } => return,
     };
     // A closed pipe must not end a flight.
     let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");
@@ -257,22 +225,15 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     if let (Some(judged), Some(verdict)) = (&summary.judged, &summary.verdict) {
         let boot_s = judged.impact.time_s;
         writeln!(out, "touchdown at T+{:.3} s, {boot_s:.3} s since power-up", verdict.time_s)?;
-        let in_space = !verdict.table_2.is_empty();
-        writeln!(
-            out,
-            "by {}:",
-            if in_space { "the limits of the legs" } else { "the landing paper's Table 2" }
-        )?;
+        writeln!(out, "by the limits of the legs:")?;
         print_limits(&mut out, &verdict.limits)?;
-        if in_space {
-            writeln!(out, "by the landing paper's Table 2:")?;
-            print_limits(&mut out, &verdict.table_2)?;
-        }
+        writeln!(out, "by the landing paper's Table 2:")?;
+        print_limits(&mut out, &verdict.table_2)?;
     }
     if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
         writeln!(
             out,
-            "controller ticks: median {:.3} ms, p99 {:.3} ms, worst {:.3} ms, {} over their deadline",
+            "plans: median {:.3} ms, p99 {:.3} ms, worst {:.3} ms, {} over their deadline",
             1e3 * median_s,
             1e3 * p99_s,
             1e3 * worst_s,

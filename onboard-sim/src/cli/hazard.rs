@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use campaign::figure::{Places, places_svg};
 use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, widest};
 use clap::Args;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;

@@ -18,7 +18,7 @@ use ::campaign::map::{self, Axis, Map, MapError};
 use ::campaign::run::threads;
 use anyhow::Context as _;
 use clap::Args;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
 use tempfile::NamedTempFile;

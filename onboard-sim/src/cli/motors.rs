@@ -15,7 +15,7 @@ use campaign::motors::source::{self, Candidate, Found};
 use campaign::motors::table;
 use clap::Args;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use hil::lockstep::Patience;
 use hil::start::Pace;
 use protocol::identity::Address;

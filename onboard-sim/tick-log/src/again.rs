@@ -2,15 +2,12 @@
 //! code.
 
 use flight::computer::pilot::PilotInput;
-use flight::computer::plane::PlaneError;
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Input, Output, flight_time_s};
 use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::Profile;
 use log_records::computer_v1::{ComputerFrame, ComputerInput};
 use log_records::flight_v1::{self, PilotStart};
-use log_records::v1;
 
 use crate::computer::{LoggedInput, frame_to_log, input_from_log};
 use crate::pilot::{self, PilotLogError, state_from_log, vector_from_log};
@@ -58,25 +55,17 @@ pub fn mission_flown(mission: Mission, start: &PilotStart) -> Mission {
 }
 
 impl RecordedComputer {
-    /// The computer of a rocket in space, at power-up. `mission` is the mission [as flown](mission_flown).
-    pub fn in_space(mission: &Mission, start: &PilotStart, controller: Controller) -> Self {
+    /// The computer at power-up. `mission` is the mission [as flown](mission_flown).
+    pub fn at_power_up(mission: &Mission, start: &PilotStart, controller: Controller) -> Self {
         let law = Law::of(controller, mission);
-        Self::of(Computer::in_space(mission, law, &state_from_log(&start.believed)))
-    }
-
-    /// The computer of the planar vehicle, at power-up.
-    ///
-    /// # Errors
-    /// The profile asks for something that this computer does not support.
-    pub fn in_plane(profile: &Profile, release: &v1::PlanarState) -> Result<Self, PlaneError> {
-        Computer::in_plane(profile, crate::state_from_log(release)).map(Self::of)
+        Self::of(Computer::at_power_up(mission, law, &state_from_log(&start.believed)))
     }
 
     /// The computer of a flight that was released at once, without a pad. Its frames are
     /// [in the air](Self::step_in_the_air).
     pub fn in_the_air(mission: &Mission, start: &PilotStart, controller: Controller) -> Self {
         let believed = state_from_log(&start.believed);
-        let computer = Computer::in_space(mission, Law::of(controller, mission), &believed);
+        let computer = Computer::at_power_up(mission, Law::of(controller, mission), &believed);
         let computer = match &start.gyro_bias_rad_s {
             Some(bias) => computer.standing(&believed, vector_from_log(bias)),
             None => computer,

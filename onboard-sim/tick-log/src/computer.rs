@@ -1,12 +1,10 @@
-//! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit. Both
-//! vehicles use the same records.
+//! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit.
 
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, People, Request};
 use flight::computer::pilot::Sensed;
-use flight::computer::plane::PlaneSensed;
-use flight::computer::{Commander, Computer, Feeling, Input, LogState, Output, Rehearsed};
+use flight::computer::{Commander, Computer, Input, LogState, Output, Rehearsed};
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::two_person::Station;
@@ -15,7 +13,6 @@ use log_records::computer_v1 as v1;
 use crate::pilot::{
     PilotLogError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
 };
-use crate::{state_from_log, state_to_log};
 
 /// Requests, by their number in the log.
 const ASKED: [Asked; 10] = [
@@ -68,20 +65,15 @@ pub fn frame_to_log(
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-    let (mut measured, mut known, mut in_plane) = (None, None, None);
-    match &input.feeling {
-        Feeling::InSpace(Sensed::Measured(measurements)) => {
-            measured = Some(measurements_to_log(measurements));
-        }
-        Feeling::InSpace(Sensed::Known(estimate)) => known = Some(estimate_to_log(estimate)),
-        Feeling::InPlane(sensed) => in_plane = Some(plane_to_log(sensed)),
-    }
+    let (measured, known) = match &input.sensed {
+        Sensed::Measured(measurements) => (Some(measurements_to_log(measurements)), None),
+        Sensed::Known(estimate) => (None, Some(estimate_to_log(estimate))),
+    };
     v1::ComputerInput {
         frame: input.frame,
         time_s: input.time_s,
         measured,
         known,
-        in_plane,
         gimbal_rad: input.gimbal_rad.to_vec(),
         fins_rad: input.fins_rad.to_vec(),
         contact: input.contact,
@@ -98,7 +90,6 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
             lands: rehearsed.landing.as_ref().map(|landing| landing.lands),
             landing_found: rehearsed.landing.as_ref().map(|landing| landing.found.clone()),
         }),
-        late: input.late,
         booster_attached: input.booster_attached.then_some(true),
         people: input.people.map(people_to_log),
         battery_v: input.battery_v,
@@ -111,19 +102,16 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// This build does not know some value of it.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLogError> {
     let frame = input.frame;
-    let feeling = match (&input.measured, &input.known, &input.in_plane) {
-        (Some(measurements), None, None) => {
-            Feeling::InSpace(Sensed::Measured(measurements_from_log(measurements)))
-        }
-        (None, Some(estimate), None) => Feeling::InSpace(Sensed::Known(estimate_from_log(estimate, frame)?)),
-        (None, None, Some(sensed)) => Feeling::InPlane(plane_from_log(sensed)),
+    let sensed = match (&input.measured, &input.known) {
+        (Some(measurements), None) => Sensed::Measured(measurements_from_log(measurements)),
+        (None, Some(estimate)) => Sensed::Known(estimate_from_log(estimate, frame)?),
         _ => return Err(PilotLogError::Sensed { frame }),
     };
     let commander = input.commander.as_ref().map(|commander| commander_from_log(commander, frame));
     let rest = Input {
         frame,
         time_s: input.time_s,
-        feeling,
+        sensed,
         gimbal_rad: list(&input.gimbal_rad, frame, "gimbal angles")?,
         fins_rad: list(&input.fins_rad, frame, "fin angles")?,
         contact: input.contact,
@@ -135,7 +123,6 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLog
         commander: commander.transpose()?,
         requests: &[],
         rehearsed: None,
-        late: input.late,
         booster_attached: input.booster_attached.unwrap_or(false),
         people: input.people.as_ref().map(|people| people_from_log(people, frame)).transpose()?,
     };
@@ -181,26 +168,6 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
         answers: output.answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
         ignite_booster: output.commands.booster.ignite.then_some(true),
         separate_booster: output.commands.booster.separate.then_some(true),
-    }
-}
-
-fn plane_to_log(sensed: &PlaneSensed) -> v1::PlaneSensed {
-    v1::PlaneSensed {
-        state: state_to_log(&sensed.state),
-        axial_specific_force_m_s2: sensed.axial_specific_force_m_s2,
-        gimbal_rad: sensed.gimbal_rad,
-        thrust_n: sensed.thrust_n,
-        thrust_below_weight: sensed.thrust_below_weight,
-    }
-}
-
-fn plane_from_log(sensed: &v1::PlaneSensed) -> PlaneSensed {
-    PlaneSensed {
-        state: state_from_log(&sensed.state),
-        axial_specific_force_m_s2: sensed.axial_specific_force_m_s2,
-        gimbal_rad: sensed.gimbal_rad,
-        thrust_n: sensed.thrust_n,
-        thrust_below_weight: sensed.thrust_below_weight,
     }
 }
 
@@ -335,6 +302,8 @@ fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, PilotLogError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flight::estimation::estimator::{ImuSample, Measurements};
+    use nalgebra::Vector3;
     use proptest::prelude::*;
     use prost::Message as _;
 
@@ -397,19 +366,14 @@ mod tests {
             rehearsed: Option<(bool, String, Option<(bool, String)>)>,
         ) {
             let number = |place: usize| numbers[place];
-            let sensed = PlaneSensed {
-                state: flight::vehicle::dynamics::PlanarState {
-                    x_m: number(0),
-                    z_m: number(1),
-                    theta_rad: number(2),
-                    u_m_s: number(3),
-                    w_m_s: number(4),
-                    q_rad_s: number(5),
+            let measured = Measurements {
+                imu: ImuSample {
+                    gyro_rad_s: Vector3::new(number(0), number(1), number(2)),
+                    specific_force_m_s2: Vector3::new(number(3), number(4), number(5)),
                 },
-                axial_specific_force_m_s2: number(6),
-                gimbal_rad: number(7),
-                thrust_n: number(8),
-                thrust_below_weight: flags[0],
+                pressure_altitude_m: flags[0].then_some(number(6)),
+                gnss: None,
+                lidar_range_m: flags[5].then_some(number(7)),
             };
             let rehearsed = rehearsed.map(|(warm, found, landing)| Rehearsed {
                 warm,
@@ -419,7 +383,7 @@ mod tests {
             let input = Input {
                 frame,
                 time_s: number(9),
-                feeling: Feeling::InPlane(sensed),
+                sensed: Sensed::Measured(measured),
                 gimbal_rad: [number(10), number(11)],
                 fins_rad: [12, 13, 14, 15].map(number),
                 contact: flags[1],
@@ -432,7 +396,6 @@ mod tests {
                 people,
                 requests: &requests,
                 rehearsed: rehearsed.as_ref(),
-                late: flags[5],
                 booster_attached: flags[6],
             };
             let bytes = input_to_log(&input).encode_to_vec();
@@ -451,10 +414,9 @@ mod tests {
 
     #[test]
     fn an_unknown_value_is_refused_with_the_number_of_its_frame() {
-        let sensed = v1::PlaneSensed::default();
         let input = v1::ComputerInput {
             frame: 7,
-            in_plane: Some(sensed),
+            measured: Some(log_records::flight_v1::Measurements::default()),
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
             requests: vec![v1::Request { asked: 10, ..v1::Request::default() }],

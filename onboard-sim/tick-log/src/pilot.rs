@@ -5,7 +5,7 @@ use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
 use flight::estimation::motor_estimate::MotorEstimate;
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
 use log_records::flight_v1 as v1;
@@ -36,9 +36,7 @@ pub enum PilotLogError {
         should: usize,
     },
     /// Neither measurements nor a known state, or both.
-    #[error(
-        "frame {frame}: needs measurements, a known state or what the planar vehicle senses, and one of them only"
-    )]
+    #[error("frame {frame}: needs measurements or a known state, and one of them only")]
     Sensed { frame: u64 },
 }
 

@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use flight::guidance::baseline::Controller;
 use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
-use flight::vehicle::profile::StartPoint;
+use flight::rules::verdict::LandingVerdict;
+use flight::vehicle::dynamics::PlanarState;
+use flight::vehicle::mission::StartPoint;
 use nalgebra::Vector3;
 use protocol::log::flight_v1::{Estimate, PilotStart, TruthSample};
 use protocol::log::record::{Event, EventLevel, Record};
@@ -143,7 +145,7 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
     let both = Limits::of(flight.mission());
-    let mut limits = crate::plant::limits_to_log(&both.by_legs(touchdown).1);
+    let mut limits = limits_to_log(&both.by_legs(touchdown).1);
     let of_legs = [Failure::Vertical, Failure::Lateral, Failure::Tilt, Failure::Rate];
     if let Some(failure) = outcome.failure.filter(|failure| !of_legs.contains(failure)) {
         limits.push(v1::LimitResult {
@@ -158,19 +160,34 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let aborted = flight.computer().mode().interlocks.abort_latched;
     Some(v1::LandingVerdict {
         time_s: touchdown.time_s,
-        state: crate::state_to_log(&in_world_plane(flight, touchdown)),
+        state: in_world_plane(flight, touchdown),
         limits,
         landed: outcome.legs,
-        table_2: crate::plant::limits_to_log(&both.by_table_2(touchdown).1),
+        table_2: limits_to_log(&both.by_table_2(touchdown).1),
         ending: Some(outcome.ending(aborted).to_string()),
     })
 }
 
 /// The state at contact in the world's x-z plane.
-fn in_world_plane(flight: &Sortie, touchdown: &Touchdown) -> flight::vehicle::dynamics::PlanarState {
+fn in_world_plane(flight: &Sortie, touchdown: &Touchdown) -> v1::PlanarState {
     let nil = Vector3::zeros();
     let feet_below_cg_m = flight.world().cg_above_feet_m();
-    Plane::choose(&nil, &nil, &nil).project(&touchdown.state, feet_below_cg_m, 0.0)
+    let PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s } =
+        Plane::choose(&nil, &nil, &nil).project(&touchdown.state, feet_below_cg_m, 0.0);
+    v1::PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s }
+}
+
+/// Each limit with its result, as records.
+fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
+    let limits = verdict.results.iter().map(|result| v1::LimitResult {
+        name: result.name.to_owned(),
+        value: result.value,
+        minimum: result.lowest,
+        maximum: result.highest,
+        unit: result.unit.to_owned(),
+        passed: result.passed,
+    });
+    limits.collect()
 }
 
 /// The controller that flew the landing burn of a recorded flight; the pilot itself if the log does not say.

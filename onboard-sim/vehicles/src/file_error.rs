@@ -5,7 +5,7 @@ use alloc::string::{String, ToString as _};
 
 use super::ranges::BadValue;
 
-/// Why a mission or a profile cannot be used.
+/// Why a mission cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FileError {
     /// The text is not TOML of the expected shape: a missing, misspelt or mistyped key.

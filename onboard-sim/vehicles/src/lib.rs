@@ -1,14 +1,13 @@
-//! Reads mission, airframe, profile and motor files into the plain types of [`flight`].
+//! Reads mission, airframe and motor files into the plain types of [`flight`].
 //!
 //! Each module reads one kind of file and knows the built-in files by name. Its errors name the wrong key or line and
 //! the accepted values.
 //!
-//! * [`mission`]: missions that start at apogee, from TOML.
+//! * [`mission`]: missions, from TOML.
 //! * [`airframe`]: airframes, from TOML.
 //! * [`motors`]: the built-in motors, by name.
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
-//! * [`profile`]: profiles of planar landings, from TOML.
-//! * [`file_error`]: why a mission or a profile cannot be used.
+//! * [`file_error`]: why a mission cannot be used.
 
 // The unit tests of `flight` compile these files as one of their modules, which cannot say this.
 #![cfg_attr(not(test), no_std)]
@@ -21,6 +20,5 @@ pub mod airframe;
 pub mod file_error;
 pub mod mission;
 pub mod motors;
-pub mod profile;
 mod ranges;
 pub mod thrust_curve;

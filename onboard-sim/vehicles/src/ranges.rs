@@ -6,7 +6,7 @@ use alloc::string::{String, ToString as _};
 use core::fmt::Display;
 
 use flight::vehicle::airframe;
-use flight::vehicle::profile::{
+use flight::vehicle::mission::{
     ArmingLimits, FinalBox, GateLimits, SolverLimits, StateWeights, TouchdownBox,
 };
 
@@ -34,10 +34,6 @@ pub(super) fn require(
     required: &'static str,
 ) -> Check {
     if ok { Ok(()) } else { Err(BadValue { key: key.into(), found: found.to_string(), required }) }
-}
-
-pub(super) fn finite(key: impl Into<String>, value: f64) -> Check {
-    require(value.is_finite(), key, value, "a finite number")
 }
 
 pub(super) fn positive(key: impl Into<String>, value: f64) -> Check {

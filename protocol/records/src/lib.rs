@@ -1,8 +1,8 @@
 //! The records of the flight log, as plain types: generated from `proto/touchdown/`. Without `std`, so that a flight
 //! computer on a board reads and writes the same records.
 //!
-//! * [`v1`]: the planar vehicle's controller, the verdict, telemetry, operators.
-//! * [`flight_v1`]: the pilot of a rocket in space, and the simulated truth.
+//! * [`v1`]: the verdict, telemetry, operators.
+//! * [`flight_v1`]: the pilot, and the simulated truth.
 //! * [`computer_v1`]: the whole flight computer, from power-up on.
 #![no_std]
 

@@ -47,10 +47,6 @@ pub enum EventLevel {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Record {
-    /// `/controller/tick`.
-    ControllerTick(Box<v1::ControllerTick>),
-    /// `/vehicle/truth`, and with it `/tf`: the same pose as a transform from `world` to `rocket`.
-    PlantTruth(Box<v1::PlantTruth>),
     /// `/verdict`.
     LandingVerdict(Box<v1::LandingVerdict>),
     /// `/telemetry`.
@@ -77,13 +73,10 @@ pub enum Record {
     PilotTiming(flight_v1::PilotTiming),
     /// `/pilot/estimate`.
     Estimate(Box<flight_v1::Estimate>),
-    /// `/vehicle/truth3d`, and with it `/tf`.
+    /// `/vehicle/truth3d`, and with it `/tf`: the same pose as a transform from `world` to `rocket`.
     TruthSample(Box<flight_v1::TruthSample>),
 }
 
-pub const TOPIC_CONTROLLER_TICK: &str = "/controller/tick";
-/// Topic of the simulated plant's truth.
-pub const TOPIC_PLANT_TRUTH: &str = "/vehicle/truth";
 /// Topic of the landing verdict.
 pub const TOPIC_VERDICT: &str = "/verdict";
 /// Topic of a ground station's decoded telemetry.
@@ -138,26 +131,9 @@ pub const ATTACHMENT_SCENARIO: &str = "scenario.toml";
 /// Name of the attachment with the dialect.
 pub const ATTACHMENT_DIALECT: &str = "touchdown.xml";
 
-/// Converts the pose of the plant into a Foxglove transform. World: x north, y west, z up; the rocket's x axis points
-/// to its nose. A pitch of `theta` from the horizontal is a rotation of `-theta` about y.
-pub(super) fn transform(truth: &v1::PlantTruth, time_ns: u64) -> FrameTransform {
-    let half = -truth.state.theta_rad / 2.0;
-    FrameTransform {
-        timestamp: Some(timestamp(time_ns)),
-        parent_frame_id: "world".to_owned(),
-        child_frame_id: "rocket".to_owned(),
-        translation: Some(foxglove::messages::Vector3 { x: truth.state.x_m, y: 0.0, z: truth.state.z_m }),
-        rotation: Some(foxglove::messages::Quaternion {
-            x: 0.0,
-            y: display_sin(half),
-            z: 0.0,
-            w: display_cos(half),
-        }),
-    }
-}
-
-/// Converts the pose of the vehicle in space into a Foxglove transform, in the same frames.
-pub(super) fn transform_in_space(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTransform {
+/// Converts the pose of the vehicle into a Foxglove transform. World: x north, y west, z up; the rocket's x axis points
+/// to its nose.
+pub(super) fn transform(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTransform {
     let (place, turn) = (&truth.state.position_m, &truth.state.world_from_body);
     FrameTransform {
         timestamp: Some(timestamp(time_ns)),
@@ -189,14 +165,4 @@ pub(super) fn log_message(event: &Event, time_ns: u64) -> Log {
 fn timestamp(time_ns: u64) -> foxglove::messages::Timestamp {
     let seconds = u32::try_from(time_ns / 1_000_000_000).unwrap_or(u32::MAX);
     foxglove::messages::Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
-}
-
-#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
-fn display_sin(angle_rad: f64) -> f64 {
-    angle_rad.sin()
-}
-
-#[expect(clippy::disallowed_methods, reason = "for a picture only; nothing decides by it")]
-fn display_cos(angle_rad: f64) -> f64 {
-    angle_rad.cos()
 }

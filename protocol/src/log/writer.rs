@@ -11,12 +11,11 @@ use super::build::build_info;
 use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
     METADATA_RUN, METADATA_SCHEMA, RawFrame, Record, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY, TOPIC_BOOK,
-    TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_CONTROLLER_TICK, TOPIC_ESTIMATE,
-    TOPIC_EVENTS, TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_PLANT_TRUTH,
-    TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
-    log_message, transform, transform_in_space,
+    TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_EVENTS,
+    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX,
+    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
 };
-use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, v1};
+use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
 use crate::dialect::DIALECT_XML;
 
 /// The messages of `touchdown/log/v1.proto`.
@@ -128,18 +127,6 @@ impl<W: Write + Seek> LogWriter<W> {
     pub fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), LogWriteError> {
         let log_time = self.start_unix_ns.saturating_add(time_ns);
         match record {
-            Record::ControllerTick(tick) => {
-                self.write_message(TOPIC_CONTROLLER_TICK, (LOG, "ControllerTick"), tick.as_ref(), log_time)
-            }
-            Record::PlantTruth(truth) => {
-                self.write_message(TOPIC_PLANT_TRUTH, (LOG, "PlantTruth"), truth.as_ref(), log_time)?;
-                self.write_foxglove(
-                    TOPIC_TRANSFORM,
-                    &transform(truth, log_time),
-                    FrameTransform::get_schema().as_ref(),
-                    log_time,
-                )
-            }
             Record::LandingVerdict(verdict) => {
                 self.write_message(TOPIC_VERDICT, (LOG, "LandingVerdict"), verdict.as_ref(), log_time)
             }
@@ -179,7 +166,7 @@ impl<W: Write + Seek> LogWriter<W> {
                 self.write_message(TOPIC_TRUTH_SAMPLE, (FLIGHT, "TruthSample"), truth.as_ref(), log_time)?;
                 self.write_foxglove(
                     TOPIC_TRANSFORM,
-                    &transform_in_space(truth, log_time),
+                    &transform(truth, log_time),
                     FrameTransform::get_schema().as_ref(),
                     log_time,
                 )
@@ -329,9 +316,3 @@ pub fn ending() -> Vec<u8> {
 
 const RAW_FRAME_SCHEMA: &[u8] =
     b"One whole MAVLink frame, start marker to signature. Definitions: the attached dialect and its includes.";
-
-impl From<v1::ControllerTick> for Record {
-    fn from(tick: v1::ControllerTick) -> Self {
-        Self::ControllerTick(Box::new(tick))
-    }
-}

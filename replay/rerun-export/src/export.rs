@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use protocol::log::flight_v1::{PilotTick, TruthSample};
 use protocol::log::v1::{LandingVerdict as RecordedVerdict, Telemetry};
 use replay::log::{Entry, FlightLog, StampedEntry};

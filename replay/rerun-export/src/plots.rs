@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
 use protocol::log::v1::Telemetry;

@@ -5,7 +5,7 @@
 
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::estimation::estimator::Estimate;
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::{Plane, PoweredReport};
 use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::Plane;
 use flight::vehicle::dynamics::PlanarState;
 use nalgebra::Vector3;

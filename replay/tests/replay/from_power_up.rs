@@ -9,7 +9,7 @@ use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
@@ -77,7 +77,7 @@ fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
     let header = tick_log::sortie::header("test", &recipe, 0, 0);
-    (Vehicle::in_space(&RocketFlight { recipe, number: 0 }).unwrap(), header)
+    (Vehicle::on_the_pad(&RocketFlight { recipe, number: 0 }).unwrap(), header)
 }
 
 /// A flight with its log.

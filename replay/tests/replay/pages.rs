@@ -1,6 +1,6 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use quick_xml::events::Event as Xml;
 use replay::report::{report, report_with};
 

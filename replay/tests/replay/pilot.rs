@@ -43,7 +43,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -1.2),
         rate_rad_s: Vector3::zeros(),
     };
-    let mut computer = Computer::in_space(&mission, Law::Nmpc, &believed).released();
+    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released();
     let mut ticks = Vec::new();
     for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
         if frame == DEAD.end() + 1 {

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;
-use simulated_vehicle::fly::{DeadlinePolicy, FlyOptions, OnTheWire, Speed, fly, load_flight, log_header};
+use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
 use tempfile::TempDir;
 use tokio::sync::watch;
 
@@ -51,19 +51,18 @@ impl Simulated {
 pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simulated {
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("flight.mcap");
-    let profile = load_flight(profile).unwrap();
-    let recorder = Recorder::create(&log, &log_header("onboard-sim", &profile, seed, START_UNIX_NS)).unwrap();
+    let mut flight = load_flight(profile).unwrap();
+    flight.recipe.seed = seed;
+    let recorder = Recorder::create(&log, &flight.log_header("onboard-sim", START_UNIX_NS)).unwrap();
     let options = FlyOptions {
         system_id: 1,
-        profile,
+        flight,
         links: links.to_vec(),
         on_the_wire: OnTheWire { boot_number: NonZeroU32::MIN, ..OnTheWire::drawn() },
         recorder: Some(recorder.clone()),
-        seed,
         speed: Speed::Max,
         auto_start: true,
         exit_when_safed: true,
-        deadline_policy: DeadlinePolicy::Observe,
         board: None,
         log_clock: None,
         key_file: None,

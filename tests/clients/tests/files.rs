@@ -7,7 +7,7 @@ use clients::{MAVSDK_NATIVE, PYMAVLINK, PythonPackages, file};
 use e2e::{Bound, Running, Signal, expect_identical_replay, landed_vehicle, unshared_address};
 
 /// A short log: the landing alone.
-const PROFILE: &str = "paper-calibrated";
+const PROFILE: &str = "mk2";
 
 fn script(packages: &PythonPackages, name: &str) -> Command {
     let mut command = packages.python();

@@ -10,7 +10,7 @@ use e2e::{Bound, Ended, Program, Running, program};
 use flight::estimation::estimator::StartUncertainty;
 use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use protocol::mission::MissionHash;
 use serde_json::{Value, json};

@@ -7,7 +7,7 @@
 use core::fmt;
 
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
 use sim::recipe::Recipe;

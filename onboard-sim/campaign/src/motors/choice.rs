@@ -8,13 +8,13 @@ use core::convert::Infallible;
 use flight::vehicle::airframe::{BadValue, Mass};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::recipe::Recipe;
 
-use crate::statistics::golden_section;
 use super::frame::{Ballast, Frame, start_height_m};
 use super::window::{Fall, Onset, Window};
+use crate::statistics::golden_section;
 
 /// What a team can change.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@
 
 use flight::vehicle::airframe::{Airframe, BadValue, Mass, MassModel};
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use toml::{Table, Value};
 

@@ -3,7 +3,7 @@
 use core::fmt::{self, Write};
 
 use flight::vehicle::atmosphere::Air;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use sim::dispersion::may_be_kinder;
 
 use super::card::{Card, Hazard};

@@ -1,7 +1,7 @@
 //! The consequence for the vehicle if the crew aborted now.
 
-use super::{Computer, Vehicle};
-use crate::guidance::controller::ControlLevel;
+use super::Computer;
+use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Event, Phase, transition};
 
 /// What an abort would do now.
@@ -31,29 +31,20 @@ pub enum AbortEffect {
 impl Computer {
     /// The event that an abort would be now, from the findings of the last frame.
     pub(super) fn abort_event(&self) -> Event {
-        match &self.vehicle {
-            Vehicle::Plane(plane) => plane.abort_event(&self.table, self.igniter_continuity),
-            Vehicle::Space(space) if self.release.is_some() => {
-                space.pilot.abort_event(self.table.mode(), space.last.as_ref().map(|(input, _)| input))
-            }
-            Vehicle::Space(_) => Event::AbortRequested { above_commit_height: false, gate_open: false },
+        if self.release.is_none() {
+            return Event::AbortRequested { above_commit_height: false, gate_open: false };
         }
+        self.pilot.abort_event(self.table.mode(), self.flown.as_ref().map(|(input, _)| input))
     }
 
     /// Whether a landing under thrust can be planned; true until the first attempt.
     fn plans_a_landing(&self) -> bool {
-        match &self.vehicle {
-            Vehicle::Plane(plane) => plane.plans_a_landing(),
-            Vehicle::Space(space) => space.pilot.report().level != ControlLevel::Stabiliser,
-        }
+        self.pilot.report().level != ControlLevel::Stabiliser
     }
 
     /// Speed at the ground after a fall from here without thrust, m/s, falling positive.
     fn impact_m_s(&self) -> f64 {
-        match &self.vehicle {
-            Vehicle::Plane(plane) => plane.impact_m_s(),
-            Vehicle::Space(space) => space.pilot.impact_m_s().unwrap_or(0.0),
-        }
+        self.pilot.impact_m_s().unwrap_or(0.0)
     }
 
     /// What an abort would do now. The phase table itself is asked, so the text beside the abort key cannot differ from

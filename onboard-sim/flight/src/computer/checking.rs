@@ -8,7 +8,7 @@ use super::news::Severity;
 use super::pad::as_measured;
 use super::pad_check::{CheckState, PadCheck, PadSwitches, Seen};
 use super::self_test::SelfTest;
-use super::{Computer, Feeling, Input, Vehicle};
+use super::{Computer, Input};
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
 
@@ -23,7 +23,6 @@ impl Computer {
         let mode = self.table.mode();
         let locks = mode.interlocks;
         let reason = match mode.phase {
-            _ if matches!(self.vehicle, Vehicle::Plane(_)) => "only a rocket in space checks itself",
             _ if locks.abort_latched => "an abort is latched: restart to clear it",
             _ if self.release.is_some() || !mode.phase.on_pad() => "not on the pad",
             _ if locks.armed || mode.countdown_end_s.is_some() => "armed: disarm first",
@@ -43,9 +42,7 @@ impl Computer {
             return Answer::ACCEPTED;
         }
         let moves = asked == Asked::Check;
-        if let Vehicle::Space(space) = &self.vehicle {
-            self.pad_check.begin(&space.pilot.mission().airframe, moves, by);
-        }
+        self.pad_check.begin(&self.pilot.mission().airframe, moves, by);
         let who = by.map_or_else(String::new, |by| format!("{by}: "));
         let what = if moves { "gimbal and fins MOVE" } else { "nothing moves" };
         self.table.say(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
@@ -76,13 +73,10 @@ impl Computer {
             self.end_check(&reason);
             return;
         }
-        let (Vehicle::Space(space), Feeling::InSpace(sensed)) = (&self.vehicle, &input.feeling) else {
-            return;
-        };
         let ([pitch_rad, yaw_rad], [one, two, three, four]) = (input.gimbal_rad, input.fins_rad);
         let seen = Seen {
             surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
-            measured: &as_measured(sensed),
+            measured: &as_measured(&input.sensed),
             switches: PadSwitches {
                 igniter_continuity: self.igniter_continuity,
                 booster_attached: self.booster_attached,
@@ -92,7 +86,7 @@ impl Computer {
                 log_space_bytes: self.log.space_bytes,
             },
         };
-        let told = self.pad_check.step(&seen, space.pilot.mission(), &self.arming);
+        let told = self.pad_check.step(&seen, self.pilot.mission(), &self.arming);
         self.rest_surfaces();
         match told {
             Some((surface @ 0..2, angle_rad)) => self.commands.gimbal_rad[surface] = angle_rad,

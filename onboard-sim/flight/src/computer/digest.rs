@@ -2,10 +2,9 @@
 
 use super::pad_check::PadCheck;
 use super::self_test::SelfTest;
-use super::{Commands, Computer, CrewMemory, LogState, Release, Vehicle};
+use super::{Commands, Computer, CrewMemory, LogState, Release};
 use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::computer::pilot::BoosterCommands;
-use crate::guidance::controller::ControllerState;
 use crate::rules::operator::Operator;
 use crate::rules::phase::{Hold, HoldCause, Interlocks, Mode, Motor, MotorStatus};
 use crate::rules::two_person::{Ask, Station, Tapping};
@@ -28,9 +27,7 @@ impl Remembers for InTheAir<'_> {
         } = mode.interlocks;
         [landing_motor_inhibited, abort_latched, no_light_latched, lands_here].remember(memory);
         stage(mode.motor).remember(memory);
-        if let Vehicle::Space(space) = &self.0.vehicle {
-            space.pilot.remember(memory);
-        }
+        self.0.pilot.remember(memory);
     }
 }
 
@@ -122,29 +119,20 @@ impl Remembers for Mode {
     }
 }
 
-impl Remembers for ControllerState {
-    fn remember(&self, memory: &mut Memory) {
-        self.digest().remember(memory);
-    }
-}
-
-impl Remembers for Vehicle {
-    fn remember(&self, memory: &mut Memory) {
-        match self {
-            Self::Space(space) => space.remember(memory),
-            Self::Plane(plane) => plane.remember(memory),
-        }
-    }
-}
-
-/// The whole memory. Time, frame, uplink, battery and booster wire come with each input; limits and the length of the countdown never change.
+/// The whole memory. Law and first state are constants of the flight; the last frame in the air came with its input, and its
+/// decisions are compared as output. Time, frame, uplink, battery and booster wire come with each input; limits and the length of the countdown never change.
 struct Whole<'a>(&'a Computer);
 
 impl Remembers for Whole<'_> {
     fn remember(&self, memory: &mut Memory) {
         let Computer {
             table,
-            vehicle,
+            pad,
+            pilot,
+            law: _,
+            believed: _,
+            flown: _,
+            gate_told,
             frame: _,
             arming: _,
             countdown_s: _,
@@ -167,7 +155,9 @@ impl Remembers for Whole<'_> {
             level,
         } = self.0;
         table.mode().remember(memory);
-        vehicle.remember(memory);
+        pad.remember(memory);
+        pilot.remember(memory);
+        gate_told.remember(memory);
         commands.remember(memory);
         self_test.remember(memory);
         readiness.remember(memory);

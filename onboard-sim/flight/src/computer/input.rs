@@ -4,7 +4,6 @@ use alloc::string::String;
 
 use super::crew::{Asked, People, Request};
 use super::pilot::{PilotInput, Sensed};
-use super::plane::PlaneSensed;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::two_person::Station;
@@ -33,16 +32,6 @@ pub struct Rehearsed {
     pub landing: Option<PredictedLanding>,
 }
 
-/// The sensor readings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "plain data, one a frame")]
-pub enum Feeling {
-    /// Of a rocket in space.
-    InSpace(Sensed),
-    /// Of the planar vehicle.
-    InPlane(PlaneSensed),
-}
-
 /// The station that armed the vehicle, and how long ago it was last heard, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Commander {
@@ -59,7 +48,7 @@ pub struct Input<'a> {
     pub frame: u64,
     /// Vehicle time at its end, s.
     pub time_s: f64,
-    pub feeling: Feeling,
+    pub sensed: Sensed,
     /// Where the gimbal is (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Where the fins are, rad.
@@ -81,10 +70,8 @@ pub struct Input<'a> {
     pub people: Option<People>,
     /// Requests since the last frame, in order.
     pub requests: &'a [Request],
-    /// Result of the rehearsal, once it is over. The planar vehicle rehearses on board.
+    /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
-    /// The planar vehicle's last tick came too late to be applied.
-    pub late: bool,
 }
 
 impl Input<'_> {
@@ -101,7 +88,7 @@ impl Input<'_> {
         Self {
             frame: input.frame,
             time_s: input.time_s,
-            feeling: Feeling::InSpace(input.sensed),
+            sensed: input.sensed,
             gimbal_rad: [0.0; 2],
             fins_rad: input.fins_rad,
             contact: input.contact,
@@ -115,7 +102,6 @@ impl Input<'_> {
             people: None,
             requests: if input.abort { &ABORT } else { &[] },
             rehearsed: None,
-            late: false,
         }
     }
 }

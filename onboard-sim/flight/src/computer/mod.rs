@@ -9,8 +9,7 @@
 //! * [`news`], `motor_watch`: the computer's messages to the crew.
 //! * [`pad_check`], `checking`: the check that the crew asks for on the pad.
 //! * [`pad`], `self_test`, `readiness`, `on_the_pad`: from power-up to the release.
-//! * [`pilot`]: flies a rocket in space from its release.
-//! * [`plane`]: the landing paper's planar vehicle.
+//! * [`pilot`]: flies the rocket from its release.
 //! * `start`: power-up, and starting from a recorded moment.
 //! * [`saved`]: what is kept through a reset, and going on from it.
 //! * `abort_effect`: what an abort would do now.
@@ -29,12 +28,10 @@ mod output;
 pub mod pad;
 pub mod pad_check;
 pub mod pilot;
-pub mod plane;
 mod readiness;
 mod requests;
 pub mod saved;
 mod self_test;
-mod space;
 mod start;
 pub mod table;
 
@@ -45,26 +42,26 @@ use serde::{Deserialize, Serialize};
 
 pub use self::abort_effect::AbortEffect;
 use self::crew::{Answer, People};
-pub use self::input::{Commander, Feeling, Input, LogState, Rehearsed};
+pub use self::input::{Commander, Input, LogState, Rehearsed};
 use self::motor_watch::MotorWatch;
 use self::news::{Readiness, Severity};
 pub use self::output::{Commands, Output};
+use self::pad::PadWatch;
 use self::pad_check::PadCheck;
-use self::plane::{PlanarTick, Plane};
 pub use self::requests::CrewMemory;
 use self::self_test::{ANSWERING_RAD, SelfTest};
-use self::space::Space;
 use self::table::PhaseTable;
 use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
-use crate::guidance::controller::ControlLevel;
-use crate::guidance::powered::LandingSolved;
+use crate::guidance::baseline::Law;
+use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::Uplink;
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
-use crate::vehicle::profile::ArmingLimits;
+use crate::vehicle::mission::ArmingLimits;
+use crate::vehicle::rigid::RigidState;
 
-/// Frame length of a rocket in space, ms.
+/// Frame length, ms.
 pub const FRAME_MS: u32 = 5;
-/// Frame length of a rocket in space, s.
+/// Frame length, s.
 pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 pub const AT_REST_S: f64 = 1.0;
@@ -76,18 +73,21 @@ struct Release {
     time_s: f64,
 }
 
-/// The vehicle being flown.
-#[derive(Debug, Clone)]
-enum Vehicle {
-    Space(Box<Space>),
-    Plane(Box<Plane>),
-}
-
 /// The flight computer and everything that it remembers.
 #[derive(Debug, Clone)]
 pub struct Computer {
     table: PhaseTable,
-    vehicle: Vehicle,
+    /// The wait on the pad.
+    pad: PadWatch,
+    /// Flies from the release on.
+    pilot: Box<Pilot>,
+    /// The law and the state at power-up, to power up again.
+    law: Law,
+    believed: RigidState,
+    /// The pilot's last frame in the air.
+    flown: Option<(PilotInput, PilotOutput)>,
+    /// The gate check that the crew was last told of.
+    gate_told: Option<&'static str>,
     frame: u64,
     arming: ArmingLimits,
     countdown_s: f64,
@@ -111,36 +111,47 @@ pub struct Computer {
 }
 
 impl Computer {
-    /// One frame.
+    /// One frame: note the input, answer the crew, watch over the countdown, fly or wait on the pad, keep the time, report.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         self.frame = input.frame;
         self.table.begin(input.time_s);
         self.take_note(input);
-        self.feel(input);
+        if self.table.mode().phase.on_pad() {
+            self.pad.feel(&input.sensed);
+        }
         let asked: Vec<Option<Answer>> = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
         let abort = asked.iter().any(Option::is_none);
-        let mut output = self.decide(input, abort);
+        let released_before = self.release;
+        let planned = match released_before {
+            Some(release) => self.fly(input, release, abort),
+            None => {
+                self.wait_on_the_pad(input);
+                false
+            }
+        };
+        let mode = self.table.mode();
+        self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;
+        self.commands.parachute = mode.phase == Phase::Chute;
         self.keep_time();
-        output.answers =
-            asked.into_iter().map(|answer| answer.unwrap_or_else(|| self.abort_answer())).collect();
-        output.news = self.table.take_news();
-        output
+        let answers = asked.into_iter().map(|answer| answer.unwrap_or_else(|| self.abort_answer())).collect();
+        Output {
+            commands: self.commands,
+            released: released_before.is_none() && self.release.is_some(),
+            answers,
+            news: self.table.take_news(),
+            planned,
+        }
     }
 
-    /// One frame. Also returns the landing that a rocket's pilot plans in it, solved separately; `None` if it plans
-    /// none.
+    /// One frame. Also returns the landing that the pilot plans in it, solved separately; `None` if it plans none.
     pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
-        let before = self.pilot().cloned();
+        let before = self.pilot.clone();
         let output = self.step(input);
-        let solved = match (&before, &self.vehicle) {
-            (Some(before), Vehicle::Space(space)) => space
-                .last
-                .as_ref()
-                .and_then(|(input, _)| space.pilot.landing_planned(before, self.table.mode(), input)),
-            _ => None,
-        };
+        let flown = self.flown.as_ref();
+        let solved =
+            flown.and_then(|(input, _)| self.pilot.landing_planned(&before, self.table.mode(), input));
         (output, solved)
     }
 
@@ -168,100 +179,29 @@ impl Computer {
         }
     }
 
-    fn feel(&mut self, input: &Input<'_>) {
-        let on_pad = self.table.mode().phase.on_pad();
-        match (&mut self.vehicle, &input.feeling) {
-            (Vehicle::Space(space), Feeling::InSpace(sensed)) if on_pad => space.pad.feel(sensed),
-            (Vehicle::Plane(plane), Feeling::InPlane(sensed)) => {
-                plane.feel(&mut self.table, sensed, input);
-            }
-            _ => {}
-        }
-    }
-
-    fn happen(&mut self, event: Event) -> Result<(), crate::rules::phase::Refusal> {
-        let effects = self.table.happen(event)?;
-        if let Vehicle::Plane(plane) = &mut self.vehicle {
-            plane.carry_out(effects, self.frame);
-        }
-        Ok(())
-    }
-
-    fn decide(&mut self, input: &Input<'_>, abort: bool) -> Output {
-        let released_before = self.release.is_some();
-        let (mut tick, mut planned) = (None, false);
-        if matches!(self.vehicle, Vehicle::Plane(_)) {
-            tick = self.sample(input);
-            planned = tick.is_some();
-        } else if released_before {
-            planned = self.fly(input, abort);
-        } else {
-            self.wait_on_the_pad(input);
-        }
-        let mode = self.table.mode();
-        self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;
-        self.commands.parachute = mode.phase == Phase::Chute;
-        Output {
-            commands: self.commands,
-            released: !released_before && self.release.is_some(),
-            answers: Vec::new(),
-            news: Vec::new(),
-            planned,
-            tick,
-        }
-    }
-
-    /// A sample of the planar vehicle, if one falls into this frame.
-    fn sample(&mut self, input: &Input<'_>) -> Option<Box<PlanarTick>> {
-        let on_sample = matches!(&self.vehicle, Vehicle::Plane(plane) if plane.is_on_sample(input.frame));
-        if !on_sample {
-            return None;
-        }
-        if self.table.mode().phase == Phase::Safe {
-            self.test_itself(input, true);
-        } else if let Vehicle::Plane(plane) = &mut self.vehicle {
-            plane.apply(input.late);
-            let (gimbal_rad, fins_rad) = plane.told;
-            self.commands = Commands { gimbal_rad: [gimbal_rad, 0.0], fins_rad, ..self.commands };
-        }
-        if self.countdown_is_over() {
-            self.let_go();
-        }
-        let over = self.is_over();
-        let Vehicle::Plane(plane) = &mut self.vehicle else { return None };
-        let due = !over && plane.controller_is_due(self.table.mode().phase, input.frame);
-        let tick = due.then(|| plane.run_controller(&mut self.table, input));
-        if due {
-            self.complain_of_readiness();
-        }
-        // After the controller: the gate judges a plan that starts from the present state, not a rehearsal.
-        if let (Vehicle::Plane(plane), Phase::LandArmed) = (&mut self.vehicle, self.table.mode().phase) {
-            plane.consider_ignition(&mut self.table, input);
-        }
-        tick
-    }
-
-    /// One frame of a rocket in the air, or on the ground after its flight. Returns whether it planned.
-    fn fly(&mut self, input: &Input<'_>, abort: bool) -> bool {
-        let (Vehicle::Space(space), Feeling::InSpace(sensed), Some(release)) =
-            (&mut self.vehicle, input.feeling, self.release)
-        else {
-            return false;
-        };
+    /// One frame in the air, or on the ground after the flight. Returns whether it planned.
+    fn fly(&mut self, input: &Input<'_>, release: Release, abort: bool) -> bool {
         let frame = input.frame.saturating_sub(release.frame);
         let input = PilotInput {
             frame,
             time_s: flight_time_s(frame),
-            sensed,
+            sensed: input.sensed,
             fins_rad: input.fins_rad,
             contact: input.contact,
             igniter_continuity: input.igniter_continuity,
             booster_attached: input.booster_attached,
             abort,
         };
-        let PilotOutput { gimbal_rad, fins_rad, level, booster, .. } = space.fly(&mut self.table, &input);
-        self.commands = Commands { gimbal_rad, fins_rad, booster, ..self.commands };
+        let output = self.pilot.step(&mut self.table, &input);
+        self.flown = Some((input, output));
         let phase = self.table.mode().phase;
+        let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
+        if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
+            self.table.say_gate_shut(check);
+        }
+        self.gate_told = refusal;
+        let PilotOutput { gimbal_rad, fins_rad, level, booster, .. } = output;
+        self.commands = Commands { gimbal_rad, fins_rad, booster, ..self.commands };
         if phase.in_landing_burn() && level != self.level {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
         }
@@ -333,28 +273,14 @@ impl Computer {
         }
     }
 
-    /// The pilot of a rocket in space.
-    pub fn pilot(&self) -> Option<&Pilot> {
-        match &self.vehicle {
-            Vehicle::Space(space) => Some(&space.pilot),
-            Vehicle::Plane(_) => None,
-        }
-    }
-
-    /// The planar vehicle's part.
-    pub fn plane(&self) -> Option<&Plane> {
-        match &self.vehicle {
-            Vehicle::Space(_) => None,
-            Vehicle::Plane(plane) => Some(plane),
-        }
+    /// Flies the rocket from its release on.
+    pub fn pilot(&self) -> &Pilot {
+        &self.pilot
     }
 
     /// Input and output of the pilot's last frame.
     pub fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
-        match &self.vehicle {
-            Vehicle::Space(space) => space.last.as_ref().map(|(input, output)| (input, output)),
-            Vehicle::Plane(_) => None,
-        }
+        self.flown.as_ref().map(|(input, output)| (input, output))
     }
 
     /// Vehicle time of the release, s.

@@ -4,15 +4,16 @@ use alloc::format;
 
 use super::news::Severity;
 use super::self_test::{ANSWERING_RAD, TestStep};
-use super::{Computer, Feeling, Input, Release, Vehicle};
+use super::{Computer, Input, Release};
 use crate::rules::phase::{Event, Phase, StartPoint};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+use crate::vehicle::rigid::RigidState;
 
 impl Computer {
-    /// One frame of a rocket on its pad.
+    /// One frame on the pad.
     pub(super) fn wait_on_the_pad(&mut self, input: &Input<'_>) {
         if self.table.mode().phase == Phase::Safe {
-            let felt = matches!(&self.vehicle, Vehicle::Space(space) if space.pad.has_felt());
-            self.test_itself(input, felt);
+            self.test_itself(input);
         }
         if self.rehearsed.is_some() {
             self.complain_of_readiness();
@@ -22,34 +23,31 @@ impl Computer {
             StartPoint::Drone => self.wait_below_the_drone(),
             _ if self.countdown_is_over() => self.let_go(),
             StartPoint::Pad => self.wait_on_the_rail(input),
-            StartPoint::Apogee | StartPoint::Ignition => {}
+            StartPoint::Apogee => {}
         }
         self.check_itself(input);
     }
 
     /// A motor may light that nobody lit.
     fn wait_on_the_rail(&mut self, input: &Input<'_>) {
-        if let (Vehicle::Space(space), Feeling::InSpace(sensed)) = (&mut self.vehicle, &input.feeling)
-            && space.pilot.feels_lift_off(sensed)
-        {
+        if self.pilot.feels_lift_off(&input.sensed) {
             self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
-            if self.happen(Event::LiftOff).is_ok() {
+            if self.table.happen(Event::LiftOff).is_ok() {
                 self.begin_flight();
             }
         }
     }
 
     fn wait_below_the_drone(&mut self) {
-        let Vehicle::Space(space) = &self.vehicle else { return };
-        if !space.pad.falls() {
+        if !self.pad.falls() {
             return;
         }
         let released = if self.countdown_is_over() {
-            self.happen(Event::ReleasedAt(StartPoint::Drone))
+            self.table.happen(Event::ReleasedAt(StartPoint::Drone))
         } else {
             self.table.say(Severity::Critical, "RELEASED before it was cleared".into());
-            let parachute_fills = space.parachute_fills_below_the_drone();
-            self.happen(Event::ReleasedEarly { parachute_fills })
+            let parachute_fills = self.parachute_fills_below_the_drone();
+            self.table.happen(Event::ReleasedEarly { parachute_fills })
         };
         if released.is_ok() {
             self.begin_flight();
@@ -57,14 +55,11 @@ impl Computer {
     }
 
     pub(super) fn start_point(&self) -> StartPoint {
-        match &self.vehicle {
-            Vehicle::Space(space) => space.start_point(),
-            Vehicle::Plane(_) => StartPoint::Ignition,
-        }
+        self.pilot.mission().start.at
     }
 
-    /// Moves every actuator and brings it back. The test is not passed before `ready` is true.
-    pub(super) fn test_itself(&mut self, input: &Input<'_>, ready: bool) {
+    /// Moves every actuator and brings it back. The test is not passed before the sensors were felt for a second.
+    fn test_itself(&mut self, input: &Input<'_>) {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
             && self.fins_answering == [true; 4];
@@ -73,11 +68,10 @@ impl Computer {
         match self.self_test.step(answering, since_s) {
             TestStep::Command(angle_rad) => {
                 let closed_rad = self.closed_rad();
-                let yaw_rad = if matches!(self.vehicle, Vehicle::Space(_)) { angle_rad } else { 0.0 };
-                self.commands.gimbal_rad = [angle_rad, yaw_rad];
+                self.commands.gimbal_rad = [angle_rad; 2];
                 self.commands.fins_rad = [closed_rad + angle_rad; 4];
             }
-            TestStep::Passed if ready => {
+            TestStep::Passed if self.pad.has_felt() => {
                 let _ = self.table.happen(Event::SelfTestPassed);
             }
             TestStep::Failed => {
@@ -90,10 +84,7 @@ impl Computer {
     }
 
     pub(super) fn closed_rad(&self) -> f64 {
-        match &self.vehicle {
-            Vehicle::Space(space) => space.pilot.mission().airframe.fins.closed_rad(),
-            Vehicle::Plane(plane) => plane.profile().fins.closed_rad(),
-        }
+        self.pilot.mission().airframe.fins.closed_rad()
     }
 
     pub(super) fn countdown_is_over(&self) -> bool {
@@ -106,16 +97,32 @@ impl Computer {
             StartPoint::Pad => Event::CountdownElapsed,
             at => Event::ReleasedAt(at),
         };
-        if self.happen(event).is_ok() {
+        if self.table.happen(event).is_ok() {
             self.begin_flight();
         }
     }
 
+    /// A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
     fn begin_flight(&mut self) {
         self.release = Some(Release { frame: self.frame, time_s: self.table.time_s() });
-        match &mut self.vehicle {
-            Vehicle::Space(space) => space.leave_the_pad(),
-            Vehicle::Plane(plane) => plane.release(),
+        let mission = self.pilot.mission();
+        if let (Some(launch), Some(start)) = (&mission.launch, self.pad.at_rest())
+            && mission.start.at == StartPoint::Pad
+        {
+            let believed = RigidState {
+                world_from_body: start.world_from_body,
+                ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
+            };
+            self.pilot.stand(&believed, start.gyro_bias_rad_s);
         }
+    }
+
+    /// Whether the parachute fills before a vehicle that falls from its drone meets the ground.
+    fn parachute_fills_below_the_drone(&self) -> bool {
+        let parachute = &self.pilot.mission().airframe.parachute;
+        // From rest it falls faster and faster: the speed when the lines are taut.
+        let delay_s = parachute.ejection_delay_s;
+        let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
+        self.pad.stance(true).hanging_m.is_some_and(|height_m| height_m > fall_m)
     }
 }

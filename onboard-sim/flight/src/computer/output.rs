@@ -1,13 +1,11 @@
 //! The output of one frame of the flight computer.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::crew::Answer;
 use super::news::News;
 use super::pilot::BoosterCommands;
-use super::plane::PlanarTick;
 
 /// Commands to the actuators.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,8 +31,6 @@ pub struct Output {
     pub answers: Vec<Answer>,
     /// Reports, in order.
     pub news: Vec<News>,
-    /// A plan or a tick of the landing controller was made.
+    /// A plan was made.
     pub planned: bool,
-    /// The planar vehicle's tick, if one fell into this frame.
-    pub tick: Option<Box<PlanarTick>>,
 }

@@ -2,29 +2,23 @@
 
 use alloc::vec::Vec;
 
+use super::Computer;
 use super::news::Severity;
 use super::pad::Stance;
-use super::{Computer, Vehicle};
-use crate::rules::arming::{ArmingInput, Check, PredictedLanding, Uplink, arming_checks};
+use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
 use crate::rules::phase::Phase;
-use crate::vehicle::profile::StartPoint;
+use crate::vehicle::mission::StartPoint;
 use crate::vehicle::rigid::RigidState;
 
 impl Computer {
     /// Attitude and motion on the pad.
     pub fn stance(&self) -> Stance {
-        match &self.vehicle {
-            Vehicle::Space(space) => space.pad.stance(space.start_point() == StartPoint::Drone),
-            Vehicle::Plane(plane) => plane.stance(),
-        }
+        self.pad.stance(self.start_point() == StartPoint::Drone)
     }
 
-    /// The estimated state on the pad, at rest at the origin; only for a rocket in space.
-    pub fn believed_on_the_pad(&self) -> Option<RigidState> {
-        match &self.vehicle {
-            Vehicle::Space(space) => Some(space.pad.believed()),
-            Vehicle::Plane(_) => None,
-        }
+    /// The estimated state on the pad, at rest at the origin.
+    pub fn believed_on_the_pad(&self) -> RigidState {
+        self.pad.believed()
     }
 
     /// The arming checks with the present values; the uplink is that of the station heard best.
@@ -35,15 +29,9 @@ impl Computer {
     pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Vec<Check> {
         let locks = &self.table.mode().interlocks;
         let stance = self.stance();
-        let (controller_warm, controller_found, predicted_landing) = match (&self.vehicle, &self.rehearsed) {
-            (Vehicle::Plane(plane), _) => {
-                let (warm, found) = plane.rehearsal();
-                (warm, found, plane.predicted_landing().as_ref().map(PredictedLanding::from))
-            }
-            (Vehicle::Space(_), Some(rehearsed)) => {
-                (rehearsed.warm, rehearsed.found.clone(), rehearsed.landing.clone())
-            }
-            (Vehicle::Space(_), None) => (false, "no rehearsal yet".into(), None),
+        let (controller_warm, controller_found, predicted_landing) = match &self.rehearsed {
+            Some(rehearsed) => (rehearsed.warm, rehearsed.found.clone(), rehearsed.landing.clone()),
+            None => (false, "no rehearsal yet".into(), None),
         };
         let input = ArmingInput {
             pin_out: locks.pin_out,

@@ -5,7 +5,7 @@ use alloc::string::{String, ToString as _};
 
 use super::crew::{Answer, Asked, Ending, People, Request, event_of, is_so_already, refused};
 use super::news::Severity;
-use super::{Commander, Computer, Input, Vehicle};
+use super::{Commander, Computer, Input};
 use crate::rules::operator::Operator;
 use crate::rules::phase::{Event, HoldCause, Phase, UPLINK_SILENT_S, transition};
 use crate::rules::two_person::{
@@ -24,7 +24,7 @@ pub struct CrewMemory {
 type Agreed = (Ask, Operator);
 
 impl Computer {
-    /// Decides a request; `None` for an abort in the air in space, which the pilot handles in this frame.
+    /// Decides a request; `None` for an abort in the air, which the pilot handles in this frame.
     pub(super) fn answer(&mut self, request: &Request) -> Option<Answer> {
         let mode = *self.table.mode();
         let time_s = self.table.time_s();
@@ -59,7 +59,7 @@ impl Computer {
             }
         }
         let on_ground = mode.phase.on_pad() || matches!(mode.phase, Phase::Touchdown | Phase::Safed);
-        if asked == Asked::Abort && matches!(self.vehicle, Vehicle::Space(_)) && !on_ground {
+        if asked == Asked::Abort && !on_ground {
             return None;
         }
         let checks = self.arming_checks_by(uplink);
@@ -75,8 +75,8 @@ impl Computer {
             Ok(agreed) => agreed,
             Err(answer) => return Some(answer),
         };
-        Some(match self.happen(event) {
-            Ok(()) => {
+        Some(match self.table.happen(event) {
+            Ok(_) => {
                 self.note_done(asked, by, agreed);
                 Answer::ACCEPTED
             }

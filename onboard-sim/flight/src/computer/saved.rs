@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use super::memory::checksum;
 use super::pilot::SavedPilot;
-use super::{Commands, Computer, Release, Severity, Vehicle};
-use crate::guidance::controller::ControlLevel;
+use super::{Commands, Computer, Release, Severity};
+use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Interlocks, Latch, Mode};
 
 /// After a longer time without power, s, nothing is taken up: whoever switches a computer off and on again later has a
@@ -100,18 +100,17 @@ impl Saved {
 }
 
 impl Computer {
-    /// What it keeps through a reset, after a frame; `None` for the planar vehicle, which is not restarted.
-    pub fn saved(&self) -> Option<Saved> {
-        let Vehicle::Space(space) = &self.vehicle else { return None };
+    /// What it keeps through a reset, after a frame.
+    pub fn saved(&self) -> Saved {
         let mode = *self.table.mode();
         let in_the_air = self.release.map(|release| InTheAir {
             release,
             commands: self.commands,
             level: self.level,
-            pilot: space.pilot.saved(),
+            pilot: self.pilot.saved(),
         });
         let latch = self.table.latch();
-        Some(Saved { frame: self.frame, time_s: self.table.time_s(), mode, latch, in_the_air })
+        Saved { frame: self.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
     }
 
     /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
@@ -123,17 +122,17 @@ impl Computer {
             return self;
         }
         self.frame = saved.frame;
-        match (&saved.in_the_air, &mut self.vehicle) {
-            (Some(flown), Vehicle::Space(space)) => {
+        match &saved.in_the_air {
+            Some(flown) => {
                 self.table.go_on(saved.mode, saved.latch);
                 // The crew has been told of it.
                 let _ = self.motor_watch.news(&saved.mode, saved.time_s);
                 self.release = Some(flown.release);
                 self.commands = flown.commands;
                 self.level = flown.level;
-                space.pilot = space.pilot.resumed(&flown.pilot, time_s - flown.release.time_s);
+                *self.pilot = self.pilot.resumed(&flown.pilot, time_s - flown.release.time_s);
             }
-            _ => self.wake_on_the_pad(saved, time_s),
+            None => self.wake_on_the_pad(saved, time_s),
         }
         self
     }
@@ -155,9 +154,9 @@ impl Computer {
 
     /// Restarts the computer: only what was saved in the last frame is kept.
     pub fn restart(&mut self, time_s: f64) {
-        let (Some(saved), Vehicle::Space(space)) = (self.saved(), &self.vehicle) else { return };
+        let saved = self.saved();
         *self =
-            Self::in_space(space.pilot.mission(), space.law.clone(), &space.believed).resumed(&saved, time_s);
+            Self::at_power_up(self.pilot.mission(), self.law.clone(), &self.believed).resumed(&saved, time_s);
     }
 }
 
@@ -174,7 +173,7 @@ mod tests {
     }
 
     fn powered_up() -> Computer {
-        Computer::in_space(&mission(), Law::Nmpc, &RigidState::upright(300.0))
+        Computer::at_power_up(&mission(), Law::Nmpc, &RigidState::upright(300.0))
     }
 
     /// A falling computer after some frames.
@@ -188,14 +187,14 @@ mod tests {
 
     fn bytes(computer: &Computer) -> Vec<u8> {
         let mut room = [0; Saved::MOST_BYTES];
-        computer.saved().expect("a rocket saves").write(&mut room).expect("it fits").to_vec()
+        computer.saved().write(&mut room).expect("it fits").to_vec()
     }
 
     #[test]
     fn a_record_comes_back_bit_for_bit_and_fits() {
         let computer = falling();
         let record = bytes(&computer);
-        assert_eq!(Saved::read(&record), Ok(computer.saved().unwrap()));
+        assert_eq!(Saved::read(&record), Ok(computer.saved()));
         // Room for the values that are not there yet: ignition, ascent.
         assert!(record.len() < Saved::MOST_BYTES - 100, "{}", record.len());
     }
@@ -237,7 +236,7 @@ mod tests {
 
     #[test]
     fn a_computer_that_was_off_for_long_is_at_power_up() {
-        let saved = falling().saved().unwrap();
+        let saved = falling().saved();
         for time_s in [0.2 + LONGEST_RESET_S + 0.01, 0.1, f64::NAN] {
             assert_eq!(powered_up().resumed(&saved, time_s).digest(), powered_up().digest(), "{time_s}");
         }

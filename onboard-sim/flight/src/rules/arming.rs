@@ -11,7 +11,7 @@ pub use crate::rules::check::{Check, all_passed, first_refusal};
 use crate::rules::phase::UPLINK_SILENT_S;
 use crate::rules::verdict::LandingVerdict;
 use crate::vehicle::drop::LOWEST_ARMED_M;
-use crate::vehicle::profile::ArmingLimits;
+use crate::vehicle::mission::ArmingLimits;
 
 /// The radio link to the station that asks for arming.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,11 +67,9 @@ pub struct ArmingInput {
     pub log_space_bytes: u64,
     /// Voltage of the battery, V; `None` if it is not measured.
     pub battery_v: Option<f64>,
-    /// The rehearsal of the landing converged
-    /// ([`SolverReport::converged`](crate::guidance::controller::SolverReport::converged)).
+    /// The rehearsal of the landing found plans and landed.
     pub controller_warm: bool,
-    /// The rehearsal's summary of its outcome
-    /// ([`SolverReport::summary`](crate::guidance::controller::SolverReport::summary)).
+    /// The rehearsal's outcome in words.
     pub controller_found: String,
     /// The verdict on the rehearsal's end by the touchdown limits; `None` without a rehearsal.
     pub predicted_landing: Option<PredictedLanding>,
@@ -169,12 +167,8 @@ fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rules::verdict::TouchdownLimits;
-    use crate::vehicle::dynamics::PlanarState;
 
     fn ready() -> ArmingInput {
-        let profile = crate::vehicles::profile::builtin("paper-calibrated").unwrap();
-        let down = PlanarState { theta_rad: core::f64::consts::FRAC_PI_2, ..PlanarState::default() };
         ArmingInput {
             pin_out: true,
             abort_latched: false,
@@ -192,10 +186,7 @@ mod tests {
             battery_v: Some(ArmingLimits::default().battery_min_v),
             controller_warm: true,
             controller_found: "converged".to_owned(),
-            predicted_landing: Some(PredictedLanding::from(&LandingVerdict::judge(
-                &TouchdownLimits::from_profile(&profile),
-                &down,
-            ))),
+            predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
             uplink: Uplink::Heard { age_s: UPLINK_SILENT_S },
         }
     }

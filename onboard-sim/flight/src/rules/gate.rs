@@ -11,7 +11,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 pub use crate::rules::check::{Check, all_passed, first_refusal};
-use crate::vehicle::profile::GateLimits;
+use crate::vehicle::mission::GateLimits;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateInput {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     fn refusal_of(spoil: impl FnOnce(&mut GateInput)) -> Option<String> {
-        let limits = crate::vehicles::profile::builtin("paper-calibrated").unwrap().gate;
+        let limits = crate::vehicles::mission::builtin("mk2").unwrap().unwrap().gate;
         let mut input = good();
         spoil(&mut input);
         first_refusal(&gate_checks(&limits, &input))
@@ -139,7 +139,7 @@ mod tests {
                 input.landing_feasible = false;
             }),
             ("predicted touchdown", |input| {
-                input.predicted_touchdown_x_m = -21.0;
+                input.predicted_touchdown_x_m = -121.0;
             }),
             ("fins", |input| {
                 input.fins_confirmed = false;

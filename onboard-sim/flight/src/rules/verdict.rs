@@ -9,8 +9,7 @@ use alloc::vec::Vec;
 use core::f64::consts::FRAC_PI_2;
 
 use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::{Profile, TouchdownBox};
+use crate::vehicle::mission::{Mission, TouchdownBox};
 
 /// What counts as a landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,11 +31,6 @@ pub struct TouchdownLimits {
 }
 
 impl TouchdownLimits {
-    /// The limits of a profile.
-    pub fn from_profile(profile: &Profile) -> Self {
-        Self::from(&profile.touchdown_limits)
-    }
-
     /// The limits of a mission's legs, anywhere inside its fence.
     pub fn of_the_legs(mission: &Mission) -> Self {
         let legs = &mission.leg_limits;
@@ -161,7 +155,7 @@ mod tests {
     use super::*;
 
     fn limits() -> TouchdownLimits {
-        TouchdownLimits::from_profile(&crate::vehicles::profile::builtin("paper-calibrated").unwrap())
+        TouchdownLimits::from(&crate::vehicles::mission::builtin("mk2").unwrap().unwrap().touchdown_limits)
     }
 
     fn upright() -> PlanarState {

@@ -13,13 +13,51 @@ use crate::guidance::powered::PoweredSettings;
 use crate::vehicle::airframe::{Airframe, BadValue};
 use crate::vehicle::drop::Drop;
 use crate::vehicle::launch::Launch;
-use crate::vehicle::profile::{ArmingLimits, GateLimits, StartPoint, TouchdownBox};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
+
+pub use nmpc::{FinalBox, SolverLimits};
 
 /// Length of the countdown of a mission whose text does not say it, s: what all missions had before it was 10 s, so that their
 /// logs verify. The built-in ones say it.
 const COUNTDOWN_S: f64 = 5.0;
+
+/// Where a flight begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StartPoint {
+    /// On the pad, under its own ascent motor.
+    Pad,
+    /// Released at apogee.
+    Apogee,
+    /// Hanging below a drone, which lets it go.
+    Drone,
+}
+
+impl StartPoint {
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pad => "pad",
+            Self::Apogee => "apogee",
+            Self::Drone => "drone",
+        }
+    }
+}
+
+impl core::str::FromStr for StartPoint {
+    type Err = UnknownStart;
+
+    fn from_str(name: &str) -> Result<Self, UnknownStart> {
+        let all = [Self::Pad, Self::Apogee, Self::Drone];
+        all.into_iter().find(|start| start.name() == name).ok_or(UnknownStart)
+    }
+}
+
+/// No flight begins there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("not a start: pad, apogee or drone is accepted")]
+pub struct UnknownStart;
 
 /// Where a mission starts, and the state at apogee, nose up, if it starts there.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -80,7 +118,104 @@ pub struct LegLimits {
     pub rate_deg_s: f64,
 }
 
-/// Everything that defines a flight from apogee, except random differences.
+/// Diagonal weights of the running cost, Eq. 28 of the landing paper; SI units and radians.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StateWeights {
+    /// Horizontal position, 1/m^2.
+    pub x: f64,
+    /// Altitude, 1/m^2.
+    #[serde(default)]
+    pub z: f64,
+    /// Pitch from upright, 1/rad^2.
+    pub theta: f64,
+    /// Axial velocity, s^2/m^2.
+    #[serde(default)]
+    pub u: f64,
+    /// Lateral velocity, s^2/m^2.
+    #[serde(default)]
+    pub w: f64,
+    /// Pitch rate, s^2/rad^2.
+    #[serde(default)]
+    pub q: f64,
+    /// Gimbal angle, 1/rad^2 (the paper's P).
+    pub delta: f64,
+}
+
+impl StateWeights {
+    /// The state weights in state order (x, z, theta, u, w, q).
+    pub fn state_diagonal(&self) -> [f64; 6] {
+        [self.x, self.z, self.theta, self.u, self.w, self.q]
+    }
+}
+
+/// What counts as a landing (Table 2 of the landing paper).
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TouchdownBox {
+    /// Largest horizontal distance, m.
+    pub x_m: f64,
+    /// Lowest altitude, m.
+    pub altitude_min_m: f64,
+    /// Highest altitude, m.
+    pub altitude_max_m: f64,
+    /// Largest pitch error from upright, degrees.
+    pub pitch_error_deg: f64,
+    /// Largest axial speed, m/s.
+    pub u_m_s: f64,
+    /// Largest lateral speed, m/s.
+    pub w_m_s: f64,
+    /// Largest pitch rate, degrees per second.
+    pub pitch_rate_deg_s: f64,
+}
+
+/// Limits of the pad checks before arming.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ArmingLimits {
+    /// Largest tilt from vertical, degrees.
+    pub tilt_max_deg: f64,
+    /// Largest rotation rate that counts as rest, degrees per second.
+    pub rotation_max_deg_s: f64,
+    /// Largest speed that counts as rest, m/s.
+    pub speed_max_m_s: f64,
+    /// Smallest free log space, bytes.
+    pub log_space_min_bytes: u64,
+    /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a cell at light load is
+    /// about a seventh of the charge, a quarter of an hour of the simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V
+    /// at which common 5 V regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through 70 mohm).
+    pub battery_min_v: f64,
+}
+
+impl Default for ArmingLimits {
+    fn default() -> Self {
+        Self {
+            tilt_max_deg: 5.0,
+            rotation_max_deg_s: 2.0,
+            speed_max_m_s: 0.2,
+            log_space_min_bytes: 64 << 20,
+            battery_min_v: 7.4,
+        }
+    }
+}
+
+/// Limits of the checks before ignition.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GateLimits {
+    /// Largest tilt from vertical, degrees.
+    pub tilt_max_deg: f64,
+    /// Largest pitch rate, degrees per second.
+    pub pitch_rate_max_deg_s: f64,
+    /// Largest difference from the predicted speed, as a fraction of it.
+    pub speed_error_max_fraction: f64,
+    /// Largest disagreement of two height sources, m.
+    pub height_disagreement_max_m: f64,
+    /// Radius of the fence that must contain the predicted touchdown, m.
+    pub fence_radius_m: f64,
+}
+
+/// Everything that defines a flight, except random differences.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {

@@ -7,7 +7,6 @@
 //! * [`dynamics`] has the state and the equations of motion in the plane, [`rigid`] the state in space.
 //! * [`site`] is the place of the pad on the Earth.
 //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`] the release from a drone.
-//! * [`profile`] holds the planar landing of the paper.
 
 pub mod airframe;
 pub mod atmosphere;
@@ -16,7 +15,6 @@ pub mod drop;
 pub mod fins;
 pub mod launch;
 pub mod mission;
-pub mod profile;
 pub mod rigid;
 pub mod site;
 pub mod thrust_curve;

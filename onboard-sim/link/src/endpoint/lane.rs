@@ -347,7 +347,7 @@ impl Lane {
         if let Some(message) = self.requested.front() {
             return Some(message.clone());
         }
-        self.next_parameter = self.next_parameter.filter(|place| *place < parameters::count(&self.streams));
+        self.next_parameter = self.next_parameter.filter(|place| *place < parameters::COUNT);
         self.next_parameter.map(|place| parameters::value(place, &self.streams, &vehicle.weights()))
     }
 

@@ -49,7 +49,7 @@ use self::requests::Waiting;
 use crate::commands::{self, Command};
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
-use crate::streams::{STANDARD, Standard, Streams};
+use crate::streams::Streams;
 use crate::telemetry;
 use crate::vehicle::Vehicle;
 
@@ -127,25 +127,20 @@ impl Default for VehicleEndpoint {
 }
 
 impl VehicleEndpoint {
-    /// An endpoint with the standard messages of the planar vehicle at their default rates.
+    /// An endpoint with the standard messages at their default rates, over one link with a radio's budget.
     pub fn new() -> Self {
-        Self::sending(&STANDARD)
-    }
-
-    /// An endpoint with these messages at their default rates, over one link with a radio's budget.
-    pub fn sending(standard: &'static [Standard]) -> Self {
-        Self::over(Streams::of(standard), 0)
+        Self::over(Streams::new(), 0)
     }
 
     /// The same for signed frames, which are longer.
-    pub fn sending_signed(standard: &'static [Standard]) -> Self {
-        Self::over(Streams::signed(standard), SIGNATURE_LEN)
+    pub fn sending_signed() -> Self {
+        Self::over(Streams::signed(), SIGNATURE_LEN)
     }
 
     /// The same for a vehicle with operators. A frame's signature must have been checked with the key that its link id
     /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
-    pub fn sending_to_crew(standard: &'static [Standard]) -> Self {
-        let endpoint = Self::over(Streams::with_crew(standard), SIGNATURE_LEN);
+    pub fn sending_to_crew() -> Self {
+        let endpoint = Self::over(Streams::with_crew(), SIGNATURE_LEN);
         Self { stations: Stations::of_a_crew(), ..endpoint }
     }
 

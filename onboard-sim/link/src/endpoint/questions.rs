@@ -37,7 +37,7 @@ impl VehicleEndpoint {
             ParamQuestion::List => self.lane(link).list_parameters(),
             ParamQuestion::Read(key) => {
                 let lane = self.lane(link);
-                let answer = match parameters::place_of(key, &lane.streams) {
+                let answer = match parameters::place_of(key) {
                     Some(place) => parameters::value(place, &lane.streams, &vehicle.weights()),
                     None => error_message(key, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, asker),
                 };

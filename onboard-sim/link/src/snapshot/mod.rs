@@ -6,7 +6,7 @@ mod space;
 use flight::computer::crew::People;
 use flight::computer::pilot::ApogeeAhead;
 use flight::computer::{AbortEffect, Commander, Computer, LogState};
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
@@ -33,8 +33,8 @@ pub struct Snapshot {
     pub interlocks: Interlocks,
     /// Time to release, s, while a countdown runs.
     pub countdown_s: Option<f64>,
-    /// Time since T+0, s; stands still after touchdown. In space as in the log: since the release, which lights the ascent
-    /// motor on a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]). In the plane: since ignition.
+    /// Time since T+0, s; stands still after touchdown. As in the log: since the release, which lights the ascent
+    /// motor on a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]).
     pub since_zero_s: Option<f64>,
     /// Time before the pad may be approached, s.
     pub pad_wait_s: Option<f64>,

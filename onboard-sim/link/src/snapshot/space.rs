@@ -2,14 +2,12 @@
 
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, PilotOutput, touchdown_from_below_m, touchdown_m};
 use flight::estimation::estimator::Estimate;
-use flight::guidance::controller::ControlLevel;
-use flight::guidance::powered::{Plane, PoweredReport};
+use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
 use flight::rules::phase::Phase;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::dynamics::PlanarState;
-use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 
@@ -23,7 +21,7 @@ use super::{
 const CARRIED_M_S: f64 = 10.0;
 const CARRIED_WEIGHTS: f64 = 0.5;
 
-/// A rocket in space: what is known of it beside its computer's memory.
+/// What is known of it beside its computer's memory.
 #[derive(Debug, Clone, Copy)]
 pub struct InSpace<'a> {
     pub known: Known<'a>,
@@ -44,17 +42,17 @@ pub struct InSpace<'a> {
 }
 
 impl InSpace<'_> {
-    /// The state now. The computer must be that of a rocket in space: `None` otherwise.
-    pub fn snapshot(&self) -> Option<Snapshot> {
+    /// The state now.
+    pub fn snapshot(&self) -> Snapshot {
         let (computer, mission) = (self.known.computer, self.mission);
-        let pilot = computer.pilot()?;
+        let pilot = computer.pilot();
         let limits = TouchdownLimits::of_the_legs(mission);
         let mass = MassModel::new(&mission.airframe.mass, pilot.curve().propellant_mass_kg());
         let cg_m = mission.airframe.above_feet_m(mass.at(0.0).cg_station_m);
         let hanging_m = computer.stance().hanging_m.filter(|height_m| height_m.is_finite());
         let believed = RigidState {
             position_m: Vector3::z() * hanging_m.unwrap_or(cg_m),
-            ..computer.believed_on_the_pad().unwrap_or_else(|| RigidState::upright(cg_m))
+            ..computer.believed_on_the_pad()
         };
         let commands = computer.commands();
         let standing = Snapshot {
@@ -69,7 +67,7 @@ impl InSpace<'_> {
             ..self.known.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
         };
         let flying = computer.released_at_s().zip(computer.piloted()).zip(pilot.estimate());
-        Some(match flying {
+        match flying {
             None => standing,
             Some(((released_at_s, (input, output)), estimate)) => {
                 let since = Airborne {
@@ -82,7 +80,7 @@ impl InSpace<'_> {
                 };
                 self.flying(pilot, &since, &standing)
             }
-        })
+        }
     }
 
     fn flying(&self, pilot: &Pilot, since: &Airborne<'_>, standing: &Snapshot) -> Snapshot {

@@ -3,7 +3,7 @@
 //! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are narrowed to the
 //! fields' types here and only here; what does not fit saturates.
 //!
-//! What is not modelled is sent as MAVLink's "unknown" and never invented: the planar vehicle has no battery.
+//! What is not modelled is sent as MAVLink's "unknown" and never invented.
 //!
 //! [`Motion`]: crate::snapshot::Motion
 

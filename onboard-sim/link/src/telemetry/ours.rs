@@ -146,8 +146,8 @@ pub(super) fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
     }))
 }
 
-fn td_level(level: flight::guidance::controller::ControlLevel) -> TdControlLevel {
-    use flight::guidance::controller::ControlLevel as L;
+fn td_level(level: flight::guidance::powered::ControlLevel) -> TdControlLevel {
+    use flight::guidance::powered::ControlLevel as L;
     match level {
         L::Idle => TdControlLevel::TD_CONTROL_LEVEL_IDLE,
         L::Rehearsal => TdControlLevel::TD_CONTROL_LEVEL_REHEARSAL,
@@ -259,7 +259,7 @@ mod tests {
         for phase in Phase::ALL {
             assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
         }
-        for level in flight::guidance::controller::ControlLevel::ALL {
+        for level in flight::guidance::powered::ControlLevel::ALL {
             assert_eq!(td_level(level) as u32, u32::from(level.index()));
         }
         for status in [

@@ -14,13 +14,13 @@ pub use self::errors::EstimatorErrors;
 use self::rehearsal::Rehearsal;
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::{Pilot, Sensed};
-use flight::computer::{Commands, Computer, FRAME_S, Feeling, Input, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
 use flight::guidance::powered::PoweredReport;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use hil::carried::{CarriedCommands, Wire};
 use hil::readings::{Feedback, Readings};
@@ -153,7 +153,7 @@ impl Sortie {
             return Err(SetUpError::NoSensors);
         }
         Ok(Self {
-            computer: Computer::in_space(mission, law, &believed),
+            computer: Computer::at_power_up(mission, law, &believed),
             rehearsal: None,
             surroundings,
             wire: dispersion.wire_resolution.then(|| Wire::new(mission)),
@@ -218,11 +218,11 @@ impl Sortie {
             outside.requests
         };
         let feedback = self.surroundings.feedback(self.computer.released_at_s().is_some(), outside.pin_out);
-        let (feeling, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(&sensed, feedback);
+        let (sensed, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(&sensed, feedback);
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
-            feeling,
+            sensed,
             gimbal_rad,
             fins_rad,
             contact: switches.contact,
@@ -236,7 +236,6 @@ impl Sortie {
             people: outside.people,
             requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
-            late: false,
         };
         let began = watch.now();
         let mut output = self.computer.step(&input);
@@ -252,12 +251,12 @@ impl Sortie {
     }
 
     /// What the computer is told, after a way over a wire if there is one.
-    fn carried(&self, sensed: &Sensed, feedback: Feedback) -> (Feeling, Feedback) {
+    fn carried(&self, sensed: &Sensed, feedback: Feedback) -> (Sensed, Feedback) {
         let (Some(wire), Sensed::Measured(measured)) = (&self.wire, sensed) else {
-            return (Feeling::InSpace(*sensed), feedback);
+            return (*sensed, feedback);
         };
         let told = wire.carry(&Readings { measured: *measured, feedback });
-        (Feeling::InSpace(Sensed::Measured(told.measured)), told.feedback)
+        (Sensed::Measured(told.measured), told.feedback)
     }
 
     fn command(&mut self, commands: &Commands) {
@@ -332,11 +331,8 @@ impl Sortie {
     }
 
     /// The pilot in the flight computer.
-    ///
-    /// # Panics
-    /// Never: the computer of a rocket in space has one.
     pub fn pilot(&self) -> &Pilot {
-        self.computer.pilot().unwrap_or_else(|| unreachable!("the computer of a rocket in space"))
+        self.computer.pilot()
     }
 
     /// The flight computer is dead: it neither hears nor speaks.

@@ -4,7 +4,7 @@
 //! mission. It knows neither the wind of the day nor the scatter of the real motor.
 
 use flight::computer::Rehearsed;
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::PoweredReport;
 use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::Phase;

@@ -2,7 +2,7 @@
 
 use flight::computer::FRAME_MS;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
 use world::{Actuators, World};
 

@@ -1,183 +1,65 @@
-//! Loads the profile (starts at ignition) or the mission (starts where it says), by name or from a file.
+//! Loads a mission, by name or from a file, and makes a flight of it.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use flight::vehicle::profile::{Profile, StartPoint};
+use flight::vehicle::mission::StartPoint;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::Dispersion;
-use sim::recipe::{Recipe, RecipeError};
+use sim::recipe::Recipe;
 
 use super::FlyError;
 use crate::vehicle::{RocketFlight, Vehicle};
-use sim::plane::draw::draw;
-use sim::plane::{DeadlinePolicy, PlanarFlight};
 
 /// The default dispersions of a mission: a normal day at the field.
 const DISPERSION: &str = "field";
 
-/// A profile and its text. The log's header and the flight use the same reading of the file.
-#[derive(Debug, Clone)]
-pub struct LoadedProfile {
-    pub profile: Profile,
-    /// Its text, for the log.
-    pub toml: String,
-}
-
-/// A profile or a mission, ready to fly.
-#[derive(Debug, Clone)]
-pub enum LoadedFlight {
-    /// In the plane, from ignition.
-    AtIgnition(Box<LoadedProfile>),
-    /// In space. The recipe's seed is the run's.
-    InSpace(Box<RocketFlight>),
-}
-
-impl LoadedFlight {
-    pub fn name(&self) -> &str {
-        match self {
-            Self::AtIgnition(loaded) => &loaded.profile.name,
-            Self::InSpace(flight) => &flight.recipe.mission.name,
-        }
-    }
-
-    /// The description in one line.
-    pub fn summary(&self) -> &str {
-        match self {
-            Self::AtIgnition(loaded) => &loaded.profile.summary,
-            Self::InSpace(flight) => &flight.recipe.mission.summary,
-        }
-    }
-
-    /// The TOML text.
-    pub fn toml(&self) -> &str {
-        match self {
-            Self::AtIgnition(loaded) => &loaded.toml,
-            Self::InSpace(flight) => &flight.recipe.mission_toml,
-        }
-    }
-
+impl RocketFlight {
     /// The same flight from another start; `None` leaves a mission with a launch on its pad, and anything else as it is.
     ///
     /// # Errors
     /// It has no such start.
     pub fn starting_at(self, start: Option<StartPoint>) -> Result<Self, FlyError> {
-        match self {
-            Self::InSpace(flight) => {
-                let RocketFlight { recipe, number } = *flight;
-                let launched = recipe.mission.launch.as_ref().map(|_| StartPoint::Pad);
-                let start = start.or(launched).unwrap_or(recipe.mission.start.at);
-                Ok(Self::InSpace(Box::new(RocketFlight { recipe: recipe.starting_at(start)?, number })))
-            }
-            Self::AtIgnition(_) if start.is_some_and(|start| start != StartPoint::Ignition) => {
-                Err(FlyError::NoSuchStart { name: self.name().to_owned() })
-            }
-            Self::AtIgnition(_) => Ok(self),
-        }
+        let launched = self.recipe.mission.launch.as_ref().map(|_| StartPoint::Pad);
+        let start = start.or(launched).unwrap_or(self.recipe.mission.start.at);
+        Ok(Self { recipe: self.recipe.starting_at(start)?, ..self })
     }
 
     /// The vehicle, powered up.
     ///
     /// # Errors
-    /// It cannot be simulated, or the late-output policy does not apply to it.
-    pub fn vehicle(&self, seed: u64, policy: DeadlinePolicy) -> Result<Vehicle, FlyError> {
-        let vehicle = match self {
-            Self::AtIgnition(loaded) => {
-                let drawn = draw(&loaded.profile, seed);
-                Vehicle::in_plane(PlanarFlight::new(&loaded.profile, drawn, policy)?)
-            }
-            Self::InSpace(_) if policy == DeadlinePolicy::Enforce => {
-                return Err(FlyError::DeadlinePolicy { name: self.name().to_owned() });
-            }
-            Self::InSpace(flight) => Vehicle::in_space(&seeded(flight, seed))?,
-        };
-        Ok(vehicle.of_mission(self.name(), self.toml()))
+    /// It cannot be simulated.
+    pub fn vehicle(&self) -> Result<Vehicle, FlyError> {
+        let Recipe { mission, mission_toml, .. } = &self.recipe;
+        Ok(Vehicle::on_the_pad(self)?.of_mission(&mission.name, mission_toml))
     }
-}
 
-fn seeded(flight: &RocketFlight, seed: u64) -> RocketFlight {
-    RocketFlight { recipe: Recipe { seed, ..flight.recipe.clone() }, number: flight.number }
-}
-
-/// Every built-in name with its text.
-pub fn builtins() -> impl Iterator<Item = (&'static str, &'static str)> {
-    vehicles::profile::BUILTIN.iter().chain(vehicles::mission::BUILTIN).copied()
+    /// The header of its log.
+    pub fn log_header(&self, writer: &str, start_unix_ns: u64) -> LogHeader {
+        tick_log::sortie::header(writer, &self.recipe, self.number, start_unix_ns)
+    }
 }
 
 pub(super) fn builtin_names() -> String {
-    names(builtins())
+    vehicles::mission::BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
-pub(super) fn planar_names() -> String {
-    names(vehicles::profile::BUILTIN.iter().copied())
-}
-
-fn names(of: impl Iterator<Item = (&'static str, &'static str)>) -> String {
-    of.map(|(name, _)| name).collect::<Vec<_>>().join(", ")
-}
-
-/// Reads a profile or a mission by built-in name or path.
+/// Reads a mission by built-in name or path: flight 0 of seed 1 with the default dispersions.
 ///
 /// # Errors
-/// No profile of that name, or an invalid one: the message names the key.
-pub fn load_flight(name_or_path: &str) -> Result<LoadedFlight, FlyError> {
-    let builtin = builtins().find(|(name, _)| *name == name_or_path).map(|(_, text)| text);
+/// No mission of that name, or an invalid one: the message names the key.
+pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
+    let builtin = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == name_or_path);
     let toml = match builtin {
-        Some(text) => text.to_owned(),
+        Some((_, text)) => (*text).to_owned(),
         None if !Path::new(name_or_path).exists() => {
-            return Err(FlyError::NoProfile { given: name_or_path.to_owned() });
+            return Err(FlyError::NoMission { given: name_or_path.to_owned() });
         }
         None => std::fs::read_to_string(name_or_path)
-            .map_err(|source| FlyError::ReadProfile { path: name_or_path.to_owned(), source })?,
+            .map_err(|source| FlyError::ReadMission { path: name_or_path.to_owned(), source })?,
     };
-    if vehicles::mission::is_meant(&toml) {
-        return Ok(LoadedFlight::InSpace(Box::new(mission_flight(&toml, name_or_path)?)));
-    }
-    let profile = vehicles::profile::from_toml(&toml, name_or_path)?;
-    Ok(LoadedFlight::AtIgnition(Box::new(LoadedProfile { profile, toml })))
-}
-
-/// Reads a profile that starts at ignition.
-///
-/// # Errors
-/// As [`load_flight`], and for a mission.
-pub fn load_planar(name_or_path: &str) -> Result<LoadedProfile, FlyError> {
-    match load_flight(name_or_path)? {
-        LoadedFlight::AtIgnition(loaded) => Ok(*loaded),
-        flight @ LoadedFlight::InSpace(_) => Err(FlyError::InSpace { name: flight.name().to_owned() }),
-    }
-}
-
-/// Flight 0 of a mission with the default dispersions.
-fn mission_flight(mission_toml: &str, origin: &str) -> Result<RocketFlight, RecipeError> {
-    let dispersion_toml = Dispersion::builtin_toml(DISPERSION)?;
-    Ok(RocketFlight {
-        recipe: Recipe::from_texts((origin, mission_toml), (DISPERSION, dispersion_toml))?,
-        number: 0,
-    })
-}
-
-/// The header of a flight's log.
-pub fn log_header(writer: &str, loaded: &LoadedFlight, seed: u64, start_unix_ns: u64) -> LogHeader {
-    match loaded {
-        LoadedFlight::AtIgnition(loaded) => {
-            let run = BTreeMap::from([
-                ("profile".to_owned(), loaded.profile.name.clone()),
-                ("seed".to_owned(), seed.to_string()),
-                ("start_unix_ns".to_owned(), start_unix_ns.to_string()),
-            ]);
-            LogHeader {
-                writer: writer.to_owned(),
-                start_unix_ns,
-                run,
-                profile_toml: Some(loaded.toml.clone()),
-                scenario_toml: None,
-            }
-        }
-        LoadedFlight::InSpace(flight) => {
-            tick_log::sortie::header(writer, &seeded(flight, seed).recipe, flight.number, start_unix_ns)
-        }
-    }
+    let dispersion =
+        (DISPERSION, Dispersion::builtin_toml(DISPERSION).map_err(sim::recipe::RecipeError::from)?);
+    Ok(RocketFlight { recipe: Recipe::from_texts((name_or_path, &toml), dispersion)?, number: 0 })
 }
 
 #[cfg(test)]
@@ -185,35 +67,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_built_in_name_loads_as_what_it_is() {
-        for (name, text) in builtins() {
-            let loaded = load_flight(name).unwrap();
-            assert_eq!((loaded.name(), loaded.toml()), (name, text));
-            assert!(!loaded.summary().is_empty());
-            let from_apogee = vehicles::mission::BUILTIN.iter().any(|(known, _)| *known == name);
-            assert_eq!(matches!(loaded, LoadedFlight::InSpace(_)), from_apogee, "{name}");
-            assert_eq!(load_planar(name).is_err(), from_apogee, "{name}");
+    fn every_built_in_mission_loads_with_field_dispersions() {
+        for (name, text) in vehicles::mission::BUILTIN {
+            let RocketFlight { recipe, number } = load_flight(name).unwrap();
+            assert_eq!(
+                (recipe.mission.name.as_str(), recipe.mission_toml.as_str(), number),
+                (*name, *text, 0)
+            );
+            assert_eq!(recipe.dispersion, Dispersion::builtin(DISPERSION).unwrap());
+            assert!(!recipe.dispersion_toml.is_empty());
         }
     }
 
     #[test]
-    fn a_mission_has_field_dispersions_by_default() {
-        let LoadedFlight::InSpace(flight) = load_flight("mk2").unwrap() else { panic!("not from apogee") };
-        assert_eq!(flight.recipe.dispersion, Dispersion::builtin(DISPERSION).unwrap());
-        assert!(!flight.recipe.dispersion_toml.is_empty());
-    }
-
-    #[test]
-    fn a_file_that_is_neither_profile_nor_mission_is_refused() {
+    fn what_is_no_mission_is_refused_with_the_names_there_are() {
         let words = load_flight("mk9").err().unwrap().to_string();
-        assert!(
-            words.contains("mk9") && words.contains("mk2") && words.contains("paper-calibrated"),
-            "{words}"
-        );
-        let words = load_planar("mk2").err().unwrap().to_string();
-        assert!(words.contains("mk2 flies in space"), "{words}");
-        let flight = load_flight("mk2").unwrap();
-        let words = flight.vehicle(1, DeadlinePolicy::Enforce).err().unwrap().to_string();
-        assert!(words.contains("mk2: deadlines"), "{words}");
+        assert!(words.contains("mk9") && words.contains("mk2") && words.contains("vlr"), "{words}");
     }
 }

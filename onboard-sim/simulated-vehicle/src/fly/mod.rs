@@ -24,14 +24,12 @@ use protocol::log::v1::LandingVerdict;
 use protocol::transport::LinkAddress;
 use sim::recipe::RecipeError;
 use tokio::sync::watch;
-use vehicle_link::streams::Standard;
-use vehicles::file_error::FileError;
 
 pub use self::board::BoardError;
 use self::board::OnBoard;
 pub use self::boot::OnTheWire;
 use self::links::{Heard, Links};
-pub use self::load::{LoadedFlight, LoadedProfile, builtins, load_flight, load_planar, log_header};
+pub use self::load::load_flight;
 use self::offered::Offer;
 use self::own_start::OwnStart;
 pub use self::pace::Lateness;
@@ -40,10 +38,9 @@ pub(crate) use self::radio::Delayed;
 use self::recording::{log_state, nanoseconds, note, record};
 use crate::endpoint::{self, VehicleEndpoint};
 use crate::solve_times::SolveTimes;
-use crate::vehicle::{Judged, Vehicle, VehicleEvent};
-use flight::computer::plane::PlaneError;
-pub use flight::vehicle::profile::StartPoint;
-pub use sim::plane::DeadlinePolicy;
+use crate::vehicle::{Judged, RocketFlight, Vehicle, VehicleEvent};
+use flight::computer::FRAME_S;
+pub use flight::vehicle::mission::StartPoint;
 
 /// How fast simulated time runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,8 +68,8 @@ impl std::str::FromStr for Speed {
 
 /// The options of a flight.
 pub struct FlyOptions {
-    /// The profile or mission to fly.
-    pub profile: LoadedFlight,
+    /// The flight.
+    pub flight: RocketFlight,
     /// MAVLink system id of the vehicle.
     pub system_id: u8,
     /// Links to serve; may be empty.
@@ -85,8 +82,6 @@ pub struct FlyOptions {
     pub recorder: Option<Recorder>,
     /// Its identity and budgets on the wire.
     pub on_the_wire: OnTheWire,
-    /// Seed of the dispersions.
-    pub seed: u64,
     /// Speed of simulated time.
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
@@ -94,8 +89,6 @@ pub struct FlyOptions {
     /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to stop. After an abort
     /// on the pad the links are always served: the crew has to see the countdown of the waiting time.
     pub exit_when_safed: bool,
-    /// What happens to a late controller output.
-    pub deadline_policy: DeadlinePolicy,
     /// Folder with the pipes of a board whose flight computer decides every frame, too, and that hears the crew on its own
     /// radio; then there are no links and no start by itself.
     pub board: Option<PathBuf>,
@@ -126,51 +119,25 @@ impl LogClock {
 /// Why a flight could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
-    /// No profile of that name.
-    #[error("no profile `{given}`: not a file, and the built-in ones are {}", load::builtin_names())]
-    NoProfile {
+    /// No mission of that name.
+    #[error("no mission `{given}`: not a file, and the built-in ones are {}", load::builtin_names())]
+    NoMission {
         /// The requested name.
         given: String,
     },
-    /// The profile's file cannot be read.
-    #[error("cannot read the profile {path}")]
-    ReadProfile {
+    /// The mission's file cannot be read.
+    #[error("cannot read the mission {path}")]
+    ReadMission {
         path: String,
         /// What the system said.
         source: std::io::Error,
     },
-    /// The profile is wrong.
-    #[error(transparent)]
-    Profile(#[from] FileError),
     /// The mission is wrong.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
-    /// The mission flies from apogee, but a start at ignition is needed.
-    #[error("{name} flies in space; this takes a profile that starts at ignition: {}", load::planar_names())]
-    InSpace {
-        /// The mission.
-        name: String,
-    },
-    /// Late outputs are not dropped in flights from apogee.
-    #[error("{name}: deadlines are enforced in profiles that start at ignition only")]
-    DeadlinePolicy {
-        /// The mission.
-        name: String,
-    },
-    /// The flight from apogee cannot be set up.
+    /// The flight cannot be set up.
     #[error(transparent)]
     Rocket(#[from] sim::sortie::SetUpError),
-    /// A planar profile starts at ignition only.
-    #[error(
-        "{name} starts at ignition; a mission (mk2, mk3) may start on its pad, at apogee or below a drone"
-    )]
-    NoSuchStart {
-        /// The profile's name.
-        name: String,
-    },
-    /// The profile cannot be simulated.
-    #[error(transparent)]
-    Plane(#[from] PlaneError),
     /// The key cannot be used.
     #[error(transparent)]
     Key(#[from] KeyFileError),
@@ -186,12 +153,6 @@ pub enum FlyError {
     /// The board, or what it has decided.
     #[error(transparent)]
     Board(#[from] BoardError),
-    /// The board's image flies missions.
-    #[error("{name} starts at ignition; a board flies missions (mk2, mk3) with this program")]
-    NotOnABoard {
-        /// The profile's name.
-        name: String,
-    },
     /// A link cannot be opened.
     #[error("cannot open the link {link}")]
     Link {
@@ -204,7 +165,7 @@ pub enum FlyError {
 /// How a flight ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FlightEnd {
-    /// Landed inside every limit; from apogee: inside the limits of the legs.
+    /// Landed inside the limits of the legs.
     Landed,
     /// On the ground, outside a limit.
     OutsideLimits,
@@ -228,7 +189,7 @@ pub struct FlightSummary {
     pub phase: Phase,
     /// Simulated time, s.
     pub time_s: f64,
-    /// Controller ticks and how long they took.
+    /// Plans and how long they took.
     pub solve_times: SolveTimes,
     /// How late frames began.
     pub lateness: Lateness,
@@ -245,11 +206,11 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
 }
 
 /// The vehicle's endpoint, set up from the options.
-fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEndpoint {
+fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
     let endpoint = match (&options.crew, &options.key_file) {
-        (Some(_), _) => VehicleEndpoint::sending_to_crew(standard),
-        (None, Some(_)) => VehicleEndpoint::sending_signed(standard),
-        (None, None) => VehicleEndpoint::sending(standard),
+        (Some(_), _) => VehicleEndpoint::sending_to_crew(),
+        (None, Some(_)) => VehicleEndpoint::sending_signed(),
+        (None, None) => VehicleEndpoint::new(),
     };
     let capacities_bytes_s: Vec<u32> =
         options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();
@@ -262,7 +223,7 @@ fn endpoint_of(options: &FlyOptions, standard: &'static [Standard]) -> VehicleEn
 
 /// The vehicle, powered up, with its crew and with its pin out.
 fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
-    let mut vehicle = options.profile.vehicle(options.seed, options.deadline_policy)?;
+    let mut vehicle = options.flight.vehicle()?;
     if let Some(crew) = &options.crew {
         if options.key_file.is_none() {
             return Err(FlyError::CrewWithoutKey);
@@ -279,16 +240,13 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
 }
 
 fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
-    let LoadedFlight::InSpace(flight) = &options.profile else {
-        return Err(FlyError::NotOnABoard { name: options.profile.name().to_owned() });
-    };
+    let recipe = &options.flight.recipe;
     let on_the_air = OnTheAir {
-        mission: options.profile.name().to_owned(),
+        mission: recipe.mission.name.clone(),
         system_id: u32::from(options.system_id),
         boot_number: options.on_the_wire.boot_number.get(),
         budget_bytes_s: options.on_the_wire.serial_bytes_s,
     };
-    let recipe = &flight.recipe;
     Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
 }
 
@@ -307,11 +265,11 @@ fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> Flig
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
-/// The outcome depends only on the profile, the seed and the frames that arrive on the links, not on the speed, the
-/// machine or the clock. (If deadlines are enforced, it also depends on the speed of the machine.)
+/// The outcome depends only on the flight and the frames that arrive on the links, not on the speed, the
+/// machine or the clock.
 ///
 /// # Errors
-/// The profile cannot be simulated, or a link cannot be opened.
+/// The flight cannot be simulated, or a link cannot be opened.
 pub async fn fly_observed(
     options: FlyOptions,
     mut stop: watch::Receiver<bool>,
@@ -325,7 +283,7 @@ pub async fn fly_observed(
         options.recorder.clone(),
     )
     .await?;
-    let mut endpoint = endpoint_of(&options, vehicle.standard());
+    let mut endpoint = endpoint_of(&options);
     let mut on_board = options.board.as_deref().map(|folder| on_board(folder, &options)).transpose()?;
     // Somebody may be heard: here, or on the board's own radio.
     let served = !options.links.is_empty() || on_board.is_some();
@@ -333,7 +291,7 @@ pub async fn fly_observed(
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
     let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false };
-    let mut pace = Pace::new(options.speed, vehicle.frame_s());
+    let mut pace = Pace::new(options.speed, FRAME_S);
     let mut log_state_due_s = 0.0;
     let (mut dropped, mut offer) = (0, Offer::default());
 
@@ -364,10 +322,8 @@ pub async fn fly_observed(
         }
         for event in &events {
             observe(time_s, event);
-            match event {
-                VehicleEvent::Tick(tick) => solve_times.add(tick.solve_time_s, tick.deadline_s),
-                VehicleEvent::Planned { took_s, deadline_s, .. } => solve_times.add(*took_s, *deadline_s),
-                _ => {}
+            if let VehicleEvent::Planned { took_s, deadline_s, .. } = event {
+                solve_times.add(*took_s, *deadline_s);
             }
         }
         if let Some(recorder) = &options.recorder {

@@ -6,6 +6,9 @@ use flight::rules::phase::Phase;
 
 use crate::vehicle::Vehicle;
 
+/// The arming checks pass within this time, s, if they ever do: the rehearsal of a long flight takes some seconds.
+const READY_WITHIN_S: f64 = 10.0;
+
 /// Arms and starts once the checks pass.
 pub(super) struct OwnStart {
     pub(super) wanted: bool,
@@ -26,7 +29,7 @@ impl OwnStart {
             return Vec::new();
         }
         match arming::first_refusal(&vehicle.arming_checks()) {
-            Some(reason) if vehicle.time_s() > vehicle.ready_within_s() => self.refused = Some(reason),
+            Some(reason) if vehicle.time_s() > READY_WITHIN_S => self.refused = Some(reason),
             Some(_) => {}
             None => {
                 (self.wanted, self.asked) = (false, true);

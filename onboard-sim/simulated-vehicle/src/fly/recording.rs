@@ -45,13 +45,6 @@ pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEv
     }
     for event in events {
         let record = match event {
-            VehicleEvent::Tick(tick) => Record::from(tick_log::tick_to_log(
-                &tick.tick.input,
-                &tick.tick.output,
-                tick.tick.state_digest,
-                tick.solve_time_s,
-                tick.deadline_s,
-            )),
             VehicleEvent::Verdict { .. } => match vehicle.verdict_record() {
                 Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
                 None => continue,

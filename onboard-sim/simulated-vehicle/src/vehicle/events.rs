@@ -1,21 +1,10 @@
 //! The events that a vehicle reports.
 
 use flight::computer::news::{News, Severity};
-use flight::computer::plane::PlanarTick;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::LandingVerdict;
 
 use super::Impact;
-
-/// One tick of the planar vehicle's landing controller, and its solve time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tick {
-    pub tick: PlanarTick,
-    /// Measured, s.
-    pub solve_time_s: f64,
-    /// Allowed, s.
-    pub deadline_s: f64,
-}
 
 /// An event that a vehicle reports.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,13 +18,11 @@ pub enum VehicleEvent {
         from: Phase,
         to: Phase,
     },
-    /// The controller ran.
-    Tick(Box<Tick>),
-    /// The pilot of a rocket in space planned in this frame.
+    /// The pilot planned in this frame.
     Planned {
-        /// The frame's number, from apogee.
+        /// The frame's number, from the release.
         frame: u64,
-        /// Its time since apogee, s.
+        /// Its time since the release, s.
         time_s: f64,
         /// Measured, s.
         took_s: f64,

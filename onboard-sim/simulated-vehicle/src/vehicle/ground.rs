@@ -5,7 +5,6 @@ use flight::computer::news::Severity;
 use flight::rules::phase::Phase;
 use sim::limits::Limits;
 use sim::outcome::Outcome;
-use sim::plane::PlanarFlight;
 use sim::sortie::Sortie;
 use world::RestOutcome;
 
@@ -37,7 +36,7 @@ impl Ground {
     }
 
     /// Looks at a rocket after a frame.
-    pub(super) fn watch_space(&mut self, sortie: &Sortie) -> Vec<VehicleEvent> {
+    pub(super) fn watch(&mut self, sortie: &Sortie) -> Vec<VehicleEvent> {
         let mut events = Vec::new();
         let Some(released_at_s) = sortie.computer().released_at_s() else { return events };
         let world = sortie.world();
@@ -69,21 +68,6 @@ impl Ground {
             self.given_up = true;
             let text = format!("the simulation ends here, in {}", phase.name());
             events.push(VehicleEvent::Text { severity: Severity::Error, text });
-        }
-        events
-    }
-
-    /// Looks at the planar vehicle after a frame.
-    pub(super) fn watch_plane(&mut self, flight: &PlanarFlight) -> Vec<VehicleEvent> {
-        let new = flight.impacts().get(self.contacts..).unwrap_or_default();
-        let mut events: Vec<_> =
-            new.iter().map(|impact| contact(impact.state.ground_velocity_m_s().1)).collect();
-        self.contacts = flight.impacts().len();
-        let down = flight.computer().mode().phase == Phase::Touchdown;
-        if let (true, None, Some((impact, verdict))) = (down, self.judged, flight.judge()) {
-            let impact = Impact { time_s: impact.time_s, state: impact.state };
-            self.judged = Some(Judged { impact, verdict, landed: verdict.landed() });
-            events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
         }
         events
     }

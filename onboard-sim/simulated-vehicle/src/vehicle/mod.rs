@@ -1,16 +1,13 @@
 //! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
 //!
-//! Two vehicles exist: a rocket in space ([`sim::sortie`]) and the landing paper's planar vehicle ([`sim::plane`]).
-//! Both are flown by the same flight computer. This module has the interface that the run loop uses; the radio takes a
-//! [`Snapshot`], and the log takes records ([`log`](self::log)).
+//! This module has the interface that the run loop uses; the radio takes a [`Snapshot`], and the log takes records
+//! ([`log`](self::log)).
 //!
 //! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
 
 mod events;
 mod ground;
 mod log;
-mod plane;
-mod space;
 #[cfg(test)]
 mod tests;
 
@@ -18,55 +15,43 @@ use std::time::Duration;
 
 use flight::computer::crew::{Answer, People, Request};
 use flight::computer::news::Severity;
-use flight::computer::{Commander, Computer, Input, LogState, Output};
+use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
-use flight::vehicle::profile::{StartPoint, StateWeights};
+use flight::vehicle::mission::{StartPoint, StateWeights};
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
-use sim::plane::PlanarFlight;
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
 
-pub use self::events::{Tick, VehicleEvent};
+pub use self::events::VehicleEvent;
 use self::ground::Ground;
 use vehicle_link::sensed::SensorWatch;
-use vehicle_link::snapshot::Known;
 pub use vehicle_link::snapshot::{
     AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
     Impact, Judged, Motion, PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
 };
-use vehicle_link::streams::{FROM_APOGEE, STANDARD, Standard};
+use vehicle_link::snapshot::{InSpace, Known};
 pub use vehicle_link::vehicle::MissionName;
 
-/// A flight of a rocket in space, by recipe and number.
+/// A flight, by recipe and number.
 #[derive(Debug, Clone)]
 pub struct RocketFlight {
     pub recipe: Recipe,
     pub number: u64,
 }
 
-/// The flight under way.
-enum Flight {
-    Space(Box<InSpace>),
-    Plane(Box<PlanarFlight>),
-}
-
-/// A rocket in space, and the last values of its sensors.
-struct InSpace {
+/// One vehicle, one flight.
+#[derive(Clone)]
+pub struct Vehicle {
     sortie: Sortie,
     sensors: SensorWatch,
     /// How long the last plan took, s.
     took_s: f64,
     /// A frame of the flight computer was flown in the air just now.
     flown: bool,
-}
-
-/// One vehicle, one flight.
-pub struct Vehicle {
-    flight: Flight,
     pin_out: bool,
     log: LogState,
     uplink: Uplink,
@@ -75,8 +60,6 @@ pub struct Vehicle {
     operators: Vec<Operator>,
     mission: MissionName,
     ground: Ground,
-    /// How long the last tick of the planar vehicle took, s.
-    tick_took_s: f64,
     /// Input and output of the flight computer in the last frame; `None` if it was dead.
     computer_frame: Option<Box<ComputerFrame>>,
     /// How many frames the flight computer has decided.
@@ -113,24 +96,16 @@ pub struct Frame {
 }
 
 impl Vehicle {
-    /// A rocket powered up on its pad.
+    /// A vehicle powered up on its pad.
     ///
     /// # Errors
     /// The flight cannot be set up.
-    pub fn in_space(flight: &RocketFlight) -> Result<Self, SetUpError> {
-        let sortie = Sortie::on_the_pad(&flight.recipe, flight.number)?;
-        let in_space = InSpace { sortie, sensors: SensorWatch::default(), took_s: 0.0, flown: false };
-        Ok(Self::of(Flight::Space(Box::new(in_space))))
-    }
-
-    /// The planar vehicle powered up in its rig.
-    pub fn in_plane(flight: PlanarFlight) -> Self {
-        Self::of(Flight::Plane(Box::new(flight)))
-    }
-
-    fn of(flight: Flight) -> Self {
-        Self {
-            flight,
+    pub fn on_the_pad(flight: &RocketFlight) -> Result<Self, SetUpError> {
+        Ok(Self {
+            sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
+            sensors: SensorWatch::default(),
+            took_s: 0.0,
+            flown: false,
             pin_out: false,
             log: LogState::NONE,
             uplink: Uplink::NotNeeded,
@@ -139,11 +114,10 @@ impl Vehicle {
             operators: Vec::new(),
             mission: MissionName::default(),
             ground: Ground::default(),
-            tick_took_s: 0.0,
             computer_frame: None,
             frames_decided: 0,
             rehearsed: false,
-        }
+        })
     }
 
     /// Moves the pin that a crew moves by hand.
@@ -168,12 +142,12 @@ impl Vehicle {
         Self { people: Some(people), operators, ..self }
     }
 
-    /// Which mission or profile it flies.
+    /// Which mission it flies.
     pub fn mission(&self) -> &MissionName {
         &self.mission
     }
 
-    /// Sets the name and the text of the mission or profile that it flies.
+    /// Sets the name and the text of the mission that it flies.
     #[must_use]
     pub fn of_mission(self, name: &str, text: &str) -> Self {
         let mission = MissionName { name: name.to_owned(), hash: MissionHash::of(text) };
@@ -202,10 +176,7 @@ impl Vehicle {
             requests,
         };
         let mut watcher = Watcher { stopwatch, rehearsed_before: self.rehearsed, frame: None };
-        let Flown { output, took } = match &mut self.flight {
-            Flight::Space(space) => space.sortie.step_with(&outside, &mut watcher),
-            Flight::Plane(flight) => flight.step_with(&outside, &mut watcher),
-        };
+        let Flown { output, took } = self.sortie.step_with(&outside, &mut watcher);
         self.computer_frame = watcher.frame;
         self.frames_decided += u64::from(self.computer_frame.is_some());
         // A computer that has restarted on the pad takes it again.
@@ -214,110 +185,78 @@ impl Vehicle {
         let (mut released, mut answers) = (false, Vec::new());
         if let Some(output) = output {
             events.extend(output.news.into_iter().map(VehicleEvent::from));
-            let took_s = took.as_secs_f64();
-            if let Some(tick) = output.tick {
-                self.tick_took_s = took_s;
-                events.push(VehicleEvent::Tick(Box::new(Tick {
-                    tick: *tick,
-                    solve_time_s: took_s,
-                    deadline_s: self.deadline_s(),
-                })));
-            } else if output.planned {
-                events.extend(self.planned(took_s));
+            if output.planned {
+                events.extend(self.planned(took.as_secs_f64()));
             }
             (released, answers) = (output.released, output.answers);
         }
-        if let Flight::Space(space) = &mut self.flight {
-            let flying = space.sortie.computer().released_at_s().is_some();
-            space.flown = flying && !released && !self.ground.is_over(space.sortie.computer());
-            if let Some(measured) = space.sortie.measured() {
-                space.sensors.take(measured, space.sortie.frame());
-            }
+        let flying = self.computer().released_at_s().is_some();
+        self.flown = flying && !released && !self.ground.is_over(self.sortie.computer());
+        if let Some(measured) = self.sortie.measured() {
+            self.sensors.take(measured, self.sortie.frame());
         }
-        events.extend(self.events_of_the_simulation(released, took));
+        events.extend(self.events_of_the_simulation(released));
         Frame { events, answers }
     }
 
-    /// The event for a frame in which a rocket's pilot planned.
+    /// The event for a frame in which the pilot planned.
     fn planned(&mut self, took_s: f64) -> Option<VehicleEvent> {
-        let Flight::Space(space) = &mut self.flight else { return None };
-        space.took_s = took_s;
-        let (input, _) = space.sortie.computer().piloted()?;
-        let (frame, time_s, deadline_s) = (input.frame, input.time_s, flight::computer::FRAME_S);
+        self.took_s = took_s;
+        let (input, _) = self.sortie.computer().piloted()?;
+        let (frame, time_s, deadline_s) = (input.frame, input.time_s, FRAME_S);
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s })
     }
 
-    /// Events that only the simulation knows: the start of the flight, contact with the ground, a late output, the
-    /// verdict.
-    fn events_of_the_simulation(&mut self, released: bool, took: Duration) -> Vec<VehicleEvent> {
-        let mut said = Vec::new();
-        match &self.flight {
-            Flight::Space(space) if released && space.sortie.mission().start.at == StartPoint::Apogee => {
-                let height_m = space.sortie.world().height_m();
-                let words =
-                    format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
-                said.push(VehicleEvent::Text { severity: Severity::Notice, text: words });
-            }
-            Flight::Plane(flight)
-                if flight.was_late() && self.tick_took_s.to_bits() == took.as_secs_f64().to_bits() =>
-            {
-                let words = format!("deadline missed by {:.3} s", took.as_secs_f64() - flight.deadline_s());
-                said.push(VehicleEvent::Text { severity: Severity::Warning, text: words });
-            }
-            Flight::Space(_) | Flight::Plane(_) => {}
+    /// Events that only the simulation knows: the start of the flight, contact with the ground, the verdict.
+    fn events_of_the_simulation(&mut self, released: bool) -> Vec<VehicleEvent> {
+        if !released {
+            return self.ground.watch(&self.sortie);
         }
-        said.extend(match &self.flight {
-            Flight::Space(space) if !released => self.ground.watch_space(&space.sortie),
-            Flight::Space(_) => Vec::new(),
-            Flight::Plane(flight) => self.ground.watch_plane(flight),
-        });
-        said
+        if self.sortie.mission().start.at != StartPoint::Apogee {
+            return Vec::new();
+        }
+        let height_m = self.sortie.world().height_m();
+        let text = format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
+        vec![VehicleEvent::Text { severity: Severity::Notice, text }]
     }
 
     /// Its flight computer.
     pub fn computer(&self) -> &Computer {
-        match &self.flight {
-            Flight::Space(space) => space.sortie.computer(),
-            Flight::Plane(flight) => flight.computer(),
-        }
+        self.sortie.computer()
     }
 
     /// Simulated time since power-up, s.
     pub fn time_s(&self) -> f64 {
-        match &self.flight {
-            Flight::Space(space) => flight::computer::flight_time_s(space.sortie.frame()),
-            Flight::Plane(flight) => flight.time_s(),
-        }
-    }
-
-    pub fn frame_s(&self) -> f64 {
-        match &self.flight {
-            Flight::Space(_) => flight::computer::FRAME_S,
-            Flight::Plane(flight) => flight.frame_s(),
-        }
-    }
-
-    /// How long the flight computer may take over a plan or a tick, s.
-    fn deadline_s(&self) -> f64 {
-        match &self.flight {
-            Flight::Space(_) => flight::computer::FRAME_S,
-            Flight::Plane(flight) => flight.deadline_s(),
-        }
+        flight::computer::flight_time_s(self.sortie.frame())
     }
 
     /// The state now.
     pub fn snapshot(&self) -> Snapshot {
-        match &self.flight {
-            Flight::Space(space) => self.snapshot_in_space(space),
-            Flight::Plane(flight) => self.snapshot_in_plane(flight),
-        }
+        let sortie = &self.sortie;
+        let (world, battery) = (sortie.world(), sortie.battery());
+        let seen = InSpace {
+            known: self.known(),
+            mission: sortie.mission(),
+            gimbal_rad: world.gimbal_rad(),
+            fins_rad: world.fins_rad(),
+            sensors: self.sensors.facts(sortie.frame()),
+            battery: Some(BatteryFacts {
+                volts: battery.volts(),
+                current_a: Some(battery.current_a()),
+                left: Some(battery.charge()),
+            }),
+            rehearsed: sortie.rehearsed().map(|(_, report)| report),
+            parachute_ejected: world.parachute_ejected(),
+            took_s: self.took_s,
+        };
+        seen.snapshot()
     }
 
     fn known(&self) -> Known<'_> {
         Known {
             computer: self.computer(),
             time_s: self.time_s(),
-            deadline_s: self.deadline_s(),
+            deadline_s: FRAME_S,
             judged: self.judged(),
             people: self.people,
             operators: &self.operators,
@@ -351,51 +290,25 @@ impl Vehicle {
         self.computer().arming_checks()
     }
 
-    /// Time within which the arming checks pass, s, if they ever do. The rehearsal of a long flight takes some seconds.
-    pub fn ready_within_s(&self) -> f64 {
-        match &self.flight {
-            Flight::Space(_) => 10.0,
-            Flight::Plane(_) => 3.0,
-        }
-    }
-
-    /// Every message that is sent without a request.
-    pub fn standard(&self) -> &'static [Standard] {
-        match &self.flight {
-            Flight::Space(_) => &FROM_APOGEE,
-            Flight::Plane(_) => &STANDARD,
-        }
-    }
-
     /// Weights of the landing cost.
     pub fn weights(&self) -> StateWeights {
-        match &self.flight {
-            Flight::Space(space) => space.sortie.mission().powered.weights,
-            Flight::Plane(flight) => flight.plane().profile().nmpc.weights,
-        }
+        self.sortie.mission().powered.weights
     }
 
-    /// The touchdown limits with the values found, once the landing is judged; for a rocket in space, the limits of the
-    /// legs.
+    /// The touchdown limits with the values found, once the landing is judged: those of the legs.
     pub fn judged(&self) -> Option<Judged> {
         self.ground.judged()
     }
 
-    /// The landing judged by the landing paper's Table 2; [`Vehicle::judged`] judges a rocket by the limits of the
-    /// legs.
+    /// The landing judged by the landing paper's Table 2.
     pub fn judged_by_table_2(&self) -> Option<Judged> {
         self.ground.judged_by_table_2()
     }
 
     /// The simulated radio: its silence and its delay.
     pub fn radio(&self) -> Radio {
-        match &self.flight {
-            Flight::Space(space) => {
-                let radio = *space.sortie.radio();
-                Radio { silent: radio.silent || space.sortie.computer_is_dead(), ..radio }
-            }
-            Flight::Plane(_) => Radio::default(),
-        }
+        let radio = *self.sortie.radio();
+        Radio { silent: radio.silent || self.sortie.computer_is_dead(), ..radio }
     }
 }
 

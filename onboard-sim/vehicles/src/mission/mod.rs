@@ -10,7 +10,7 @@ use alloc::string::String;
 
 use flight::estimation::estimator::EstimatorConfigError;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -89,9 +89,6 @@ fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
             refuse("pad", "needs the section [launch] with its rail and booster")
         }
         StartPoint::Drone if mission.drop.is_none() => refuse("drone", "needs the section [drop]"),
-        StartPoint::Ignition => {
-            refuse("ignition", "is for planar profiles: apogee, pad or drone is accepted")
-        }
         StartPoint::Pad | StartPoint::Apogee | StartPoint::Drone => Ok(()),
     }
 }

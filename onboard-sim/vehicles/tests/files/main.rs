@@ -5,5 +5,4 @@ mod airframe;
 mod mission;
 mod mk3_parts;
 mod motors;
-mod profile;
 mod thrust_curve;

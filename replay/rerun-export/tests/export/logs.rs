@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use flight::guidance::controller::ControlLevel;
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 
 use super::{COMPONENTS, rms_and_max};

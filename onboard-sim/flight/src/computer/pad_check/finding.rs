@@ -6,7 +6,7 @@ use alloc::string::String;
 use super::PadSwitches;
 use crate::computer::memory::{Memory, Remembers};
 use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::{ArmingLimits, StartPoint};
+use crate::vehicle::mission::{ArmingLimits, StartPoint};
 
 /// The surfaces: gimbal pitch and yaw, fins 1 to 4.
 pub const SURFACES: usize = 6;

@@ -24,7 +24,7 @@ use crate::estimation::estimator::Measurements;
 use crate::rules::operator::Operator;
 use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::{ArmingLimits, StartPoint};
+use crate::vehicle::mission::{ArmingLimits, StartPoint};
 
 /// How the last check stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -7,8 +7,8 @@ use crate::computer::FRAME_S;
 use crate::computer::memory::remembers;
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{FELT_AT_REST_M_S2, STILL_RAD_S};
+use crate::vehicle::mission::ArmingLimits;
 use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::ArmingLimits;
 
 /// Frames watched: 5 s, in which a spread is known to 2 % (1 / sqrt(2 * 1000)).
 pub(super) const FRAMES: u32 = 1000;

@@ -30,12 +30,12 @@ use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::guidance::baseline::{Baseline, Law};
-use crate::guidance::controller::ControlLevel;
+use crate::guidance::powered::ControlLevel;
 use crate::guidance::powered::{PoweredGuidance, PoweredReport};
 use crate::rules::phase::Phase;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::mission::Mission;
-use crate::vehicle::profile::StartPoint;
+use crate::vehicle::mission::StartPoint;
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 

@@ -12,7 +12,7 @@ use crate::vehicle::rigid::RigidState;
 /// A phase table as it is right after the release.
 pub(super) fn released() -> PhaseTable {
     let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
-    let computer = Computer::in_space(&mission, Law::Nmpc, &RigidState::upright(300.0));
+    let computer = Computer::at_power_up(&mission, Law::Nmpc, &RigidState::upright(300.0));
     computer.released().into_table()
 }
 

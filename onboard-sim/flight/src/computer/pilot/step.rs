@@ -11,14 +11,14 @@ use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
-use crate::guidance::controller::ControlLevel;
 use crate::guidance::descent::DescentSituation;
+use crate::guidance::powered::ControlLevel;
 use crate::rules::gate::{GateInput, gate_checks};
 use crate::rules::phase::{Effect, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase};
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::fins::Moments;
-use crate::vehicle::profile::StartPoint;
+use crate::vehicle::mission::StartPoint;
 
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;

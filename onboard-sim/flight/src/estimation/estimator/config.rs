@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use crate::vehicle::profile::StartPoint;
+use crate::vehicle::mission::StartPoint;
 
 /// Standard gravity, m/s^2.
 pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -248,7 +248,7 @@ impl StartUncertainty {
     pub fn at_start(start: StartPoint) -> Self {
         match start {
             StartPoint::Pad => Self::on_pad(),
-            StartPoint::Apogee | StartPoint::Drone | StartPoint::Ignition => Self::at_apogee(),
+            StartPoint::Apogee | StartPoint::Drone => Self::at_apogee(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Flown, Plane, PoweredGuidance, PoweredReport};
 use crate::computer::memory::{Memory, Remembers, remembers};
-use crate::guidance::controller::ControlLevel;
+use crate::guidance::powered::ControlLevel;
 use crate::vehicle::dynamics::PlanarState;
 use nmpc::free_time::FreeTimeSolution;
 use nmpc::{Solution, SolveStatus};

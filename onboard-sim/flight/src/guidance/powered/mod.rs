@@ -10,7 +10,7 @@
 //! A mission with `[powered.space]` plans in `space` instead: the nose may lean in any direction, and the plan has the
 //! fins as well.
 //!
-//! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s of the planar controller.
+//! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s.
 
 mod digest;
 mod flown;
@@ -31,7 +31,7 @@ pub use homing::Homing;
 pub(crate) use homing::here_m;
 pub use inspect::LandingSolved;
 pub use plane::Plane;
-pub use report::PoweredReport;
+pub use report::{ControlLevel, PoweredReport};
 pub use settings::PoweredSettings;
 use situation::Ahead;
 pub use situation::PoweredSituation;
@@ -41,9 +41,8 @@ pub use space::SpaceSettings;
 use nalgebra::Vector3;
 
 use crate::control::aim::Aim;
-use crate::guidance::controller::ControlLevel;
 use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::profile::{FinalBox, SolverLimits};
+use crate::vehicle::mission::{FinalBox, SolverLimits};
 use crate::vehicle::rigid::RigidState;
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
 use nmpc::{Problem, SolveStatus};

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{Homing, SpaceSettings};
-use crate::vehicle::profile::{FinalBox, SolverLimits, StateWeights};
+use crate::vehicle::mission::{FinalBox, SolverLimits, StateWeights};
 
 /// The settings of the landing burn.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

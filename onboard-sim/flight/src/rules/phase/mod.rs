@@ -11,7 +11,7 @@ mod latch;
 mod motor;
 mod transition;
 
-pub use crate::vehicle::profile::StartPoint;
+pub use crate::vehicle::mission::StartPoint;
 pub use event::{Effect, Effects, Event, Refusal};
 pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, LAST_HOLD_S, UPLINK_SILENT_S};
 pub use latch::Latch;

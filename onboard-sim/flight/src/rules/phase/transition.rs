@@ -132,21 +132,15 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             P::Boost,
             Effects::of(&[Effect::IgniteAscentMotor]),
         ),
-        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee)) if countdown_over(mode, time_s) => {
-            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
-        }
         // A drone's pilot lets go when he likes, but not before the countdown is over, and not while it is held.
-        (P::PadArmed, E::ReleasedAt(StartPoint::Drone)) if countdown_over(mode, time_s) => {
+        (P::PadArmed, E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone))
+            if countdown_over(mode, time_s) =>
+        {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
         }
-        (P::PadArmed, E::ReleasedAt(StartPoint::Ignition)) if countdown_over(mode, time_s) => {
-            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::LandArmed, Effects::of(&[Effect::FinsOpen]))
+        (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone)) => {
+            Row::Refuse(Refusal::CountdownNotElapsed)
         }
-        (
-            P::PadArmed,
-            E::CountdownElapsed
-            | E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone | StartPoint::Ignition),
-        ) => Row::Refuse(Refusal::CountdownNotElapsed),
         (_, E::CountdownElapsed) => wrong("end a countdown", "only PAD_ARMED counts down"),
         (_, E::ReleasedAt(StartPoint::Pad)) => wrong("release at the pad", "a pad start lifts off by itself"),
         (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),

@@ -85,7 +85,7 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
 fn another_mission_is_not_armed_whatever_the_station_shows() {
     let fresh = || {
         let mut wire = Wire::new();
-        wire.vehicle = planar().of_mission("mk2", "the right one");
+        wire.vehicle = rocket().of_mission("mk2", "the right one");
         wire
     };
     let ours = MissionHash::of("the right one");
@@ -122,7 +122,7 @@ proptest! {
             params: [1.0, 0.0, 0.0, params[0], params[1], params[2], 0.0],
             confirmation: 0,
         };
-        let vehicle = planar().of_mission("mk2", "the right one");
+        let vehicle = rocket().of_mission("mk2", "the right one");
         let why = vehicle_link::endpoint::meant::why_other_mission(&request, &vehicle);
         prop_assert_eq!(why.is_none(), arms);
     }

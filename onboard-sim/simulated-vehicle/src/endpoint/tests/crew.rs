@@ -80,8 +80,8 @@ impl Launch {
             Station { encoder: Encoder::new(address), signing }
         };
         let mut launch = Self {
-            vehicle: planar().with_crew(people, operators),
-            endpoint: VehicleEndpoint::sending_to_crew(&STANDARD),
+            vehicle: rocket().with_crew(people, operators),
+            endpoint: VehicleEndpoint::sending_to_crew(),
             hub: Hub::new(1, Some(signing)),
             stations: (0..6).map(station).collect(),
             speaking: vec![RANGE, FLIGHT, PAD],
@@ -109,7 +109,7 @@ impl Launch {
     }
 
     fn frame(&mut self) {
-        if self.frames.is_multiple_of(5) {
+        if self.frames.is_multiple_of(20) {
             for station in self.speaking.clone() {
                 let beat = self.signed(station, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
                 self.deliver(&beat);
@@ -377,7 +377,7 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
     let frames_to_latch = |people: Option<People>| {
         let mut launch = Launch::two();
         if people.is_none() {
-            (launch.vehicle, launch.endpoint) = (planar(), VehicleEndpoint::sending_signed(&STANDARD));
+            (launch.vehicle, launch.endpoint) = (rocket(), VehicleEndpoint::sending_signed());
             launch.hub = Hub::new(1, Some(Signing::new(key(1), Memory::default())));
             launch.run(4.0);
         }
@@ -394,13 +394,13 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
     assert_eq!(frames_to_latch(None), 1);
 }
 
-/// Whoever may command may check, alone; nobody else may. (The planar vehicle of these tests has no check to run.)
+/// Whoever may command may check, alone; nobody else may.
 #[test]
 fn a_check_takes_one_operator_with_a_key() {
     let mut launch = Launch::two();
     for (station, expected) in [
         (OBSERVER, "only an operator with a key of their own commands"),
-        (PAD, "only a rocket in space checks itself"),
+        (PAD, "PAD Dan: check of the vehicle begins"),
     ] {
         let (_, words) = launch.says(station, CHECK, 1.0, 0.0);
         assert!(words.contains(expected), "{words}");
@@ -413,6 +413,7 @@ fn one_person_mode_needs_one_key() {
     assert_eq!(launch.asks(OBSERVER, ARM).0, DENIED);
     assert_eq!(launch.asks(PAD, ARM).0, ACCEPTED);
     assert!(launch.armed());
+    launch.run(1.0);
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.people, crew.commanded_by), (1, 4));
     assert_eq!(launch.asks(PAD, START).0, ACCEPTED);

@@ -1,5 +1,6 @@
 //! Tests the vehicle's log over MAVLink FTP: within the link's budget, beside telemetry, and refused while armed.
 
+use flight::computer::FRAME_S;
 use protocol::ftp::download::{Download, Failure, News};
 use protocol::ftp::packet::Refusal;
 use protocol::ftp::server::InMemory;
@@ -40,7 +41,7 @@ impl Wire {
             for packet in download.poll(now) {
                 self.ask_file(&packet);
             }
-            for frame in self.run(0.5 * self.vehicle.frame_s()) {
+            for frame in self.run(0.5 * FRAME_S) {
                 if let Some((_, packet)) = Packet::answer_in(&frame)
                     && let Some(News::Piece { offset, data }) = download.take(&packet, now)
                 {
@@ -63,7 +64,7 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
     for (capacity_bytes_s, signature_len, least) in [(2000, 0, 0.75), (5760, 0, 0.8), (5760, 13, 0.8)] {
         let endpoint = match signature_len {
             0 => VehicleEndpoint::new(),
-            _ => VehicleEndpoint::sending_signed(&STANDARD),
+            _ => VehicleEndpoint::sending_signed(),
         };
         let mut wire = Wire { endpoint: endpoint.over_links(&[capacity_bytes_s]), ..Wire::new() };
         wire.endpoint.offer(Box::new(log(200_000)));
@@ -117,7 +118,7 @@ fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
     }
     // Arming has ended the session, so telemetry is as in any flight.
     wire.run(2.0);
-    assert!(count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID) >= 95);
+    assert!(count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID) >= 76, "8 Hz");
 }
 
 #[test]
@@ -140,7 +141,7 @@ fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
     wire.run(0.5);
     wire.ask_file(&Packet { size: 239, ..Packet::request(2, 0, Opcode::BurstReadFile, 0, "") });
     let mut carried = [[0; 2]; 2];
-    for _ in 0..250 {
+    for _ in 0..1000 {
         let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[]);
         for Outgoing { frame, links } in leaving {
             for link in links {
@@ -150,5 +151,5 @@ fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
         }
     }
     assert!(carried[0][0] <= 2 && carried[0][1] > 20, "{carried:?}");
-    assert!(carried[1][0] >= 48 && carried[1][1] == 0, "{carried:?}");
+    assert!(carried[1][0] >= 38 && carried[1][1] == 0, "{carried:?}");
 }

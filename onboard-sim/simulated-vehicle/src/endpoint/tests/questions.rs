@@ -57,11 +57,11 @@ fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
     }));
     let sent = wire.run(10.0);
     let places: Vec<u16> = values(&sent).iter().map(|value| value.param_index).collect();
-    let parameters = parameters::count(&Streams::of(&STANDARD));
+    let parameters = parameters::COUNT;
     assert_eq!(places, (0..parameters).collect::<Vec<_>>());
     assert!(values(&sent).iter().all(|value| value.param_count == parameters));
     let attitudes = count(&sent, ATTITUDE_QUATERNION_DATA::ID);
-    assert!(attitudes >= 99, "{attitudes}");
+    assert!(attitudes >= 79, "{attitudes} in 10 s at 8 Hz");
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn a_parameter_is_read_by_name_or_index_and_a_missing_one_is_reported() {
     wire.tell(&read(name("NMPC_W_THETA"), -1));
     wire.tell(&read(name("ignored"), 0));
     let found: Vec<f32> = values(&wire.run(0.5)).iter().map(|value| value.param_value).collect();
-    assert_eq!(found, [150.0, 1.0]);
+    assert_eq!(found, [100.0, 1.0]);
     wire.tell(&read(name("NO_SUCH"), -1));
     wire.tell(&read(name(""), 999));
     let errors = wire.run(0.5).into_iter().filter(|frame| {
@@ -97,10 +97,11 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     for (id, asked, holds, why) in [
         ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
         ("RATE_FINS", -3.0, 4.0, "must be"),
-        ("RATE_GIMBAL", f32::NAN, 5.0, "must be"),
-        ("RATE_POSITION", f32::INFINITY, 10.0, "must be"),
+        ("RATE_GIMBAL", f32::NAN, 3.0, "must be"),
+        // The fins take its room.
+        ("RATE_POSITION", f32::INFINITY, 7.0, "must be"),
         ("RATE_HEARTBEAT", 0.0, 1.0, "vital messages"),
-        ("NMPC_W_U", 51.0, 50.0, "from the profile"),
+        ("NMPC_W_U", 51.0, 50.0, "from the mission"),
     ] {
         // Texts have a share of each second.
         wire.run(1.0);

@@ -10,8 +10,7 @@ use protocol::dialect::{
 use sim::dispersion::Dispersion;
 
 use super::*;
-use crate::fly::{Delayed, LoadedFlight, load_flight};
-use vehicle_link::streams::FROM_APOGEE;
+use crate::fly::{Delayed, load_flight};
 
 struct Airborne {
     rocket: Vehicle,
@@ -28,15 +27,15 @@ impl Airborne {
     }
 
     fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
-        let LoadedFlight::InSpace(mut flight) = load_flight("mk2").unwrap() else { panic!("from apogee") };
+        let mut flight = load_flight("mk2").unwrap();
         flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
         flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-        let mut rocket = Vehicle::in_space(&flight).unwrap();
+        let mut rocket = Vehicle::on_the_pad(&flight).unwrap();
         rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
         rocket.set_pin_out(true);
         let mut airborne = Self {
             rocket,
-            endpoint: VehicleEndpoint::sending(&FROM_APOGEE),
+            endpoint: VehicleEndpoint::new(),
             uplink: Vec::new(),
             heard: Delayed::default(),
             sent: Delayed::default(),
@@ -99,7 +98,7 @@ impl Airborne {
 
 #[test]
 fn its_standard_rates_fit_the_radio_signed_or_not() {
-    let all = [Streams::of(&FROM_APOGEE), Streams::signed(&FROM_APOGEE), Streams::with_crew(&FROM_APOGEE)];
+    let all = [Streams::new(), Streams::signed(), Streams::with_crew()];
     for streams in all {
         assert!(streams.fit(), "{} B/s", streams.bytes_s());
         assert!(streams.rate_hz(LOCAL_POSITION_NED_DATA::ID) >= 3.0);

@@ -12,7 +12,7 @@ use super::*;
 
 const STEP_S: f64 = 0.005;
 /// A vehicle's frame in steps.
-const FRAME_STEPS: u64 = 4;
+const FRAME_STEPS: u64 = 1;
 const BAUDS: [u32; 3] = [4_800, 9_600, 57_600];
 
 /// One direction of the line: what it was given arrives in order, ten bits a byte.
@@ -66,18 +66,14 @@ struct Line {
 
 impl Line {
     fn at(baud: u32, signed: bool) -> Self {
-        let endpoint = if signed {
-            VehicleEndpoint::sending_signed(&STANDARD)
-        } else {
-            VehicleEndpoint::sending(&STANDARD)
-        };
+        let endpoint = if signed { VehicleEndpoint::sending_signed() } else { VehicleEndpoint::new() };
         let budget = ((SHARE * f64::from(baud) / 10.0) as u32).min(RADIO_BUDGET_BYTES_S);
         let hub = || {
             let signing = signed.then(|| Signing::new(Key::new([7; Key::LEN]), Memory::default()));
             Hub::new(1, signing).over(&[Some(baud / 10)])
         };
         Self {
-            vehicle: planar(),
+            vehicle: rocket(),
             endpoint: endpoint.over_links(&[budget]),
             vehicle_hub: hub(),
             station_hub: hub(),

@@ -1,14 +1,12 @@
 //! Tests the uplink: arming waits for it, a countdown is held without it, and every station gets a report on it.
 
-use flight::rules::arming::{UPLINK_CHECK, all_passed};
+use flight::computer::FRAME_S;
+use flight::rules::arming::UPLINK_CHECK;
 use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_SILENT_S};
 use protocol::dialect::{COMMAND_CANCEL_DATA, TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor};
 use protocol::signing::Rejection;
-use sim::dispersion::Dispersion;
 
 use super::*;
-use crate::fly::{LoadedFlight, load_flight};
-use vehicle_link::streams::FROM_APOGEE;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
@@ -48,6 +46,7 @@ impl Pad {
             events: Vec::new(),
             beat_in: 0,
         };
+        pad.run(0.1);
         while !all_passed(&pad.vehicle.arming_checks()) {
             assert!(pad.vehicle.time_s() < 20.0, "{:?}", pad.vehicle.arming_checks());
             pad.run(0.1);
@@ -55,12 +54,8 @@ impl Pad {
         pad
     }
 
-    fn planar() -> Self {
-        Self::of(planar(), VehicleEndpoint::new())
-    }
-
-    fn in_space() -> Self {
-        Self::flying("mk2")
+    fn rocket() -> Self {
+        Self::of(rocket(), VehicleEndpoint::new())
     }
 
     /// Below a drone.
@@ -69,9 +64,9 @@ impl Pad {
     }
 
     fn flying(mission: &str) -> Self {
-        let LoadedFlight::InSpace(mut flight) = load_flight(mission).unwrap() else { panic!("in space") };
+        let mut flight = load_flight(mission).unwrap();
         flight.recipe.dispersion = Dispersion::builtin("none").unwrap();
-        Self::of(Vehicle::in_space(&flight).unwrap(), VehicleEndpoint::sending(&FROM_APOGEE))
+        Self::of(Vehicle::on_the_pad(&flight).unwrap(), VehicleEndpoint::new())
     }
 
     /// One frame as in the run loop.
@@ -81,7 +76,7 @@ impl Pad {
                 let beat = self.stations[station].encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
                 self.endpoint.on_frame(0, &beat, &self.vehicle);
             }
-            self.beat_in = (0.1 / self.vehicle.frame_s()).round() as u32;
+            self.beat_in = (0.1 / FRAME_S).round() as u32;
         }
         self.beat_in -= 1;
         let (events, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
@@ -170,7 +165,7 @@ fn frames(leaving: Vec<Outgoing>) -> Vec<Frame> {
 
 #[test]
 fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
-    for mut pad in [Pad::planar(), Pad::in_space()] {
+    for mut pad in [Pad::rocket(), Pad::hanging()] {
         // Another station is heard, but not the one that asks.
         assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
         assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
@@ -184,7 +179,7 @@ fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
 
 #[test]
 fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not_complained_of() {
-    let mut pad = Pad::planar();
+    let mut pad = Pad::rocket();
     assert!(pad.status().checks_failed.is_empty());
     pad.speaking.clear();
     pad.run(3.0);
@@ -195,7 +190,7 @@ fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not
 
 #[test]
 fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
-    for mut pad in [Pad::planar(), Pad::in_space(), Pad::hanging()] {
+    for mut pad in [Pad::rocket(), Pad::hanging()] {
         let countdown_s = pad.vehicle.computer().countdown_s();
         pad.count_down();
         pad.run(1.0);
@@ -228,7 +223,7 @@ fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
 
 #[test]
 fn after_the_release_silence_holds_nothing() {
-    let mut pad = Pad::in_space();
+    let mut pad = Pad::rocket();
     pad.count_down();
     pad.run(pad.vehicle.computer().countdown_s() - 0.5);
     pad.speaking.clear();
@@ -239,23 +234,22 @@ fn after_the_release_silence_holds_nothing() {
 /// Neither silence nor a command; an abort and a disarm do.
 #[test]
 fn in_the_last_moment_nothing_holds_and_the_crew_is_told_why() {
-    for mut pad in [Pad::planar(), Pad::in_space()] {
-        pad.count_down();
-        assert_eq!(pad.status().last_hold_ms, 2_000);
-        pad.run(pad.vehicle.computer().countdown_s() - LAST_HOLD_S - 0.5);
-        // Silent for 2 s at T-0.3 s.
-        pad.speaking.clear();
-        pad.run(0.3);
-        assert!(pad.counting());
-        pad.run(0.2);
-        assert_eq!(pad.ask(CREW, HOLD, 0.0), DENIED);
-        assert_eq!(pad.said("hold refused: the last 2 s have begun, and nothing holds any more"), 1);
-        assert_eq!(pad.said("asks for a hold"), 0);
-        pad.run(LAST_HOLD_S);
-        assert!(!pad.vehicle.phase().on_pad() && pad.said("HOLD") == 0 && pad.said("nothing heard") == 0);
-    }
+    let mut pad = Pad::rocket();
+    pad.count_down();
+    assert_eq!(pad.status().last_hold_ms, 2_000);
+    pad.run(pad.vehicle.computer().countdown_s() - LAST_HOLD_S - 0.5);
+    // Silent for 2 s at T-0.3 s.
+    pad.speaking.clear();
+    pad.run(0.3);
+    assert!(pad.counting());
+    pad.run(0.2);
+    assert_eq!(pad.ask(CREW, HOLD, 0.0), DENIED);
+    assert_eq!(pad.said("hold refused: the last 2 s have begun, and nothing holds any more"), 1);
+    assert_eq!(pad.said("asks for a hold"), 0);
+    pad.run(LAST_HOLD_S);
+    assert!(!pad.vehicle.phase().on_pad() && pad.said("HOLD") == 0 && pad.said("nothing heard") == 0);
     for (command, param1) in [(ABORT, 1.0), (ARM, 0.0)] {
-        let mut pad = Pad::planar();
+        let mut pad = Pad::rocket();
         pad.count_down();
         pad.run(pad.vehicle.computer().countdown_s() - 1.0);
         assert_eq!(pad.ask(CREW, command, param1), ACCEPTED);
@@ -272,7 +266,7 @@ fn in_the_last_moment_nothing_holds_and_the_crew_is_told_why() {
 
 #[test]
 fn a_running_check_can_be_cancelled() {
-    let mut pad = Pad::in_space();
+    let mut pad = Pad::rocket();
     assert_eq!(pad.ask(CREW, MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0), ACCEPTED);
     pad.run(0.5);
     assert!(pad.vehicle.computer().pad_check().is_running());
@@ -288,7 +282,7 @@ fn a_running_check_can_be_cancelled() {
 
 #[test]
 fn a_latched_abort_has_its_reason_on_the_wire() {
-    let mut pad = Pad::planar();
+    let mut pad = Pad::rocket();
     assert_eq!(pad.status().latch, TdLatch::TD_LATCH_NONE);
     assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED);
     assert_eq!(pad.status().latch, TdLatch::TD_LATCH_COMMANDED);
@@ -296,7 +290,7 @@ fn a_latched_abort_has_its_reason_on_the_wire() {
 
 #[test]
 fn a_held_vehicle_disarms_after_a_minute() {
-    for mut pad in [Pad::planar(), Pad::in_space()] {
+    for mut pad in [Pad::rocket(), Pad::hanging()] {
         pad.count_down();
         pad.speaking.clear();
         pad.run(UPLINK_SILENT_S + 0.2);
@@ -312,7 +306,7 @@ fn a_held_vehicle_disarms_after_a_minute() {
 
 #[test]
 fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
-    for mut pad in [Pad::planar(), Pad::in_space()] {
+    for mut pad in [Pad::rocket(), Pad::hanging()] {
         assert_eq!(pad.ask(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
         pad.count_down();
         assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
@@ -329,7 +323,7 @@ fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
 
 #[test]
 fn a_vehicle_that_starts_by_itself_needs_no_station() {
-    let mut pad = Pad::planar();
+    let mut pad = Pad::rocket();
     pad.endpoint = VehicleEndpoint::new().starting_by_itself();
     pad.speaking.clear();
     frame(&mut pad.vehicle, &mut pad.endpoint, &[Asked::Arm, Asked::Start]);
@@ -339,7 +333,7 @@ fn a_vehicle_that_starts_by_itself_needs_no_station() {
 
 #[test]
 fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
-    let vehicle = planar();
+    let vehicle = rocket();
     let mut endpoint = VehicleEndpoint::new();
     let mut stranger = Encoder::new(SPARE);
     let beat = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
@@ -370,7 +364,7 @@ fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
 
 #[test]
 fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
-    let mut pad = Pad::in_space();
+    let mut pad = Pad::rocket();
     pad.count_down();
     pad.run(pad.vehicle.computer().countdown_s() + 1.0);
     assert!(pad.vehicle.phase().in_descent());
@@ -388,7 +382,7 @@ fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
 
 #[test]
 fn the_motor_and_its_wait_are_on_the_wire_until_it_is_safe() {
-    let mut pad = Pad::planar();
+    let mut pad = Pad::rocket();
     let status = pad.status();
     assert_eq!((status.motor, status.approach_wait_s), (TdMotor::TD_MOTOR_LIVE, 0));
     pad.count_down();
@@ -418,7 +412,7 @@ fn the_motor_and_its_wait_are_on_the_wire_until_it_is_safe() {
 
 #[test]
 fn two_stations_and_everything_else_stay_within_the_radio_s_budget() {
-    let mut pad = Pad::in_space();
+    let mut pad = Pad::rocket();
     pad.speaking = vec![CREW, OTHER];
     pad.run(1.0);
     pad.sent.clear();

@@ -1,15 +1,15 @@
 //! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends it.
 
 use flight::computer::pad_check::{CheckState, Item, Verdict};
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 
 use super::space::flight_of;
 use super::*;
-use crate::fly::{LoadedFlight, load_flight};
+use crate::fly::load_flight;
 
 fn on_the_pad(dispersion: &str, faults: &[&str]) -> Told {
-    Told::of(Vehicle::in_space(&flight_of(dispersion, faults)).unwrap()).run_to(Phase::PadIdle)
+    Told::of(Vehicle::on_the_pad(&flight_of(dispersion, faults)).unwrap()).run_to(Phase::PadIdle)
 }
 
 fn failing(rocket: &Vehicle) -> Vec<Item> {
@@ -37,9 +37,9 @@ fn rests(rocket: &Vehicle) -> bool {
 fn every_built_in_mission_passes_its_check() {
     for (name, _) in vehicles::mission::BUILTIN {
         for dispersion in ["none", "field", "real"] {
-            let LoadedFlight::InSpace(mut flight) = load_flight(name).unwrap() else { panic!("in space") };
+            let mut flight = load_flight(name).unwrap();
             flight.recipe.dispersion = sim::dispersion::Dispersion::builtin(dispersion).unwrap();
-            let mut rocket = Told::of(Vehicle::in_space(&flight).unwrap());
+            let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
             rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
             let events = checked(&mut rocket);
             let findings = rocket.computer().pad_check().findings();
@@ -67,9 +67,8 @@ fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
 
 #[test]
 fn a_failed_self_test_is_a_reason_to_look_closer() {
-    let mut rocket = Told::of(Vehicle::in_space(&flight_of("none", &[])).unwrap());
-    let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
-    space.sortie.world_mut().inject(&world::Fault::FinStuck { fin: 2 });
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
+    rocket.vehicle.sortie.world_mut().inject(&world::Fault::FinStuck { fin: 2 });
     let refused = rocket.request(Asked::Check);
     assert_eq!(refused.ending, Ending::NotNow);
     assert_eq!(refused.reason.unwrap(), "the self-test is not over");
@@ -95,8 +94,7 @@ fn without_motion_everything_but_the_surfaces_is_checked() {
 #[test]
 fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
     let mut rocket = on_the_pad("none", &[]);
-    let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
-    space.sortie.set_battery(0.08);
+    rocket.vehicle.sortie.set_battery(0.08);
     checked(&mut rocket);
     assert_eq!(failing(&rocket), [Item::BatteryVoltage]);
     let refused = rocket.request(Asked::Arm);
@@ -158,7 +156,7 @@ fn a_lift_off_that_nobody_asked_for_ends_it() {
     let mut flight = flight_of("none", &[]);
     flight.recipe = flight.recipe.starting_at(StartPoint::Pad).unwrap();
     flight.recipe.faults = vec!["ascent-self-lights@pad+6".parse().unwrap()];
-    let mut rocket = Told::of(Vehicle::in_space(&flight).unwrap());
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
     rocket.run_until(|rocket| rocket.time_s() > 6.0);
     rocket.request(Asked::Check);
     rocket.run_until(|rocket| !rocket.phase().on_pad());

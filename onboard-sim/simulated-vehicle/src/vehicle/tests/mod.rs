@@ -4,7 +4,6 @@ mod aborts;
 mod check;
 mod motor;
 mod pad;
-mod plane;
 mod space;
 
 use std::ops::{Deref, DerefMut};

@@ -3,18 +3,13 @@
 use super::space::flight_of;
 use super::*;
 use flight::computer::AbortEffect;
-use flight::vehicle::profile::StartPoint;
+use flight::vehicle::mission::StartPoint;
 use world::RestOutcome;
 
 fn from(start: StartPoint, dispersion: &str, faults: &[&str]) -> Told {
     let mut flight = flight_of(dispersion, faults);
     flight.recipe = flight.recipe.starting_at(start).unwrap();
-    Told::of(Vehicle::in_space(&flight).unwrap())
-}
-
-fn sortie(rocket: &Vehicle) -> &Sortie {
-    let Flight::Space(space) = &rocket.flight else { panic!("in space") };
-    &space.sortie
+    Told::of(Vehicle::on_the_pad(&flight).unwrap())
 }
 
 /// Started as far as it takes, and then flown to the end.
@@ -52,7 +47,7 @@ fn from_the_pad_it_passes_every_phase_and_lands() {
         }
         assert!(!said(&events, "no ascent is flown"));
         assert!(rocket.judged().unwrap().landed, "{dispersion}");
-        let fell_from_m = sortie(&rocket).fell_from().position_m.z;
+        let fell_from_m = rocket.sortie.fell_from().position_m.z;
         assert!((270.0..335.0).contains(&fell_from_m), "{fell_from_m}");
     }
 }
@@ -71,7 +66,7 @@ fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
     rocket.run_until(|rocket| ascent(rocket).booster == Booster::Separated);
     rocket.run_until(|rocket| !rocket.phase().before_apogee());
     assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteNow, "from the first frame on");
-    let reached_m = sortie(&rocket).world().state().position_m.z;
+    let reached_m = rocket.sortie.world().state().position_m.z;
     assert!((told.height_m - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
     let took_s = rocket.snapshot().since_zero_s.unwrap() - began_s;
     assert!((told.in_s - took_s).abs() < 0.05 * took_s, "{told:?}, {took_s}");
@@ -102,7 +97,7 @@ fn an_ascent_motor_that_does_not_light_leaves_an_aborted_vehicle_on_its_pad() {
     assert!(
         after.interlocks.abort_latched && after.interlocks.landing_motor_inhibited && !after.interlocks.armed
     );
-    assert!(sortie(&rocket).world().booster_attached());
+    assert!(rocket.sortie.world().booster_attached());
 }
 
 /// A vehicle with its booster can neither steer nor land: no burn, parachute at apogee.
@@ -115,7 +110,7 @@ fn a_booster_that_does_not_separate_inhibits_the_motor_and_opens_the_parachute()
     );
     assert!(said(&events, "the booster has not separated"));
     assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
-    let world = sortie(&rocket).world();
+    let world = rocket.sortie.world();
     assert!(world.booster_attached() && world.thrust_begins_s().is_none());
     let impact_m_s = world.touchdown().unwrap().vertical_m_s;
     assert!(impact_m_s > -10.0, "{impact_m_s}");
@@ -145,7 +140,7 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
         let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
         assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
         // Apogee was felt within half a second of the true one.
-        let fall_m_s = sortie(&rocket).fell_from().velocity_m_s.z;
+        let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
         assert!(fall_m_s.abs() < 5.0, "{fault}: {fall_m_s}");
     }
 }
@@ -176,7 +171,7 @@ fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
         let (rocket, events) = flown(from(StartPoint::Pad, "field", &[fault]));
         let seen = phases(&events);
         assert!(expected.is_empty() || seen == expected, "{fault}: {seen:?}");
-        let fall_m_s = sortie(&rocket).fell_from().velocity_m_s.z;
+        let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
         assert!(believed_m_s.contains(&fall_m_s), "{fault}: {fall_m_s} m/s, {seen:?}");
         let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
         assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
@@ -199,8 +194,7 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
             assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
         }
         rocket.advance();
-        let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
-        space.sortie.world_mut().inject(&world::Fault::AscentSelfLights);
+        rocket.vehicle.sortie.world_mut().inject(&world::Fault::AscentSelfLights);
         let events = rocket.run_until(Vehicle::is_over);
         let seen = phases(&events);
         assert!(said(&events, "LIFT-OFF without a countdown"), "{asked:?}: {seen:?}");
@@ -235,7 +229,7 @@ fn hanging_it_is_not_armed_too_low() {
     let mut flight = flight_of("none", &[]);
     flight.recipe = flight.recipe.starting_at(StartPoint::Drone).unwrap();
     flight.recipe.mission.drop.as_mut().unwrap().height_m = 9.0;
-    let mut rocket = Told::of(Vehicle::in_space(&flight).unwrap());
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
     rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle && rocket.time_s() > 5.0);
     let checks = rocket.arming_checks();
     let height = checks.iter().find(|check| check.name == "height below the drone").unwrap();
@@ -258,8 +252,7 @@ fn released_before_it_was_cleared_it_inhibits_the_motor_and_opens_the_parachute(
             assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
         }
         rocket.advance();
-        let Flight::Space(space) = &mut rocket.flight else { panic!("in space") };
-        space.sortie.world_mut().let_go();
+        rocket.vehicle.sortie.world_mut().let_go();
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown], "{asked:?}");
         assert!(said(&events, "RELEASED before it was cleared"));
@@ -278,7 +271,7 @@ fn an_abort_while_it_hangs_inhibits_the_motor_and_stays_on_the_drone() {
         rocket.advance();
     }
     assert_eq!(rocket.phase(), Phase::PadIdle);
-    assert!(sortie(&rocket).world().hangs() && rocket.snapshot().interlocks.landing_motor_inhibited);
+    assert!(rocket.sortie.world().hangs() && rocket.snapshot().interlocks.landing_motor_inhibited);
 }
 
 /// A held countdown does not let a drone's pilot clear the release: nothing falls by itself.
@@ -291,7 +284,7 @@ fn a_hold_while_it_hangs_keeps_it_hanging() {
         rocket.advance();
     }
     assert_eq!(rocket.phase(), Phase::PadArmed);
-    assert!(sortie(&rocket).world().hangs());
+    assert!(rocket.sortie.world().hangs());
 }
 
 /// A reset of 0.1 s on the pad disarms, ends the countdown and is said; the crew may arm and start again.

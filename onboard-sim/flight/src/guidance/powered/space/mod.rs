@@ -21,7 +21,7 @@ use super::{
 };
 use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
-use crate::guidance::controller::ControlLevel;
+use crate::guidance::powered::ControlLevel;
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::rigid::RigidState;
 

@@ -23,7 +23,8 @@ fn during_a_flight_the_motor_is_live_then_burning_then_hot_then_burnt() {
     let start = [ARM[2], Event::StartRequested { countdown_s: 0.0 }];
     assert_eq!(status(&[], 2.0), (MotorStatus::Live, Some(0.0)));
     assert_eq!(status(&start, 3.0), (MotorStatus::Live, None));
-    assert_eq!(status(&[Event::ReleasedAt(StartPoint::Ignition)], 4.0), (MotorStatus::Live, None));
+    let fall = [Event::ReleasedAt(StartPoint::Apogee), Event::FinsConfirmed, Event::LandArm];
+    assert_eq!(status(&fall, 4.0), (MotorStatus::Live, None));
     assert_eq!(status(&[Event::IgnitionGate { open: true }], 5.0), (MotorStatus::Burning, None));
     assert_eq!(status(&[Event::ThrustConfirmed], 5.1), (MotorStatus::Burning, None));
     let contact = Event::Contact { thrust_below_weight: true };

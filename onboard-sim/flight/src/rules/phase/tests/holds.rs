@@ -33,7 +33,7 @@ fn a_hold_clears_the_countdown_and_keeps_the_vehicle_armed() {
 fn in_the_last_two_seconds_nothing_holds_and_an_abort_and_a_disarm_still_end_it() {
     let counting = after(&with_arm(&[START]));
     for cause in CAUSES {
-        for start in [StartPoint::Pad, StartPoint::Apogee, StartPoint::Ignition] {
+        for start in [StartPoint::Pad, StartPoint::Apogee] {
             assert_eq!(transition(&counting, hold(cause, start), 5.99).refusal, None);
             for time_s in [6.0, 7.0, 8.0, 9.0, f64::NAN] {
                 let late = transition(&counting, hold(cause, start), time_s);
@@ -63,11 +63,7 @@ fn below_a_drone_a_countdown_can_be_held_until_the_release() {
 
 #[test]
 fn a_held_vehicle_is_not_released_and_a_second_hold_does_not_lengthen_the_first() {
-    for release in [
-        Event::CountdownElapsed,
-        Event::ReleasedAt(StartPoint::Apogee),
-        Event::ReleasedAt(StartPoint::Ignition),
-    ] {
+    for release in [Event::CountdownElapsed, Event::ReleasedAt(StartPoint::Apogee)] {
         assert_eq!(transition(&held(), release, 30.0).refusal, Some(Refusal::CountdownNotElapsed));
     }
     let again = transition(&held(), SILENT, 30.0);

@@ -14,7 +14,6 @@ fn every_event() -> Vec<Event> {
         Event::CountdownElapsed,
         Event::ReleasedAt(StartPoint::Pad),
         Event::ReleasedAt(StartPoint::Apogee),
-        Event::ReleasedAt(StartPoint::Ignition),
         Event::ReleasedAt(StartPoint::Drone),
         Event::LiftOff,
         Event::NoLiftOff,
@@ -181,16 +180,18 @@ fn with_arm(rest: &[Event]) -> Vec<Event> {
 const ABORT: Event = Event::AbortRequested { above_commit_height: false, gate_open: false };
 
 #[test]
-fn a_simulation_released_at_ignition_flies_to_safed() {
+fn a_vehicle_released_at_apogee_flies_to_safed() {
     let mode = after(&with_arm(&[
         Event::StartRequested { countdown_s: 1.0 },
-        Event::ReleasedAt(StartPoint::Ignition),
+        Event::ReleasedAt(StartPoint::Apogee),
+        Event::FinsConfirmed,
+        Event::LandArm,
         Event::IgnitionGate { open: true },
         Event::ThrustConfirmed,
         Event::Burnout,
         Event::Contact { thrust_below_weight: true },
     ]));
-    let burnt_out_at_s = 7.0;
+    let burnt_out_at_s = 9.0;
     assert_eq!(mode.motor, Motor::BurntOut { at_s: burnt_out_at_s });
     let hot = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S - 0.1);
     assert_eq!(hot.refusal, Some(Refusal::MotorHot));
@@ -220,9 +221,9 @@ fn a_pad_start_flies_the_whole_sequence() {
 #[test]
 fn the_countdown_must_run_out_before_a_release() {
     let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
-    let release = Event::ReleasedAt(StartPoint::Ignition);
+    let release = Event::ReleasedAt(StartPoint::Apogee);
     assert_eq!(transition(&mode, release, 7.9).refusal, Some(Refusal::CountdownNotElapsed));
-    assert_eq!(transition(&mode, release, 8.0).mode.phase, Phase::LandArmed);
+    assert_eq!(transition(&mode, release, 8.0).mode.phase, Phase::Deploy);
     assert_eq!(mode.countdown_remaining_s(6.0), Some(2.0));
     assert_eq!(
         transition(&mode, Event::StartRequested { countdown_s: 5.0 }, 4.0).refusal,
@@ -362,7 +363,6 @@ fn any_event() -> impl Strategy<Value = Event> {
 fn likely_event() -> impl Strategy<Value = Event> {
     let leading = with_arm(&[
         Event::StartRequested { countdown_s: 1.0 },
-        Event::ReleasedAt(StartPoint::Ignition),
         Event::ReleasedAt(StartPoint::Apogee),
         Event::FinsConfirmed,
         Event::LandArm,
