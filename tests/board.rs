@@ -3,10 +3,16 @@
 //! Cortex-M7.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
+use std::fs::File;
+use std::io::{Read, Write};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::thread::{JoinHandle, spawn};
 
-use e2e::{Ended, Program, Running, SerialLine, Terminal, auto_ground, expect_identical_replay, program};
+use e2e::{
+    Ended, Program, Random, Running, SerialLine, Signal, Terminal, auto_ground, expect_identical_replay,
+    program,
+};
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
 
@@ -78,4 +84,70 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     }
     assert!(!world.output.contains("IGNITION"), "{}", world.output);
     expect_identical_replay(folder.path(), "vehicle.mcap");
+}
+
+/// What carries the frames loses bytes and changes them: nothing of the flight changes.
+#[test]
+fn a_bad_wire_to_a_board_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for pipe in ["frames", "answers"] {
+        mkfifo(&folder.path().join(pipe), Mode::S_IRUSR | Mode::S_IWUSR).unwrap();
+    }
+    let mut world = program(Program::OnboardSim);
+    world.args([
+        "fly",
+        "--start",
+        "drone",
+        "--profile",
+        "vlr",
+        "--speed",
+        "max",
+        "--board",
+        ".",
+        "--log",
+        "log.mcap",
+    ]);
+    let mut world = Running::start(world.current_dir(folder.path()));
+    // Opened in the order in which the world opens them.
+    let from_world = File::open(folder.path().join("frames")).unwrap();
+    let to_world = File::options().write(true).open(folder.path().join("answers")).unwrap();
+    let mut board = program(Program::Board);
+    let mut board = board.arg("fly").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let ways = [
+        worsened(from_world, board.stdin.take().unwrap(), 1),
+        worsened(board.stdout.take().unwrap(), to_world, 2),
+    ];
+    // Nobody arms it: it stands on its pad.
+    world.wait_for_line("phase SAFE to PAD_IDLE");
+    world.signal(Signal::SIGTERM);
+    let world = world.wait();
+    assert_eq!(world.code, Some(5), "{}", world.output);
+    let worse: u64 = ways.map(|way| way.join().unwrap()).iter().sum();
+    assert!(worse > 3, "{worse} bytes were lost or changed");
+    board.wait().unwrap();
+    expect_identical_replay(folder.path(), "log.mcap");
+}
+
+/// Carries bytes in a thread; one in ten thousand is lost, and one is changed. Returns how many.
+fn worsened(
+    mut from: impl Read + Send + 'static,
+    mut to: impl Write + Send + 'static,
+    seed: u64,
+) -> JoinHandle<u64> {
+    spawn(move || {
+        let (mut random, mut bytes, mut worse) = (Random(seed), [0; 4096], 0);
+        while let Ok(read @ 1..) = from.read(&mut bytes) {
+            let carried = bytes[..read].iter().filter_map(|byte| match random.next() % 10_000 {
+                0 => None,
+                1 => Some(byte ^ 0x55),
+                _ => Some(*byte),
+            });
+            let carried: Vec<u8> = carried.collect();
+            worse += bytes[..read].iter().zip(&carried).any(|(before, after)| before != after) as u64;
+            if to.write_all(&carried).is_err() {
+                break;
+            }
+        }
+        worse
+    })
 }

@@ -6,7 +6,6 @@ mod board;
 mod demo;
 mod download;
 mod ground_log;
-mod hil;
 mod hold;
 mod hostile;
 mod links;

@@ -64,16 +64,6 @@ enum Command {
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     #[command(after_help = "Example: onboard-sim paper --figures figures")]
     Paper(cli::paper::PaperArguments),
-    /// Hardware in the loop: simulate the world of flights whose flight computer is another process.
-    ///
-    /// Each flight begins released, at apogee or on its rail. In lockstep it is the same, bit for bit, as a campaign's flight
-    /// with `wire_resolution`. Exit codes: 0 all flown, and identical if compared; 1 error; 2 usage; 3 a flight differs;
-    /// 5 the computer does not answer.
-    #[command(after_help = "Example: onboard-sim world --link udpout:127.0.0.1:14560 --flights 10 --compare")]
-    World(cli::world::WorldArguments),
-    /// Hardware in the loop: a flight computer whose world is another process; it answers until it is stopped.
-    #[command(after_help = "Example: onboard-sim computer --link udpin:127.0.0.1:14560")]
-    Computer(cli::computer::ComputerArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
     Keygen {
@@ -119,8 +109,6 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Card(arguments) => cli::motors::card(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Paper(arguments) => cli::paper::run(&arguments),
-        Command::World(arguments) => cli::world::run(arguments),
-        Command::Computer(arguments) => cli::computer::run(arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),

@@ -42,7 +42,7 @@ fn wait_for_abort(screen: &Terminal) {
 fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     type Ending = fn(&mut Terminal);
     let endings: [(Ending, bool); 4] = [
-        (|terminal| terminal.type_bytes(b"q"), false),
+        (|terminal| terminal.type_by_hand(b"q"), false),
         // Ctrl-C, as a terminal that distinguishes repeats sends it.
         (|terminal| terminal.type_bytes(b"\x1b[99;5u"), true),
         (|terminal| terminal.signal(Signal::SIGTERM), true),

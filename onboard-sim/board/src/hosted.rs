@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read as _, Write as _};
+use std::io::{self, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, TrySendError, sync_channel};
@@ -11,8 +11,8 @@ use std::thread;
 
 use anyhow::{Context as _, Result, ensure};
 use board::radio::Radio;
-use board::recorded::fly;
-use board::stream::{Answer, Link, receive};
+use board::recorded::Board;
+use board::stream::{Answer, Reader};
 use clap::{Parser, Subcommand};
 use flight::rules::phase::Phase;
 
@@ -68,23 +68,6 @@ pub(super) fn main() -> ExitCode {
 /// Most bytes that may wait for the next frame: a second of a fast radio.
 const MOST_WAITING_BYTES: usize = 8 * 1024;
 
-/// Two streams of bytes as a link.
-struct Pipes<R, W>(R, W);
-
-impl<R: io::Read, W: io::Write> Link for Pipes<R, W> {
-    type Error = io::Error;
-
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        self.0.read(into)
-    }
-
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.1.write_all(bytes)?;
-        // A world waits for it.
-        self.1.flush()
-    }
-}
-
 /// A serial device that a thread reads.
 struct Serial {
     arrived: Receiver<u8>,
@@ -121,25 +104,40 @@ impl Radio for Serial {
 }
 
 fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
-    let mut link = Pipes(BufReader::new(io::stdin().lock()), BufWriter::new(io::stdout().lock()));
-    let frames = match radio {
-        None => fly(&mut link, &mut (), &mut ()),
-        Some(path) => {
-            let mut radio = Serial::open(path).with_context(|| path.display().to_string())?;
-            fly(&mut link, &mut radio, &mut ())
+    let mut radio = match radio {
+        None => None,
+        Some(path) => Some(Serial::open(path).with_context(|| path.display().to_string())?),
+    };
+    let (mut from_world, mut to_world) = (io::stdin().lock(), io::stdout().lock());
+    let (mut board, mut arrived, mut answers) = (Board::default(), [0; 4096], Vec::new());
+    loop {
+        let read = from_world.read(&mut arrived)?;
+        if read == 0 {
+            break;
         }
-    }?;
-    eprintln!("{frames} frames");
+        let flown = match &mut radio {
+            None => board.take(&arrived[..read], &mut (), &mut (), &mut answers),
+            Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answers),
+        };
+        to_world.write_all(&answers)?;
+        // A world waits for it.
+        to_world.flush()?;
+        answers.clear();
+        flown?;
+    }
+    let (broken, cut) = (board.reader().broken(), board.reader().missing_its_end());
+    ensure!(board.frames() > 0, "no frame has arrived");
+    ensure!(cut == 0, "the stream ends inside a record, after {cut} bytes of it");
+    eprintln!("{} frames; {broken} records were broken on their way", board.frames());
     Ok(())
 }
 
 fn answers_of(path: &Path) -> Result<Vec<Answer>> {
-    let file = File::open(path).with_context(|| path.display().to_string())?;
-    let mut link = Pipes(BufReader::new(file), io::sink());
-    let (mut answers, mut buffer) = (Vec::new(), Vec::new());
-    while let Some(answer) = receive(&mut link, &mut buffer).with_context(|| path.display().to_string())? {
-        answers.push(answer);
-    }
+    let mut reader = Reader::default();
+    reader.push(&fs::read(path).with_context(|| path.display().to_string())?);
+    let answers: Vec<Answer> = std::iter::from_fn(|| reader.next()).collect();
+    let whole = reader.broken() == 0 && reader.missing_its_end() == 0;
+    ensure!(whole, "{}: a record is broken or cut off", path.display());
     Ok(answers)
 }
 

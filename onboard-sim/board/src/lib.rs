@@ -1,9 +1,9 @@
 //! The flight computer as a program for a board.
 //!
 //! * [`port`]: what a board must offer, and the loop that flies it.
-//! * [`stream`]: a recorded flight as bytes for a board, and the board's answers.
+//! * [`stream`]: a flight as bytes for a board, and the board's answers.
 //! * [`radio`]: the crew on the board's own radio, between the frames.
-//! * [`recorded`]: flies a recorded flight, frame by frame, and answers each frame.
+//! * [`recorded`]: flies the frames that arrive, and answers each.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;

@@ -3,14 +3,16 @@
 //! `saved-1` are its memory that outlasts a reset: where a recorded flight's computer was dead, this program resets its processor
 //! and goes on from them.
 
+extern crate alloc;
+
+use alloc::vec::Vec;
 use core::ffi::CStr;
 use core::fmt::Write as _;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use board::radio::Radio;
-use board::recorded::{Watch, fly};
-use board::stream::Link;
+use board::recorded::{Board, FlyError, Watch};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::{entry, exception};
@@ -74,11 +76,12 @@ fn fly_the_files() -> io::Result<()> {
         }
         None => File::create(name),
     };
-    let mut files = Files { frames: File::open(c"frames")?, answers: written(c"answers")? };
+    let (mut frames, mut answers) = (File::open(c"frames")?, written(c"answers")?);
     let file = written(c"costs")?;
     let mut costs =
         Costs { file, begun: 0, set_up_bytes: 0, most_bytes: 0, saved, save: Cost::default(), failed: None };
-    let flown = fly(&mut files, &mut Serial::default(), &mut costs);
+    let mut board = Board::default();
+    let flown = fly(&mut board, (&mut frames, &mut answers), &mut costs)?;
     if let Some(error) = costs.failed {
         return Err(error);
     }
@@ -94,7 +97,7 @@ fn fly_the_files() -> io::Result<()> {
         costs.save.bytes, costs.save.instructions
     );
     match flown {
-        Ok(frames) => println!("{frames} frames"),
+        Ok(()) => println!("{} frames", board.frames()),
         Err(error) => {
             eprintln!("board: {error}");
             process::exit(1)
@@ -103,20 +106,24 @@ fn fly_the_files() -> io::Result<()> {
     Ok(())
 }
 
-struct Files {
-    frames: File,
-    answers: File,
-}
-
-impl Link for Files {
-    type Error = io::Error;
-
-    fn read(&mut self, into: &mut [u8]) -> Result<usize, io::Error> {
-        self.frames.read(into)
-    }
-
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), io::Error> {
-        self.answers.write_all(bytes)
+/// Flies what comes from the world until it ends.
+fn fly(
+    board: &mut Board,
+    (frames, answers): (&mut File, &mut File),
+    costs: &mut Costs,
+) -> io::Result<Result<(), FlyError>> {
+    let (mut radio, mut arrived, mut out) = (Serial::default(), [0; 512], Vec::new());
+    loop {
+        let read = frames.read(&mut arrived)?;
+        if read == 0 {
+            return Ok(Ok(()));
+        }
+        let flown = board.take(&arrived[..read], &mut radio, costs, &mut out);
+        answers.write_all(&out)?;
+        out.clear();
+        if flown.is_err() {
+            return Ok(flown);
+        }
     }
 }
 

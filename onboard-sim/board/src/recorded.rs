@@ -1,4 +1,4 @@
-//! Flies a recorded flight, frame by frame, and answers each frame with what this machine decided.
+//! Flies the frames that arrive, and answers each with what this machine decided.
 
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
@@ -12,7 +12,7 @@ use tick_log::computer::output_to_log;
 use tick_log::pilot;
 
 use crate::radio::{Crewed, Radio};
-use crate::stream::{Answer, Begin, Frame, Link, StreamError, receive, send};
+use crate::stream::{Answer, Begin, Frame, Reader, put};
 
 /// What looks at the computer while it flies, without changing anything. A machine that counts its instructions counts
 /// between `begins` and `ended`.
@@ -36,12 +36,10 @@ pub trait Watch {
 
 impl Watch for () {}
 
-/// Why a recorded flight was not flown to its end.
+/// Why a flight was not flown to its end.
 #[derive(Debug, thiserror::Error)]
-pub enum FlyError<E> {
-    #[error(transparent)]
-    Stream(#[from] StreamError<E>),
-    #[error("the stream is empty: its first record must say what to fly")]
+pub enum FlyError {
+    #[error("the first record must say what to fly")]
     Empty,
     /// No computer can be built from the first record.
     #[error("the first record: {0}")]
@@ -52,91 +50,151 @@ pub enum FlyError<E> {
     Frame(#[from] FrameError),
 }
 
-/// Flies the flight that comes over the link. If it says who the board is on the air, the crew is heard over the radio.
-/// Returns the number of its frames.
-///
-/// # Errors
-/// See [`FlyError`]; every frame before the error was answered.
-pub fn fly<L: Link>(
-    link: &mut L,
-    radio: &mut impl Radio,
-    watch: &mut impl Watch,
-) -> Result<u64, FlyError<L::Error>> {
-    let mut buffer = Vec::new();
-    let begin: Begin = receive(link, &mut buffer)?.ok_or(FlyError::Empty)?;
-    let (mut computer, mut crewed) = power_up(&begin).map_err(FlyError::Begin)?;
-    drop(begin);
-    watch.is_set_up();
-    let mut frames = 0;
-    let mut saved = watch.saved();
-    while let Some(frame) = receive::<Frame, _>(link, &mut buffer)? {
-        if let Some(number) = frame.number() {
-            match saved.take_if(|saved| saved.frame() < number) {
-                Some(saved) => computer = computer.resumed(&saved, number),
-                // Flown before the reset.
-                None if saved.is_some() => continue,
-                None if computer.was_reset_before(number) => watch.reset(number),
-                None => {}
+/// The flight computer on a board: frames in, answers out.
+#[derive(Default)]
+pub struct Board {
+    reader: Reader,
+    flying: Option<Flying>,
+    frames: u64,
+}
+
+struct Flying {
+    flight: u32,
+    computer: RecordedComputer,
+    /// If the board has a radio.
+    crewed: Option<Crewed>,
+    /// What was saved before a reset, until the frames behind it come.
+    saved: Option<Saved>,
+    /// The number of the last frame and its answer, for who asks again.
+    answered: Option<(u64, Vec<u8>)>,
+}
+
+impl Board {
+    /// Frames that it has flown.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// What has arrived so far.
+    pub fn reader(&self) -> &Reader {
+        &self.reader
+    }
+
+    /// Takes bytes that have arrived, flies the frames in them, and puts the answers into `out`. If the flight's first frame says
+    /// who the board is on the air, the crew is heard over the radio.
+    ///
+    /// # Errors
+    /// See [`FlyError`]; every frame before the error was answered.
+    pub fn take(
+        &mut self,
+        bytes: &[u8],
+        radio: &mut impl Radio,
+        watch: &mut impl Watch,
+        out: &mut Vec<u8>,
+    ) -> Result<(), FlyError> {
+        self.reader.push(bytes);
+        while let Some(mut frame) = self.reader.next::<Frame>() {
+            let begin = frame.begin.take();
+            if let Some(begin) = begin.filter(|begin| self.flight() != Some(begin.flight)) {
+                self.flying = Some(Flying::power_up(&begin, watch.saved()).map_err(FlyError::Begin)?);
+                watch.is_set_up();
             }
+            let flying = self.flying.as_mut().ok_or(FlyError::Empty)?;
+            self.frames += u64::from(flying.fly(&frame, self.frames, radio, watch, out)?);
         }
+        Ok(())
+    }
+
+    fn flight(&self) -> Option<u32> {
+        self.flying.as_ref().map(|flying| flying.flight)
+    }
+}
+
+impl Flying {
+    /// Returns whether the frame was flown now.
+    fn fly(
+        &mut self,
+        frame: &Frame,
+        after: u64,
+        radio: &mut impl Radio,
+        watch: &mut impl Watch,
+        out: &mut Vec<u8>,
+    ) -> Result<bool, FlyError> {
+        let number = frame.number().ok_or(FlyError::TwoInputs { after })?;
+        if let Some((_, answer)) = self.answered.as_ref().filter(|(answered, _)| *answered == number) {
+            out.extend(answer);
+            return Ok(false);
+        }
+        match self.saved.take_if(|saved| saved.frame() < number) {
+            Some(saved) => self.computer.resume(&saved, number),
+            // Flown before the reset.
+            None if self.saved.is_some() => return Ok(false),
+            None if self.computer.was_reset_before(number) => watch.reset(number),
+            None => {}
+        }
+        let computer = &mut self.computer;
         let answer = match (&frame.from_power_up, &frame.in_the_air) {
             (Some(input), None) => {
                 let read = computer.read(input)?;
-                let read = match &crewed {
+                let read = match &self.crewed {
                     Some(crewed) => crewed.hear(read),
                     None => read,
                 };
                 watch.begins();
                 let output = computer.step(&read);
-                watch.ended(input.frame, &output);
+                watch.ended(number, &output);
                 let computer = computer.computer();
                 let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
                 Answer {
+                    frame: number,
                     from_power_up: Some(output_to_log(&output, computer)),
                     in_the_air: None,
                     state_digest: computer.digest(),
-                    heard: crewed.as_mut().map(speak),
+                    heard: self.crewed.as_mut().map(speak),
                 }
             }
             (None, Some(input)) => {
                 let read = computer.read_in_the_air(input)?;
                 watch.begins();
                 let output = computer.step_in_the_air(&read);
-                watch.ended(input.frame, &output);
+                watch.ended(number, &output);
                 let computer = computer.computer();
                 Answer {
+                    frame: number,
                     from_power_up: None,
                     in_the_air: computer.piloted().map(|(_, output)| pilot::output_to_log(output)),
                     state_digest: computer.flight_digest(),
                     heard: None,
                 }
             }
-            _ => return Err(FlyError::TwoInputs { after: frames }),
+            _ => return Err(FlyError::TwoInputs { after }),
         };
-        send(link, &answer, &mut buffer)?;
-        watch.save(&computer.computer().saved());
-        frames += 1;
+        watch.save(&self.computer.computer().saved());
+        let mut bytes = Vec::new();
+        put(&answer, &mut bytes);
+        out.extend(&bytes);
+        self.answered = Some((number, bytes));
+        Ok(true)
     }
-    Ok(frames)
-}
 
-/// The flight computer before its first frame, and the crew's end of it; or why there is none.
-fn power_up(begin: &Begin) -> Result<(RecordedComputer, Option<Crewed>), String> {
-    let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
-    let mission = |start| {
-        let mission = vehicles::mission::from_toml(&begin.toml, "mission");
-        mission.map_err(|error| error.to_string()).map(|mission| mission_flown(mission, start))
-    };
-    match (&begin.at_power_up, &begin.in_the_air, &begin.on_the_air) {
-        (Some(ComputerStart { start }), None, on_the_air) => {
-            let mission = mission(start)?;
-            let computer = RecordedComputer::at_power_up(&mission, start, controller);
-            let crewed = on_the_air.as_ref().map(|on_the_air| Crewed::new(on_the_air, mission, &begin.toml));
-            Ok((computer, crewed))
-        }
-        (None, Some(start), None) => {
-            Ok((RecordedComputer::in_the_air(&mission(start)?, start, controller), None))
-        }
-        _ => Err("must name one start, with a radio only from power-up on".into()),
+    /// The flight computer before its first frame, and the crew's end of it; or why there is none.
+    fn power_up(begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
+        let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
+        let mission = |start| {
+            let mission = vehicles::mission::from_toml(&begin.toml, "mission");
+            mission.map_err(|error| error.to_string()).map(|mission| mission_flown(mission, start))
+        };
+        let (computer, crewed) = match (&begin.at_power_up, &begin.in_the_air, &begin.on_the_air) {
+            (Some(ComputerStart { start }), None, on_the_air) => {
+                let mission = mission(start)?;
+                let computer = RecordedComputer::at_power_up(&mission, start, controller);
+                (computer, on_the_air.as_ref().map(|air| Crewed::new(air, mission, &begin.toml)))
+            }
+            (None, Some(start), None) => {
+                (RecordedComputer::in_the_air(&mission(start)?, start, controller), None)
+            }
+            _ => return Err("must name one start, with a radio only from power-up on".into()),
+        };
+        Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })
     }
 }

@@ -1,8 +1,9 @@
-//! A recorded flight as bytes for a board, and the board's answers.
+//! A flight as bytes for a board, and the board's answers.
 //!
-//! Either way a stream is a sequence of records: the length of the record in four bytes, the lowest first, then the
-//! record, a protocol buffer. To the board: one [`Begin`], then one [`Frame`] for each frame. From the board: one
-//! [`Answer`] for each frame. A length of zero, or the end of the bytes, ends the flight.
+//! Either way it is a sequence of records: a protocol buffer and its CRC-32 (the lowest byte first), in Consistent Overhead
+//! Byte Stuffing, ended by a zero byte. So whoever joins in, or has lost a byte, is in step again behind the next zero, and
+//! a record that has changed on its way is known. To the board: one [`Frame`] for each frame; the first one says what to
+//! fly. From the board: one [`Answer`] for each frame. Who asks again gets the same answer again.
 //!
 //! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander and requests in a frame, and
 //! its answer has them for the next one, so that a world that flies the same computer beside it can compare.
@@ -15,7 +16,7 @@ use alloc::vec::Vec;
 
 use log_records::computer_v1::{Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink};
 use log_records::flight_v1::{PilotInput, PilotOutput, PilotStart};
-use prost::{DecodeError, Message};
+use prost::Message;
 
 /// Longest accepted record, bytes: several times a mission with its motors' files (20 KB), the longest there is.
 pub const LONGEST_BYTES: usize = 128 * 1024;
@@ -23,7 +24,7 @@ pub const LONGEST_BYTES: usize = 128 * 1024;
 /// What a computer is built from at power-up.
 #[derive(Clone, PartialEq, Message)]
 pub struct Begin {
-    /// The mission's or profile's text, from the log.
+    /// The mission's text, from the log.
     #[prost(string, required, tag = "1")]
     pub toml: String,
     /// The law of the landing burn, by its name.
@@ -38,6 +39,9 @@ pub struct Begin {
     /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are in the frames.
     #[prost(message, optional, tag = "5")]
     pub on_the_air: Option<OnTheAir>,
+    /// Another one for each flight: a board that flies this one already does not begin it again.
+    #[prost(uint32, required, tag = "6")]
+    pub flight: u32,
 }
 
 /// A board with a radio.
@@ -78,6 +82,9 @@ pub struct Frame {
     pub from_power_up: Option<ComputerInput>,
     #[prost(message, optional, tag = "2")]
     pub in_the_air: Option<PilotInput>,
+    /// In a flight's first frame, in the first one behind a reset, and in one that is asked again.
+    #[prost(message, optional, tag = "3")]
+    pub begin: Option<Begin>,
 }
 
 impl Frame {
@@ -101,6 +108,9 @@ pub struct Answer {
     /// What the next frame is told and asked, of a board with a radio.
     #[prost(message, optional, tag = "4")]
     pub heard: Option<Heard>,
+    /// The number of the frame.
+    #[prost(uint64, required, tag = "5")]
+    pub frame: u64,
 }
 
 impl Answer {
@@ -111,94 +121,65 @@ impl Answer {
     }
 }
 
-/// Bytes in and out: a file, a serial line, a debugger's channel.
-pub trait Link {
-    type Error;
-
-    /// Reads at least one byte; 0 at the end.
-    ///
-    /// # Errors
-    /// The bytes cannot be read.
-    fn read(&mut self, into: &mut [u8]) -> Result<usize, Self::Error>;
-
-    /// Writes all bytes.
-    ///
-    /// # Errors
-    /// The bytes cannot be written.
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
+/// Puts a record behind the bytes that are on their way.
+pub fn put(record: &impl Message, into: &mut Vec<u8>) {
+    let mut bytes = record.encode_to_vec();
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    into.extend(cobs::encode_vec(&bytes));
+    into.push(0);
 }
 
-/// Why a stream cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError<E> {
-    #[error("link: {0}")]
-    Link(E),
-    #[error("a record of {bytes} bytes; at most {LONGEST_BYTES} are accepted")]
-    TooLong { bytes: usize },
-    #[error("the stream ends inside a record: {missing} of {bytes} bytes are missing")]
-    CutOff { missing: usize, bytes: usize },
-    #[error("a record is not what its place in the stream asks for: {0}")]
-    Record(DecodeError),
+/// Takes records out of the bytes that arrive.
+#[derive(Debug, Clone, Default)]
+pub struct Reader {
+    pending: Vec<u8>,
+    /// As many bytes of it were looked at, and are no end of a record.
+    looked_at: usize,
+    broken: u64,
 }
 
-/// Reads the next record into `buffer`, whose memory is used again; `None` at the end of the flight.
-///
-/// # Errors
-/// See [`StreamError`].
-pub fn receive<R: Message + Default, L: Link>(
-    link: &mut L,
-    buffer: &mut Vec<u8>,
-) -> Result<Option<R>, StreamError<L::Error>> {
-    let mut length = [0; 4];
-    if fill(link, &mut length, true)? == 0 {
-        return Ok(None);
-    }
-    let bytes = u32::from_le_bytes(length) as usize;
-    if bytes == 0 {
-        return Ok(None);
-    }
-    if bytes > LONGEST_BYTES {
-        return Err(StreamError::TooLong { bytes });
-    }
-    buffer.clear();
-    buffer.resize(bytes, 0);
-    fill(link, buffer, false)?;
-    R::decode(buffer.as_slice()).map(Some).map_err(StreamError::Record)
-}
-
-/// Writes a record.
-///
-/// # Errors
-/// See [`StreamError`].
-pub fn send<R: Message, L: Link>(
-    link: &mut L,
-    record: &R,
-    buffer: &mut Vec<u8>,
-) -> Result<(), StreamError<L::Error>> {
-    buffer.clear();
-    buffer.extend([0; 4]);
-    // A vector grows as needed.
-    let _ = record.encode(buffer);
-    let bytes = buffer.len() - 4;
-    if bytes > LONGEST_BYTES {
-        return Err(StreamError::TooLong { bytes });
-    }
-    buffer[..4].copy_from_slice(&(bytes as u32).to_le_bytes());
-    link.write_all(buffer).map_err(StreamError::Link)
-}
-
-/// Fills `into`, and returns how much of it was filled: less than all of it only at the end of the stream, 0 if `or_end`.
-fn fill<L: Link>(link: &mut L, into: &mut [u8], or_end: bool) -> Result<usize, StreamError<L::Error>> {
-    let mut filled = 0;
-    while filled < into.len() {
-        let read = link.read(&mut into[filled..]).map_err(StreamError::Link)?;
-        if read == 0 {
-            if filled == 0 && or_end {
-                return Ok(0);
-            }
-            return Err(StreamError::CutOff { missing: into.len() - filled, bytes: into.len() });
+impl Reader {
+    /// Adds bytes that have arrived.
+    pub fn push(&mut self, bytes: &[u8]) {
+        if self.looked_at > LONGEST_BYTES {
+            // Noise without an end.
+            self.pending.clear();
+            (self.looked_at, self.broken) = (0, self.broken + 1);
         }
-        filled += read;
+        self.pending.extend(bytes);
     }
-    Ok(filled)
+
+    /// The next whole record; broken ones before it are counted.
+    pub fn next<R: Message + Default>(&mut self) -> Option<R> {
+        loop {
+            let end = self.pending[self.looked_at..].iter().position(|byte| *byte == 0);
+            let Some(end) = end.map(|end| self.looked_at + end) else {
+                self.looked_at = self.pending.len();
+                return None;
+            };
+            let found = record_in(&mut self.pending[..end]);
+            self.pending.drain(..=end);
+            self.looked_at = 0;
+            match found {
+                Some(record) => return Some(record),
+                None => self.broken += 1,
+            }
+        }
+    }
+
+    /// How many records were broken on their way.
+    pub fn broken(&self) -> u64 {
+        self.broken
+    }
+
+    /// Bytes of a record whose end has not arrived.
+    pub fn missing_its_end(&self) -> usize {
+        self.pending.len()
+    }
+}
+
+fn record_in<R: Message + Default>(stuffed: &mut [u8]) -> Option<R> {
+    let bytes = cobs::decode_in_place(stuffed).ok()?;
+    let (record, sum) = stuffed[..bytes].split_last_chunk()?;
+    (crc32fast::hash(record) == u32::from_le_bytes(*sum)).then(|| R::decode(record).ok())?
 }

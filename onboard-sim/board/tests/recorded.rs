@@ -1,9 +1,9 @@
 //! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a stream is said.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use board::port::{Board, Readings};
-use board::recorded::{FlyError, fly};
-use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Link, StreamError, receive, send};
+use board::port::{self, Readings};
+use board::recorded::{Board, FlyError};
+use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Reader, put};
 use flight::computer::news::News;
 use flight::computer::pilot::{PilotInput, Sensed};
 use flight::computer::{Commands, Computer, Input};
@@ -19,29 +19,19 @@ use tick_log::pilot::{input_to_log, output_to_log};
 /// gate says every number that it has looked at.
 const NEWS_BYTES_MAX: u64 = 2048;
 
-/// A link in memory.
-#[derive(Default)]
-struct Memory {
-    to_read: Vec<u8>,
-    read: usize,
-    written: Vec<u8>,
-}
-
-impl Link for Memory {
-    type Error = core::convert::Infallible;
-
-    /// Some bytes at a time, as a serial line gives them.
-    fn read(&mut self, into: &mut [u8]) -> Result<usize, Self::Error> {
-        let bytes = into.len().min(self.to_read.len() - self.read).min(61);
-        into[..bytes].copy_from_slice(&self.to_read[self.read..self.read + bytes]);
-        self.read += bytes;
-        Ok(bytes)
+/// What a board answers to bytes that arrive a few at a time, as a serial line gives them.
+fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
+    let (mut board, mut out, mut flown) = (Board::default(), Vec::new(), Ok(()));
+    for arrived in bytes.chunks(61) {
+        flown = board.take(arrived, &mut (), &mut (), &mut out);
+        if flown.is_err() {
+            break;
+        }
     }
-
-    fn write_all(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.written.extend(bytes);
-        Ok(())
-    }
+    let mut reader = Reader::default();
+    reader.push(&out);
+    let answers = std::iter::from_fn(|| reader.next()).collect();
+    (board, answers, flown)
 }
 
 fn recipe() -> Recipe {
@@ -55,6 +45,7 @@ fn begin(sortie: &Sortie) -> Begin {
         at_power_up: None,
         in_the_air: Some(tick_log::sortie::pilot_start(sortie)),
         on_the_air: None,
+        flight: 7,
     }
 }
 
@@ -65,6 +56,7 @@ fn flown(sortie: &mut Sortie) -> Vec<(PilotInput, Answer)> {
         sortie.step();
         let (input, output) = sortie.computer().piloted().unwrap();
         let answer = Answer {
+            frame: input.frame,
             from_power_up: None,
             in_the_air: Some(output_to_log(output)),
             state_digest: sortie.computer().flight_digest(),
@@ -75,32 +67,58 @@ fn flown(sortie: &mut Sortie) -> Vec<(PilotInput, Answer)> {
     frames
 }
 
-fn stream(begin: &Begin, frames: impl IntoIterator<Item = Frame>) -> Memory {
-    let (mut link, mut buffer) = (Memory::default(), Vec::new());
-    send(&mut link, begin, &mut buffer).unwrap();
-    for frame in frames {
-        send(&mut link, &frame, &mut buffer).unwrap();
-    }
-    Memory { to_read: link.written, ..Memory::default() }
+fn in_the_air(input: &PilotInput, begin: Option<Begin>) -> Frame {
+    Frame { in_the_air: Some(input_to_log(input)), begin, ..Frame::default() }
 }
 
-fn in_the_air(input: &PilotInput) -> Frame {
-    Frame { from_power_up: None, in_the_air: Some(input_to_log(input)) }
+fn bytes_of(frames: impl IntoIterator<Item = Frame>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for frame in frames {
+        put(&frame, &mut bytes);
+    }
+    bytes
 }
 
 #[test]
 fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
-    let begin = begin(&sortie);
+    let mut begin = Some(begin(&sortie));
     let frames = flown(&mut sortie);
-    let mut link = stream(&begin, frames.iter().map(|(input, _)| in_the_air(input)));
-    assert_eq!(fly(&mut link, &mut (), &mut ()).unwrap(), frames.len() as u64);
-    let (mut answers, mut buffer) = (Memory { to_read: link.written, ..Memory::default() }, Vec::new());
-    for (_, expected) in &frames {
-        let answer: Answer = receive(&mut answers, &mut buffer).unwrap().unwrap();
-        assert_eq!(prost::Message::encode_to_vec(&answer), prost::Message::encode_to_vec(expected));
+    let bytes = bytes_of(frames.iter().map(|(input, _)| in_the_air(input, begin.take())));
+    let (board, answers, flown) = fly(&bytes);
+    flown.unwrap();
+    assert_eq!((board.frames(), board.reader().broken()), (frames.len() as u64, 0));
+    assert_eq!(answers.len(), frames.len());
+    for (answer, (_, expected)) in answers.iter().zip(&frames) {
+        assert_eq!(prost::Message::encode_to_vec(answer), prost::Message::encode_to_vec(expected));
     }
-    assert_eq!(receive::<Answer, _>(&mut answers, &mut buffer).unwrap(), None);
+}
+
+/// Every frame is asked twice, with the flight's beginning, and comes through noise and with broken copies.
+#[test]
+fn a_bad_wire_changes_no_answer() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let begin = begin(&sortie);
+    let frames: Vec<_> = flown(&mut sortie).into_iter().take(300).collect();
+    let mut bytes = b"noise before the first frame".to_vec();
+    bytes.push(0);
+    for (input, _) in &frames {
+        let whole = bytes_of([in_the_air(input, Some(begin.clone()))]);
+        for place in [3, whole.len() / 2] {
+            let mut flipped = whole.clone();
+            flipped[place] ^= if flipped[place] == 0x10 { 0x20 } else { 0x10 };
+            let lost: Vec<u8> = [&whole[..place], &whole[place + 1..]].concat();
+            bytes.extend(flipped);
+            bytes.extend(lost);
+        }
+        bytes.extend([whole.as_slice(), &whole].concat());
+    }
+    let (board, answers, flown) = fly(&bytes);
+    flown.unwrap();
+    assert_eq!(board.frames(), 300);
+    assert_eq!(board.reader().broken(), 1 + 4 * 300);
+    let expected: Vec<&Answer> = frames.iter().flat_map(|(_, answer)| [answer, answer]).collect();
+    assert_eq!(answers.iter().collect::<Vec<_>>(), expected);
 }
 
 /// A board that senses what was recorded, and notes its commands.
@@ -110,7 +128,7 @@ struct Recorded<'f> {
     kept: u64,
 }
 
-impl Board for Recorded<'_> {
+impl port::Board for Recorded<'_> {
     type Error = core::convert::Infallible;
 
     fn sense(&mut self) -> Result<Option<Readings>, Self::Error> {
@@ -157,7 +175,7 @@ fn a_board_that_senses_the_same_commands_the_same() {
     let believed = tick_log::pilot::state_from_log(&start.believed);
     let mut computer = Computer::at_power_up(&recipe().mission, Law::Nmpc, &believed).released();
     let mut board = Recorded { frames: frames.iter(), commanded: Vec::new(), kept: 0 };
-    board::port::fly(&mut computer, &mut board).unwrap();
+    port::fly(&mut computer, &mut board).unwrap();
     assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()));
     for ((input, answer), commands) in frames.iter().zip(&board.commanded) {
         let recorded = answer.in_the_air.as_ref().unwrap();
@@ -196,33 +214,34 @@ fn in_flight_only_news_allocate() {
 fn what_is_wrong_with_a_stream_is_said() {
     let sortie = Sortie::new(&recipe(), 0).unwrap();
     let begin = begin(&sortie);
-    let said = |mut link: Memory| fly(&mut link, &mut (), &mut ()).unwrap_err().to_string();
+    let said = |frame: Frame| fly(&bytes_of([frame])).2.unwrap_err().to_string();
+    let first = |begin: Begin| Frame {
+        in_the_air: Some(PilotRecord::default()),
+        begin: Some(begin),
+        ..Frame::default()
+    };
 
-    assert!(matches!(fly(&mut Memory::default(), &mut (), &mut ()), Err(FlyError::Empty)));
+    assert_eq!(said(Frame { begin: None, ..first(begin.clone()) }), "the first record must say what to fly");
     let nothing = Begin { in_the_air: None, ..begin.clone() };
     assert_eq!(
-        said(stream(&nothing, [])),
+        said(first(nothing)),
         "the first record: must name one start, with a radio only from power-up on"
     );
     let unknown = Begin { controller: "luck".to_owned(), ..begin.clone() };
     assert_eq!(
-        said(stream(&unknown, [])),
+        said(first(unknown)),
         "the first record: no controller is named `luck`; there are nmpc, open-loop and oscillating"
     );
-    let empty = Frame { from_power_up: Some(ComputerInput::default()), in_the_air: None };
-    let two = Frame { in_the_air: Some(PilotRecord::default()), ..empty.clone() };
+    let two = Frame { from_power_up: Some(ComputerInput::default()), ..first(begin.clone()) };
     let one = "the record after 0 frames must have one input, of a flight from power-up or in the air";
-    assert_eq!(said(stream(&begin, [two])), one);
-    assert!(said(stream(&begin, [empty])).starts_with("frame 0: needs measurements"));
+    assert_eq!(said(two), one);
+    assert!(said(first(begin.clone())).starts_with("frame 0: needs measurements"));
 
-    let mut cut = stream(&begin, []);
-    cut.to_read.pop();
-    let bytes = cut.to_read.len() - 3;
-    assert_eq!(said(cut), format!("the stream ends inside a record: 1 of {bytes} bytes are missing"));
-    let mut long = Memory::default();
-    long.to_read.extend((LONGEST_BYTES as u32 + 1).to_le_bytes());
-    assert!(matches!(
-        fly(&mut long, &mut (), &mut ()),
-        Err(FlyError::Stream(StreamError::TooLong { bytes })) if bytes == LONGEST_BYTES + 1
-    ));
+    let mut cut = bytes_of([first(begin)]);
+    cut.pop();
+    let (board, answers, _) = fly(&cut);
+    assert_eq!((board.reader().missing_its_end(), answers.len()), (cut.len(), 0));
+    let (board, _, flown) = fly(&vec![1; 2 * LONGEST_BYTES]);
+    assert!(flown.is_ok() && board.reader().missing_its_end() <= LONGEST_BYTES + 61, "memory is bounded");
+    assert!(board.reader().broken() > 0);
 }

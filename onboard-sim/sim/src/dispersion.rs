@@ -9,8 +9,6 @@ use world::sensors::SensorParams;
 pub struct Dispersion {
     /// The controller sees sensors; otherwise it knows the true state.
     pub sensors: bool,
-    /// Sensors deliver and servos get what the messages of hardware in the loop can carry; needs `sensors`.
-    pub wire_resolution: bool,
     /// Errors of the sensors.
     pub sensor_params: SensorParams,
     /// Impulse, as a fraction.
@@ -142,20 +140,6 @@ impl Dispersion {
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, DispersionError> {
         toml::from_str(text)
             .map_err(|error| DispersionError::Parse { origin: origin.to_owned(), message: error.to_string() })
-    }
-
-    /// The text of a set with `wire_resolution`; comments and order stay.
-    ///
-    /// # Errors
-    /// As [`from_toml`](Self::from_toml).
-    pub fn toml_with_wire_resolution(text: &str, origin: &str) -> Result<String, DispersionError> {
-        let parse = |error: toml_edit::TomlError| DispersionError::Parse {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        };
-        let mut document: toml_edit::DocumentMut = text.parse().map_err(parse)?;
-        document["wire_resolution"] = toml_edit::value(true);
-        Ok(document.to_string())
     }
 
     /// The built-in set of a name.

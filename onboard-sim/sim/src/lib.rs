@@ -9,7 +9,6 @@
 //! * [`fault`]: what breaks in a flight, and when.
 //! * [`sortie`]: the flight itself.
 //! * `surroundings`: everything of it but its flight computer.
-//! * [`remote`]: the same flight with its flight computer elsewhere.
 //! * [`outside`]: the input from the crew and the ground in one frame.
 //! * [`limits`]: what counts as a landing.
 //! * [`ending`]: how the flight ended, in words.
@@ -23,6 +22,5 @@ pub mod limits;
 pub mod outcome;
 pub mod outside;
 pub mod recipe;
-pub mod remote;
 pub mod sortie;
 mod surroundings;

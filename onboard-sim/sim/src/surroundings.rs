@@ -6,7 +6,6 @@ use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
-use hil::readings::{Feedback, Switches};
 use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
 use world::{Actuators, Battery, World};
 
@@ -79,7 +78,7 @@ impl Surroundings {
     }
 
     /// What feedback and switches say after the frame; `released`: contact counts.
-    pub(crate) fn feedback(&mut self, released: bool, pin_out: bool) -> Feedback {
+    pub(crate) fn feedback(&mut self, released: bool) -> Feedback {
         let fed_back_rad = self.world.fins_feedback_rad();
         let touched = released && self.world.touchdown().is_some();
         let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
@@ -89,8 +88,8 @@ impl Surroundings {
             None => (fed_back_rad, touched, true),
         };
         let booster_attached = self.world.booster_attached();
-        let switches = Switches { contact, igniter_continuity, booster_attached, pin_out };
-        Feedback { gimbal_rad: self.world.gimbal_feedback_rad(), fins_rad, switches }
+        let gimbal_rad = self.world.gimbal_feedback_rad();
+        Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached }
     }
 
     /// Commands for the next frame.
@@ -125,6 +124,20 @@ impl Surroundings {
     pub(crate) fn measured(&self) -> Option<&Measurements> {
         self.measured.as_ref()
     }
+}
+
+/// What actuators and switches say at the end of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Feedback {
+    /// Where the gimbal is (pitch, yaw), rad.
+    pub(crate) gimbal_rad: [f64; 2],
+    /// Where the fins are, rad.
+    pub(crate) fins_rad: [f64; 4],
+    /// A foot touches the ground.
+    pub(crate) contact: bool,
+    pub(crate) igniter_continuity: bool,
+    /// The wire between booster and vehicle is whole.
+    pub(crate) booster_attached: bool,
 }
 
 /// Where gimbal and fins are, rad.

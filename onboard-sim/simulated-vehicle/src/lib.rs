@@ -5,11 +5,9 @@
 //! * [`fly`]: the run loop with clock, links and log.
 //! * [`vehicle`]: the simulated vehicle as run loop, radio and log see it. Pure.
 //! * [`endpoint`]: a frame of the simulated vehicle and of its end of MAVLink (`vehicle_link`, which a board has, too).
-//! * [`hil`]: hardware in the loop: a world and a flight computer as two processes.
 //! * [`solve_times`]: statistics of the controller's solve times.
 
 pub mod endpoint;
 pub mod fly;
-pub mod hil;
 pub mod solve_times;
 pub mod vehicle;

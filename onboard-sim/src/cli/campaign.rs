@@ -21,7 +21,7 @@ use flight::vehicle::mission::StartPoint;
 use protocol::log::build::build_info;
 use serde_json::json;
 use sha2::Digest as _;
-use sim::dispersion::{self, Dispersion};
+use sim::dispersion;
 use sim::fault::TimedFault;
 
 use super::{MapArguments, on_threads, recipe, single};
@@ -40,9 +40,6 @@ pub(crate) struct CampaignArguments {
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
-    /// Sensors deliver and servos get what the messages of hardware in the loop can carry.
-    #[arg(long)]
-    wire_resolution: bool,
     /// Number of flights; they are numbered from 0.
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     flights: u64,
@@ -140,10 +137,6 @@ fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expecte
     mission.steered &= !arguments.passive;
     if mission.ignition.fixed_height_m.is_none() {
         mission.ignition.fixed_height_m = tally::fixed_height_m(*controller, mission)?;
-    }
-    if arguments.wire_resolution {
-        recipe.dispersion_toml = Dispersion::toml_with_wire_resolution(&recipe.dispersion_toml, dispersion)?;
-        recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, dispersion)?;
     }
     recipe.controller = *controller;
     recipe.faults.clone_from(&arguments.faults);

@@ -2,13 +2,11 @@
 //! the files that they write: each is complete or absent, and replaces an existing one only on request.
 
 pub(crate) mod campaign;
-pub(crate) mod computer;
 pub(crate) mod fly;
 pub(crate) mod hazard;
 pub(crate) mod motors;
 pub(crate) mod paper;
 mod single;
-pub(crate) mod world;
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};

@@ -133,10 +133,9 @@ impl RecordedComputer {
     }
 
     /// This computer at power-up, after a reset behind which frame `number` is next: it goes on from what was saved.
-    #[must_use]
-    pub fn resumed(self, saved: &Saved, number: u64) -> Self {
-        let computer = self.computer.resumed(saved, flight_time_s(number.saturating_sub(1)));
-        Self { computer, next: Some(number), rehearsed: false }
+    pub fn resume(&mut self, saved: &Saved, number: u64) {
+        self.computer.resume(saved, flight_time_s(number.saturating_sub(1)));
+        (self.next, self.rehearsed) = (Some(number), false);
     }
 
     /// Whether frames are missing before this one, so that the computer was reset there.

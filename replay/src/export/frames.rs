@@ -4,7 +4,7 @@ use std::io;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use board::stream::{Answer, Begin, Frame, Link, StreamError, send};
+use board::stream::{Answer, Begin, Frame, put};
 use flight::guidance::baseline::Controller;
 
 use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
@@ -19,49 +19,35 @@ pub enum FramesError {
     #[error("{file}: {reason}")]
     NotWhole { file: String, reason: &'static str },
     #[error("{path}: cannot be written")]
-    Write { path: String, source: StreamError<io::Error> },
+    Write { path: String, source: io::Error },
 }
 
 /// A file of records, which gets its name when it is complete.
 struct Records<'p> {
     path: &'p Path,
     file: BufWriter<NewFile>,
-    buffer: Vec<u8>,
-}
-
-impl Link for Records<'_> {
-    type Error = io::Error;
-
-    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-        Ok(0)
-    }
-
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.file.write_all(bytes)
-    }
 }
 
 impl<'p> Records<'p> {
     fn create(path: &'p Path, overwrite: Overwrite, log: &Path) -> Result<Self, FramesError> {
-        let file = NewFile::create(Destination { path, overwrite }, log)
-            .map_err(|error| failed(path, StreamError::Link(error)))?;
-        Ok(Self { path, file: BufWriter::new(file), buffer: Vec::new() })
+        let file =
+            NewFile::create(Destination { path, overwrite }, log).map_err(|error| failed(path, error))?;
+        Ok(Self { path, file: BufWriter::new(file) })
     }
 
     fn send(&mut self, record: &impl prost::Message) -> Result<(), FramesError> {
-        let mut buffer = std::mem::take(&mut self.buffer);
-        let sent = send(self, record, &mut buffer).map_err(|error| failed(self.path, error));
-        self.buffer = buffer;
-        sent
+        let mut bytes = Vec::new();
+        put(record, &mut bytes);
+        self.file.write_all(&bytes).map_err(|error| failed(self.path, error))
     }
 
     fn finish(self) -> Result<(), FramesError> {
         let file = self.file.into_inner().map_err(io::IntoInnerError::into_error);
-        file.and_then(NewFile::commit).map_err(|error| failed(self.path, StreamError::Link(error)))
+        file.and_then(NewFile::commit).map_err(|error| failed(self.path, error))
     }
 }
 
-fn failed(path: &Path, source: StreamError<io::Error>) -> FramesError {
+fn failed(path: &Path, source: io::Error) -> FramesError {
     FramesError::Write { path: path.display().to_string(), source }
 }
 
@@ -75,7 +61,7 @@ pub fn write_frames<'a>(log: &Path, directory: impl Into<Destination<'a>>) -> Re
     let Destination { path: directory, overwrite } = directory.into();
     let opened = FlightLog::open(log)?;
     let made = !directory.exists();
-    std::fs::create_dir_all(directory).map_err(|error| failed(directory, StreamError::Link(error)))?;
+    std::fs::create_dir_all(directory).map_err(|error| failed(directory, error))?;
     let written = write_into(directory, overwrite, log, opened);
     if written.is_err() && made {
         // Nothing is left behind. If this fails, an empty directory is.
@@ -93,29 +79,38 @@ fn write_into<R: io::Read>(
     let files = [directory.join("frames"), directory.join("recorded")];
     let mut inputs = Records::create(&files[0], overwrite, path)?;
     let mut expected = Records::create(&files[1], overwrite, path)?;
-    let (mut started, mut from_power_up, mut written) = (false, false, 0);
+    let (mut begin, mut from_power_up, mut written) = (None, false, 0);
     let not_whole =
         |log: &FlightLog<_>, reason| FramesError::NotWhole { file: log.name().to_owned(), reason };
     while let Some(stamped) = log.next_entry()? {
         match stamped.entry {
-            Entry::ComputerStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::ComputerStart(_) if begin.is_some() || written > 0 => {
+                return Err(not_whole(&log, "has more than one flight"));
+            }
             Entry::ComputerStart(start) => {
-                (started, from_power_up) = (true, true);
-                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
-                inputs.send(&Begin { at_power_up: Some(*start), ..begin })?;
+                from_power_up = true;
+                let began = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                begin = Some(Begin { at_power_up: Some(*start), ..began });
             }
             // The computer of a flight from power-up needs no other start.
             Entry::PilotStart(_) if from_power_up => {}
-            Entry::PilotStart(_) if started => return Err(not_whole(&log, "has more than one flight")),
+            Entry::PilotStart(_) if begin.is_some() || written > 0 => {
+                return Err(not_whole(&log, "has more than one flight"));
+            }
             Entry::PilotStart(start) => {
-                started = true;
-                let begin = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
-                inputs.send(&Begin { in_the_air: Some(*start), ..begin })?;
+                let began = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
+                begin = Some(Begin { in_the_air: Some(*start), ..began });
             }
             Entry::ComputerFrame(frame) if from_power_up => {
-                inputs.send(&Frame { from_power_up: Some(frame.input), in_the_air: None })?;
+                let number = frame.input.frame;
+                inputs.send(&Frame {
+                    from_power_up: Some(frame.input),
+                    begin: begin.take(),
+                    ..Frame::default()
+                })?;
                 let (output, state_digest) = (Some(frame.output), frame.state_digest);
                 expected.send(&Answer {
+                    frame: number,
                     from_power_up: output,
                     in_the_air: None,
                     state_digest,
@@ -123,10 +118,16 @@ fn write_into<R: io::Read>(
                 })?;
                 written += 1;
             }
-            Entry::PilotTick(tick) if started && !from_power_up => {
-                inputs.send(&Frame { from_power_up: None, in_the_air: Some(tick.input) })?;
+            Entry::PilotTick(tick) if !from_power_up && (begin.is_some() || written > 0) => {
+                let number = tick.input.frame;
+                inputs.send(&Frame {
+                    in_the_air: Some(tick.input),
+                    begin: begin.take(),
+                    ..Frame::default()
+                })?;
                 let (output, state_digest) = (Some(tick.output), tick.state_digest);
                 expected.send(&Answer {
+                    frame: number,
                     from_power_up: None,
                     in_the_air: output,
                     state_digest,
@@ -175,5 +176,6 @@ fn beginning<R: io::Read>(log: &FlightLog<R>) -> Result<Begin, &'static str> {
         at_power_up: None,
         in_the_air: None,
         on_the_air: None,
+        flight: 0,
     })
 }

@@ -132,7 +132,9 @@ proptest! {
         let mut bytes = WHOLE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
         let (ticks, damaged) = read_ticks(&bytes).unwrap();
-        prop_assert_eq!((ticks.len(), damaged), (FLIGHT.ticks.len(), false));
+        prop_assert_eq!(ticks.len(), FLIGHT.ticks.len());
+        // A record's type that becomes the end mark's ends the file too early, and that is told.
+        prop_assert!(!damaged || bytes[place] == mcap::records::op::FOOTER);
     }
 
     /// Overwrites stretches of the log with bytes of another file.

@@ -1,65 +1,24 @@
-"""JSBSim as the world of our flight computer, over the messages of hardware in the loop, in lockstep over UDP.
+"""JSBSim as the world of our flight computer, which is a process of its own, in lockstep.
 
-world.py PORT ORDER.json: flies the flights of the order with the computer at 127.0.0.1:PORT and prints one line of JSON
-for each. The order names the airframe's and the motor's file, the site, the mission's hash, and the draw of each flight.
+world.py BOARD ORDER.json: flies the flights of the order with the program BOARD and prints one line of JSON for each. The
+order names the airframe's, the motor's and the mission's file, the site, and the draw of each flight.
 """
 import json
 import math
-import os
-import random
-import socket
-import struct
 import sys
 import tempfile
 
-os.environ["MAVLINK20"] = "1"
-import jsbsim  # noqa: E402
-import numpy as np  # noqa: E402
-from pymavlink.dialects.v20 import touchdown as mav  # noqa: E402
+import jsbsim
+import numpy as np
 
-import vehicle  # noqa: E402
-from sensors import Sensors  # noqa: E402
+import vehicle
+from board import Computer, double, doubles, message, vector, whole
+from sensors import Sensors
 
 M = vehicle.M_PER_FT
-FRAME_US, STEP_S = 5000, 0.001
-LONGEST_S, SEND_AGAIN_S, GIVE_UP = 150.0, 0.5, 40
-NOTHING = (1 << 64) - 1
-IMU_FIELDS, BAROMETER_FIELDS = 0x3F, 0x200 | 0x800
-QUARTER_TURN = math.pi / 2
+FRAME_S, STEP_S, LONGEST_S = 0.005, 0.001, 150.0
 # WGS 84.
 EQUATORIAL_RADIUS_M, ECCENTRICITY_SQUARED = 6378137.0, 6.69437999014e-3
-
-
-class Computer:
-    """The flight computer at the other end."""
-
-    def __init__(self, port):
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.connect(("127.0.0.1", port))
-        self.socket.settimeout(SEND_AGAIN_S)
-        self.mav = mav.MAVLink(None, srcSystem=254, srcComponent=1)
-
-    def ask(self, flight_id, time_usec, messages):
-        """Sends messages in one datagram, again until they are answered; returns (controls, phase)."""
-        for _ in range(GIVE_UP):
-            self.socket.send(b"".join(message.pack(self.mav) for message in messages))
-            try:
-                while True:
-                    told = None
-                    for message in self.mav.parse_buffer(self.socket.recv(4096)) or []:
-                        if message.get_type() == "TD_HIL_COMPUTER":
-                            told = message
-                        elif message.get_type() == "HIL_ACTUATOR_CONTROLS" and told is not None:
-                            if (told.flight_id, told.time_usec, message.time_usec) == (flight_id, time_usec, time_usec):
-                                return message.controls, told.phase
-            except TimeoutError:
-                continue
-        raise SystemExit(f"the flight computer does not answer at {time_usec} us")
-
-
-def single(value):
-    """As the wire carries it."""
-    return struct.unpack("<f", struct.pack("<f", value))[0]
 
 
 class Plant:
@@ -104,13 +63,12 @@ class Plant:
             self.site["longitude_deg"] + math.degrees(east_m / east),
         )
 
-    def command(self, controls):
+    def command(self, gimbal, fins, ignite):
         fdm = self.fdm
-        fdm["fcs/gimbal-pitch-cmd"] = controls[0] * QUARTER_TURN
-        fdm["fcs/gimbal-yaw-cmd"] = controls[1] * QUARTER_TURN
+        fdm["fcs/gimbal-pitch-cmd"], fdm["fcs/gimbal-yaw-cmd"] = gimbal
         for fin in range(4):
-            fdm[f"fcs/fin{fin}-cmd"] = controls[2 + fin] * QUARTER_TURN
-        if controls[6] > 0.5 and self.lit_at is None:
+            fdm[f"fcs/fin{fin}-cmd"] = fins[fin]
+        if ignite and self.lit_at is None:
             self.lit_at = self.time_s + self.truth["ignition_delay_s"]
 
     def step(self):
@@ -172,35 +130,21 @@ def euler(world_from_body):
     return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def messages_of(flight_id, time_usec, plant, sample, contact):
+def input_of(time_s, plant, sample, contact):
+    """A frame's input but for its number: time, readings, fins, contact, igniter, no abort."""
     gyro, force, height, fix, distance = sample
-    fdm = plant.fdm
-    # Contact, continuity, pin out; there is no booster.
-    switches = 2 | 8 | (1 if contact else 0)
-    messages = [mav.MAVLink_td_hil_vehicle_message(
-        time_usec=time_usec, gnss_time_usec=fix[2] if fix else NOTHING, flight_id=flight_id,
-        gimbal=[fdm["fcs/gimbal-pitch-rad"], fdm["fcs/gimbal-yaw-rad"]],
-        fins=[fdm[f"fcs/fin{fin}-rad"] for fin in range(4)],
-        battery=0xFFFF, switches=switches, range=0 if distance is None else 1,
-    )]
+    measured = vector(1, gyro) + vector(2, force)
+    if height is not None:
+        measured += double(3, height)
     if fix:
-        place, velocity, valid_us = fix
-        latitude_deg, longitude_deg = plant.degrees(place[0], place[1])
-        north, east, down = (round(100 * speed) for speed in (velocity[0], velocity[1], -velocity[2]))
-        messages.append(mav.MAVLink_hil_gps_message(
-            valid_us, 3, round(1e7 * latitude_deg), round(1e7 * longitude_deg), round(1e3 * place[2]),
-            0xFFFF, 0xFFFF, 0xFFFF, north, east, down, 0xFFFF, 0xFF,
-        ))
+        (north, east, up), (north_m_s, east_m_s, up_m_s), valid_us = fix
+        place, velocity = vector(1, (north, -east, up)), vector(2, (north_m_s, -east_m_s, up_m_s))
+        measured += message(4, place + velocity + double(3, valid_us * 1e-6))
     if distance is not None:
-        messages.append(mav.MAVLink_distance_sensor_message(
-            time_usec // 1000, 0, 0xFFFF, round(100 * distance), 0, 0, 12, 0xFF,
-        ))
-    fields = IMU_FIELDS | (BAROMETER_FIELDS if height is not None else 0)
-    pressure_hpa = fdm["atmosphere/P-psf"] * 0.47880259 if height is not None else 0.0
-    messages.append(mav.MAVLink_hil_sensor_message(
-        time_usec, *map(single, force), *map(single, gyro), 0, 0, 0, pressure_hpa, 0, height or 0.0, 0, fields,
-    ))
-    return messages
+        measured += double(5, distance)
+    fins = [plant.fdm[f"fcs/fin{fin}-rad"] for fin in range(4)]
+    flags = whole(6, contact) + whole(7, True) + whole(8, False)
+    return double(2, time_s) + message(3, measured) + doubles(5, fins) + flags
 
 
 def fly(computer, order, draw):
@@ -210,19 +154,15 @@ def fly(computer, order, draw):
 
 def fly_in(folder, computer, order, draw):
     plant, sensors = Plant(folder, order, draw), Sensors(draw["number"])
-    flight_id, believed = random.getrandbits(32), draw["believed"]
-    start = mav.MAVLink_td_hil_start_message(
-        position_m=believed["position_m"], velocity_m_s=believed["velocity_m_s"],
-        world_from_body=believed["world_from_body"], rate_rad_s=believed["rate_rad_s"], flight_id=flight_id,
-        mission_hash=order["mission_hash"], pace=0,
-    )
-    controls, _ = computer.ask(flight_id, 0, [start])
+    begin, frame = computer.begin(open(order["mission"]).read(), draw["believed"]), 0
+    closed = math.radians(order["fins_closed_deg"])
+    gimbal, fins, ignite, eject = (0.0, 0.0), (closed,) * 4, False, False
     before, touchdown, ignited_m, still_s, ending, chute = plant.motion(), None, None, 0.0, "time-out", False
     while plant.time_s < LONGEST_S and ending == "time-out":
-        plant.command(controls)
-        if controls[6] > 0.5 and ignited_m is None:
+        plant.command(gimbal, fins, ignite)
+        if ignite and ignited_m is None:
             ignited_m = before["place"][2]
-        chute |= controls[7] > 0.5
+        chute |= eject
         sample = None
         for _ in range(5):
             plant.step()
@@ -241,10 +181,9 @@ def fly_in(folder, computer, order, draw):
                 "body strike" if hull else "tipped over" if motion["tilt"] > math.pi / 4
                 else "upright" if still_s >= 0.3 else ending
             )
-        time_usec = round(plant.time_s / STEP_S) * 1000
-        controls, phase = computer.ask(
-            flight_id, time_usec, messages_of(flight_id, time_usec, plant, sample, touchdown is not None)
-        )
+        frame += 1
+        told = input_of(FRAME_S * frame, plant, sample, touchdown is not None)
+        (gimbal, fins, ignite, eject), begin = computer.ask(frame, told, begin), b""
     told = {"number": draw["number"], "ending": ending, "parachute": bool(chute), "ignited_m": ignited_m}
     if touchdown:
         velocity = touchdown["velocity"]
@@ -257,8 +196,8 @@ def fly_in(folder, computer, order, draw):
 
 
 def main():
-    port, order = int(sys.argv[1]), json.load(open(sys.argv[2]))
-    computer = Computer(port)
+    program, order = sys.argv[1], json.load(open(sys.argv[2]))
+    computer = Computer(program)
     for draw in order["flights"]:
         print(json.dumps(fly(computer, order, draw)), flush=True)
 

@@ -60,11 +60,9 @@ pub static READERS: PythonPackages = PythonPackages::with_dependencies(
 /// A simulator of ascents.
 pub static ROCKETPY: PythonPackages = PythonPackages::with_dependencies("rocketpy", &["rocketpy==1.13.0"]);
 
-/// A flight dynamics model, and MAVLink to speak with it.
-pub static JSBSIM: PythonPackages = PythonPackages::without_dependencies(
-    "jsbsim",
-    &["jsbsim==1.3.3", "numpy==2.4.6", "pymavlink==2.4.50", "fastcrc==0.5.0", "lxml==6.1.3"],
-);
+/// A flight dynamics model.
+pub static JSBSIM: PythonPackages =
+    PythonPackages::without_dependencies("jsbsim", &["jsbsim==1.3.3", "numpy==2.4.6"]);
 
 /// Rerun with its command-line program.
 pub static RERUN: PythonPackages = PythonPackages::with_dependencies("rerun", &["rerun-sdk==0.36.3"]);

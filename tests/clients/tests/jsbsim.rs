@@ -1,18 +1,15 @@
 //! JSBSim as the world: its equations of motion, integrator, Earth, atmosphere, motor, servos and ground instead of ours,
-//! behind the messages of hardware in the loop. Each flight is also flown in our own world with the same draw.
+//! and our flight computer as a process of its own. Each flight is also flown in our own world with the same draw.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 #![expect(clippy::print_stdout, reason = "the touchdowns side by side, for the page of hardware in the loop")]
 
-use std::path::Path;
-
-use clients::{JSBSIM, dialect, file};
-use e2e::{Bound, Ended, Program, Running, program};
+use clients::{JSBSIM, file};
+use e2e::{Ended, Program, Running, program};
 use flight::estimation::estimator::StartUncertainty;
 use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
-use protocol::mission::MissionHash;
 use serde_json::{Value, json};
 use sim::dispersion::Dispersion;
 use sim::draw::{Draw, draw};
@@ -29,7 +26,7 @@ const SEED: u64 = 2002;
 /// A day at the field with this mean wind and without gusts, which JSBSim makes in another way.
 fn day(wind_m_s: f64) -> Dispersion {
     let field = Dispersion::builtin("field").unwrap();
-    Dispersion { wind_m_s: [wind_m_s; 2], gust_scale: 0.0, wire_resolution: true, ..field }
+    Dispersion { wind_m_s: [wind_m_s; 2], gust_scale: 0.0, ..field }
 }
 
 fn state(state: &RigidState) -> Value {
@@ -43,7 +40,7 @@ fn state(state: &RigidState) -> Value {
 }
 
 /// The flights that JSBSim is to fly, numbered from `first`.
-fn order(mission: &Mission, mission_toml: &str, first: usize, draws: &[Draw]) -> Value {
+fn order(mission: &Mission, first: usize, draws: &[Draw]) -> Value {
     let vehicles = file("../../onboard-sim/vehicles");
     let flights: Vec<Value> = draws
         .iter()
@@ -63,24 +60,10 @@ fn order(mission: &Mission, mission_toml: &str, first: usize, draws: &[Draw]) ->
         "airframe": vehicles.join("airframes/mk2.toml"),
         "motor": vehicles.join("motors/AeroTech_H45.eng"),
         "site": { "latitude_deg": mission.site.latitude_deg, "longitude_deg": mission.site.longitude_deg },
-        "mission_hash": MissionHash::of(mission_toml).0,
+        "mission": vehicles.join("missions/mk2.toml"),
+        "fins_closed_deg": mission.airframe.fins.closed_rad().to_degrees(),
         "flights": flights,
     })
-}
-
-/// Generates our dialect for JSBSim's bridge.
-fn generate_dialect() {
-    let place = Running::to_end(
-        JSBSIM.python().args(["-c", "import pymavlink.dialects.v20 as d; print(d.__path__[0])"]),
-    );
-    let place = Path::new(&place.output);
-    let folder = tempfile::tempdir_in(place).unwrap();
-    let made = folder.path().join("touchdown.py");
-    let mut generator = JSBSIM.program("mavgen.py");
-    generator.args(["--lang", "Python3", "--wire-protocol", "2.0", "-o"]).arg(&made).arg(dialect());
-    let generated = Running::to_end(&mut generator);
-    assert_eq!(generated.code, Some(0), "{}", generated.output);
-    std::fs::rename(&made, place.join("touchdown.py")).unwrap();
 }
 
 /// What JSBSim tells of a flight, judged as our own flights are.
@@ -159,16 +142,13 @@ fn fly(wind_m_s: f64) -> Flown {
     let dispersion = day(wind_m_s);
     let draws: Vec<Draw> = (0..FLIGHTS).map(|number| draw(&mission, &dispersion, SEED, number)).collect();
     let folder = tempfile::tempdir().unwrap();
-    let mut computer =
-        Running::start(program(Program::OnboardSim).args(["computer", "--link", "udpin:127.0.0.1:0"]));
-    let port = computer.bound_port(Bound::Udp);
     let mut theirs = Vec::new();
     // A few at a time, because a program under test has limited time.
     for few in draws.chunks(AT_ONCE) {
         let path = folder.path().join("order.json");
-        std::fs::write(&path, order(&mission, mission_toml, theirs.len(), few).to_string()).unwrap();
+        std::fs::write(&path, order(&mission, theirs.len(), few).to_string()).unwrap();
         let mut bridge = JSBSIM.python();
-        bridge.arg(file("jsbsim/world.py")).arg(port.to_string()).arg(&path);
+        bridge.arg(file("jsbsim/world.py")).arg(program(Program::Board).get_program()).arg(&path);
         let Ended { code, output } = Running::to_end(&mut bridge);
         assert_eq!(code, Some(0), "{output}");
         let told = output.lines().filter(|line| line.starts_with('{'));
@@ -195,7 +175,6 @@ fn differences(some: &[Outcome], others: &[Outcome]) -> [(f64, f64); 6] {
 }
 
 fn compare(wind_m_s: f64, fewest: usize) {
-    generate_dialect();
     let Flown { theirs, ours, again } = fly(wind_m_s);
     println!("wind {wind_m_s} m/s: vertical m/s, lateral m/s, tilt deg, rate deg/s, distance m, time s");
     for (number, (theirs, ours)) in theirs.iter().zip(&ours).enumerate() {

@@ -115,11 +115,10 @@ impl Computer {
 
     /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
     /// which it comes back, so a board needs a clock that runs through the reset.
-    #[must_use]
-    pub fn resumed(mut self, saved: &Saved, time_s: f64) -> Self {
+    pub fn resume(&mut self, saved: &Saved, time_s: f64) {
         let lost_s = time_s - saved.time_s;
         if !(0.0..=LONGEST_RESET_S).contains(&lost_s) {
-            return self;
+            return;
         }
         self.frame = saved.frame;
         match &saved.in_the_air {
@@ -134,7 +133,6 @@ impl Computer {
             }
             None => self.wake_on_the_pad(saved, time_s),
         }
-        self
     }
 
     /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to the pad must not be told
@@ -155,8 +153,8 @@ impl Computer {
     /// Restarts the computer: only what was saved in the last frame is kept.
     pub fn restart(&mut self, time_s: f64) {
         let saved = self.saved();
-        *self =
-            Self::at_power_up(self.pilot.mission(), self.law.clone(), &self.believed).resumed(&saved, time_s);
+        *self = Self::at_power_up(self.pilot.mission(), self.law.clone(), &self.believed);
+        self.resume(&saved, time_s);
     }
 }
 
@@ -174,6 +172,12 @@ mod tests {
 
     fn powered_up() -> Computer {
         Computer::at_power_up(&mission(), Law::Nmpc, &RigidState::upright(300.0))
+    }
+
+    fn resumed(saved: &Saved, time_s: f64) -> Computer {
+        let mut computer = powered_up();
+        computer.resume(saved, time_s);
+        computer
     }
 
     /// A falling computer after some frames.
@@ -223,7 +227,7 @@ mod tests {
     fn a_computer_from_its_bytes_is_the_one_that_was_restarted_in_place() {
         let mut here = falling();
         let saved = Saved::read(&bytes(&here)).unwrap();
-        let mut there = powered_up().resumed(&saved, 0.3);
+        let mut there = resumed(&saved, 0.3);
         here.restart(0.3);
         assert_eq!(here.digest(), there.digest());
         for frame in 61..=100 {
@@ -238,9 +242,9 @@ mod tests {
     fn a_computer_that_was_off_for_long_is_at_power_up() {
         let saved = falling().saved();
         for time_s in [0.2 + LONGEST_RESET_S + 0.01, 0.1, f64::NAN] {
-            assert_eq!(powered_up().resumed(&saved, time_s).digest(), powered_up().digest(), "{time_s}");
+            assert_eq!(resumed(&saved, time_s).digest(), powered_up().digest(), "{time_s}");
         }
-        assert_ne!(powered_up().resumed(&saved, 0.2 + LONGEST_RESET_S).digest(), powered_up().digest());
+        assert_ne!(resumed(&saved, 0.2 + LONGEST_RESET_S).digest(), powered_up().digest());
     }
 
     /// In every phase: on the pad nothing but an abort is taken up, in the air everything of the mode.

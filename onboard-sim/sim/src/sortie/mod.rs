@@ -13,7 +13,7 @@ use std::time::Duration;
 pub use self::errors::EstimatorErrors;
 use self::rehearsal::Rehearsal;
 use flight::computer::crew::{Asked, Request};
-use flight::computer::pilot::{Pilot, Sensed};
+use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::baseline::Law;
@@ -22,8 +22,6 @@ use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
-use hil::carried::{CarriedCommands, Wire};
-use hil::readings::{Feedback, Readings};
 use nalgebra::Vector3;
 use world::sensors::SensorParamError;
 use world::world::WorldError;
@@ -35,7 +33,7 @@ use crate::fault::Injector;
 use crate::outcome::Outcome;
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
-use crate::surroundings::Surroundings;
+use crate::surroundings::{Feedback, Surroundings};
 
 /// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
 pub(crate) const LONGEST_S: f64 = 150.0;
@@ -49,12 +47,6 @@ pub enum SetUpError {
     /// A sensor parameter is out of its range.
     #[error(transparent)]
     Sensors(#[from] SensorParamError),
-    /// A wire carries sensors, not the truth.
-    #[error("the set of dispersions has no sensors, so there is nothing that a wire could carry")]
-    NoSensors,
-    /// A computer at the other end of a wire cannot be broken from this one.
-    #[error("no fault can be injected into a flight whose computer is elsewhere: {0}")]
-    Fault(String),
 }
 
 /// The radio between vehicle and ground, in both directions. Nothing on board waits for it.
@@ -76,7 +68,6 @@ pub struct Sortie {
     rehearsal: Option<Rehearsal>,
     surroundings: Surroundings,
     /// Narrows what the computer is told and what it commands.
-    wire: Option<Wire>,
     /// The state in which the fall began.
     fall: Option<RigidState>,
     injector: Injector,
@@ -149,14 +140,10 @@ impl Sortie {
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
         let drawn = start::falling_as(mission, drawn)?;
         let (surroundings, believed) = Surroundings::at_start(mission, dispersion, &drawn)?;
-        if dispersion.wire_resolution && !dispersion.sensors {
-            return Err(SetUpError::NoSensors);
-        }
         Ok(Self {
             computer: Computer::at_power_up(mission, law, &believed),
             rehearsal: None,
             surroundings,
-            wire: dispersion.wire_resolution.then(|| Wire::new(mission)),
             fall: None,
             injector: Injector::default(),
             radio: Radio::default(),
@@ -217,18 +204,18 @@ impl Sortie {
         } else {
             outside.requests
         };
-        let feedback = self.surroundings.feedback(self.computer.released_at_s().is_some(), outside.pin_out);
-        let (sensed, Feedback { gimbal_rad, fins_rad, switches }) = self.carried(&sensed, feedback);
+        let Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached } =
+            self.surroundings.feedback(self.computer.released_at_s().is_some());
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             sensed,
             gimbal_rad,
             fins_rad,
-            contact: switches.contact,
-            igniter_continuity: switches.igniter_continuity,
-            booster_attached: switches.booster_attached,
-            pin_out: switches.pin_out,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            pin_out: outside.pin_out,
             battery_v: Some(self.surroundings.battery.volts()),
             log: outside.log,
             uplink: outside.uplink,
@@ -250,18 +237,7 @@ impl Sortie {
         Flown { output: Some(output), took }
     }
 
-    /// What the computer is told, after a way over a wire if there is one.
-    fn carried(&self, sensed: &Sensed, feedback: Feedback) -> (Sensed, Feedback) {
-        let (Some(wire), Sensed::Measured(measured)) = (&self.wire, sensed) else {
-            return (*sensed, feedback);
-        };
-        let told = wire.carry(&Readings { measured: *measured, feedback });
-        (Sensed::Measured(told.measured), told.feedback)
-    }
-
     fn command(&mut self, commands: &Commands) {
-        let carried = self.wire.map(|_| CarriedCommands::narrow(commands).widen());
-        let commands = carried.as_ref().unwrap_or(commands);
         self.surroundings.command(commands);
         let falls = !self.computer.mode().phase.before_apogee();
         if falls && self.fall.is_none() {

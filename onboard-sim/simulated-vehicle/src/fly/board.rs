@@ -6,17 +6,18 @@
 //! what moves the vehicle is what the board has decided, from what the board has heard.
 //!
 //! The board is at the other end of two pipes in a folder, `frames` and `answers`, and reads a flight as
-//! [`board::stream`] describes it. A board that was dead in some frames finds that out from the number of the next one, and
-//! resets itself; so behind missing frames the flight's first record and that frame are sent again.
+//! [`board::stream`] describes it; what is behind the pipes (a process, an emulator, `socat` and a cable) may lose bytes. A
+//! frame that is not answered is sent again, with the flight's beginning. A board that was dead in some frames finds that
+//! out from the number of the next one, and resets itself; so behind missing frames that frame is sent twice.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufReader, Read as _, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use board::stream::{self, Answer, Begin, Frame, Link, OnTheAir, StreamError, receive, send};
+use board::stream::{self, Answer, Begin, Frame, OnTheAir, Reader, put};
 use flight::rules::arming::Uplink;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::record::Record;
@@ -29,13 +30,16 @@ use crate::vehicle::{Vehicle, VehicleEvent};
 /// A board that is silent for longer has stopped. An emulated one plans a landing in a second or two.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// A frame without an answer is sent again after this time. An emulated board that still plans answers it twice.
+const SENT_AGAIN_AFTER: Duration = Duration::from_millis(500);
+
 /// Why a flight with a board has ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {
     #[error("{}: {source}", path.display())]
     Pipe { path: PathBuf, source: io::Error },
     #[error("the board's pipes: {0}")]
-    Stream(#[from] StreamError<io::Error>),
+    Pipes(#[from] io::Error),
     #[error("the board has not answered frame {frame} for {PATIENCE:?}")]
     Silent { frame: u64 },
     #[error("the board has closed its pipe before it answered frame {frame}")]
@@ -46,46 +50,15 @@ pub enum BoardError {
     Heard(#[from] PilotLogError),
 }
 
-/// The pipe to the board as a link that is only written.
-struct Frames(File);
-
-impl Link for Frames {
-    type Error = io::Error;
-
-    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-        Ok(0)
-    }
-
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.0.write_all(bytes)
-    }
-}
-
-/// The pipe from the board as a link that is only read.
-struct Answers(BufReader<File>);
-
-impl Link for Answers {
-    type Error = io::Error;
-
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        self.0.read(into)
-    }
-
-    fn write_all(&mut self, _: &[u8]) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// A board at the other end of two pipes.
 pub(super) struct OnBoard {
-    frames: Frames,
-    answers: Receiver<Result<Option<Answer>, StreamError<io::Error>>>,
+    frames: File,
+    answers: Receiver<io::Result<Answer>>,
     begin: Begin,
     /// The number of the last frame.
     last: Option<u64>,
     /// For the next frame; `None` of a board that has not answered the last one: it has heard nobody yet.
     heard: Option<stream::Heard>,
-    buffer: Vec<u8>,
 }
 
 impl OnBoard {
@@ -100,16 +73,24 @@ impl OnBoard {
             options.open(&path).map_err(|source| BoardError::Pipe { path, source })
         };
         // In the order in which the board opens them.
-        let frames = Frames(opened("frames", OpenOptions::new().write(true))?);
-        let mut from_board = Answers(BufReader::new(opened("answers", OpenOptions::new().read(true))?));
-        let (sender, answers) = sync_channel(1);
+        let frames = opened("frames", OpenOptions::new().write(true))?;
+        let mut from_board = opened("answers", OpenOptions::new().read(true))?;
+        let (sender, answers) = channel();
         let reading = thread::Builder::new().name("board".into()).spawn(move || {
-            let mut buffer = Vec::new();
+            let (mut reader, mut arrived) = (Reader::default(), [0; 4096]);
             loop {
-                let answer = receive(&mut from_board, &mut buffer);
-                let ended = !matches!(answer, Ok(Some(_)));
-                if sender.send(answer).is_err() || ended {
-                    return;
+                match from_board.read(&mut arrived) {
+                    Ok(0) => return,
+                    Ok(read) => reader.push(&arrived[..read]),
+                    Err(error) => {
+                        let _ = sender.send(Err(error));
+                        return;
+                    }
+                }
+                while let Some(answer) = reader.next() {
+                    if sender.send(Ok(answer)).is_err() {
+                        return;
+                    }
                 }
             }
         });
@@ -117,10 +98,11 @@ impl OnBoard {
         let begin = Begin {
             toml: mission_toml.to_owned(),
             controller: controller.to_owned(),
+            flight: on_the_air.boot_number,
             on_the_air: Some(on_the_air),
             ..Begin::default()
         };
-        Ok(Self { frames, answers, begin, last: None, heard: None, buffer: Vec::new() })
+        Ok(Self { frames, answers, begin, last: None, heard: None })
     }
 
     /// Steps the vehicle by one frame with what the board has heard; the board decides it, too.
@@ -154,10 +136,7 @@ impl OnBoard {
     fn decide(&mut self, vehicle: &Vehicle) -> Result<(), BoardError> {
         for record in vehicle.computer_records() {
             match record {
-                Record::ComputerStart(start) => {
-                    self.begin.at_power_up = Some(*start);
-                    send(&mut self.frames, &self.begin, &mut self.buffer)?;
-                }
+                Record::ComputerStart(start) => self.begin.at_power_up = Some(*start),
                 Record::ComputerFrame(frame) => self.compare(&frame)?,
                 _ => {}
             }
@@ -170,19 +149,23 @@ impl OnBoard {
         // The board knows itself what it has heard.
         let input =
             ComputerInput { uplink: None, commander: None, requests: Vec::new(), ..frame.input.clone() };
-        let sent = Frame { from_power_up: Some(input), in_the_air: None };
-        send(&mut self.frames, &sent, &mut self.buffer)?;
-        if self.last.is_some_and(|last| number > last + 1) {
-            send(&mut self.frames, &self.begin, &mut self.buffer)?;
-            send(&mut self.frames, &sent, &mut self.buffer)?;
+        let sent = Frame { from_power_up: Some(input), ..Frame::default() };
+        let (mut once, mut again) = (Vec::new(), Vec::new());
+        put(&sent, &mut once);
+        put(&Frame { begin: Some(self.begin.clone()), ..sent }, &mut again);
+        match self.last {
+            None => self.frames.write_all(&again)?,
+            Some(last) => {
+                self.frames.write_all(&once)?;
+                if number > last + 1 {
+                    self.frames.write_all(&again)?;
+                }
+            }
         }
         self.last = Some(number);
-        let answer = match self.answers.recv_timeout(PATIENCE) {
-            Ok(answer) => answer?.ok_or(BoardError::Gone { frame: number })?,
-            Err(RecvTimeoutError::Timeout) => return Err(BoardError::Silent { frame: number }),
-            Err(RecvTimeoutError::Disconnected) => return Err(BoardError::Gone { frame: number }),
-        };
+        let answer = self.answer_to(number, &again)?;
         let expected = Answer {
+            frame: number,
             from_power_up: Some(frame.output.clone()),
             in_the_air: None,
             state_digest: frame.state_digest,
@@ -193,5 +176,26 @@ impl OnBoard {
         }
         self.heard = answer.heard;
         Ok(())
+    }
+
+    /// Waits for the answer to a frame; older ones were given already.
+    fn answer_to(&mut self, number: u64, again: &[u8]) -> Result<Answer, BoardError> {
+        let mut waited = Duration::ZERO;
+        while waited < PATIENCE {
+            match self.answers.recv_timeout(SENT_AGAIN_AFTER) {
+                Ok(answer) => {
+                    let answer = answer?;
+                    if answer.frame == number {
+                        return Ok(answer);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    waited += SENT_AGAIN_AFTER;
+                    self.frames.write_all(again)?;
+                }
+                Err(RecvTimeoutError::Disconnected) => return Err(BoardError::Gone { frame: number }),
+            }
+        }
+        Err(BoardError::Silent { frame: number })
     }
 }
