@@ -26,15 +26,81 @@ extern crate alloc;
 #[cfg(test)]
 extern crate self as flight;
 
-pub mod vehicle;
+pub mod vehicle {
+    //! Describes the rocket, its motor, the air and a mission as data.
+    //!
+    //! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the limits.
+    //! * [`airframe`] holds masses, shape and actuators.
+    //! * [`thrust_curve`] is the certified motor, and [`burn`] the expected burn of this motor.
+    //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
+    //! * [`dynamics`] has the state and the equations of motion in the plane, [`rigid`] the state in space.
+    //! * [`site`] is the place of the pad on the Earth.
+    //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`] the release from a drone.
 
-pub mod estimation;
+    pub mod airframe;
+    pub mod atmosphere;
+    pub mod burn;
+    pub mod drop;
+    pub mod fins;
+    pub mod launch;
+    pub mod mission;
+    pub mod rigid;
+    pub mod site;
+    pub mod thrust_curve;
 
-pub mod guidance;
+    pub use nmpc::dynamics;
+}
 
-pub mod control;
+pub mod estimation {
+    //! Estimates the rocket's state and the strength of its motor from the sensors.
+    //!
+    //! * [`estimator`] finds state and wind from the sensors.
+    //! * [`motor_estimate`] finds impulse, burn time and ignition of the motor.
 
-pub mod rules;
+    pub mod estimator;
+    pub mod motor_estimate;
+}
+
+pub mod guidance {
+    //! Decides where to steer, when to light the motor, and how to land.
+    //!
+    //! * [`descent`] steers by the fins before ignition.
+    //! * [`vertical`] computes the band of heights from which a landing exists, [`ignition`] when to light the motor.
+    //! * [`powered`] plans and flies the landing burn.
+    //! * [`baseline`]: simpler laws, for comparison.
+
+    pub mod baseline;
+    pub mod descent;
+    pub mod ignition;
+    pub mod powered;
+    pub mod vertical;
+}
+
+pub mod control {
+    //! Turns wanted directions into commands for gimbal and fins.
+    //!
+    //! * [`aim`] points the rocket by its gimbal.
+    //! * [`fins`] finds the four openings for wanted moments and drag.
+
+    pub mod aim;
+    pub mod fins;
+}
+
+pub mod rules {
+    //! The rules for what the vehicle may do.
+    //!
+    //! * [`phase`] has the flight phases and the one table that moves between them.
+    //! * [`arming`] has the checks before arming, [`gate`] the checks before ignition.
+    //! * [`operator`] has the people who may command; [`two_person`] lets two of them arm and start together.
+    //! * [`verdict`] has the touchdown limits, and whether a landing kept them.
+
+    pub mod arming;
+    pub mod gate;
+    pub mod operator;
+    pub mod phase;
+    pub mod two_person;
+    pub mod verdict;
+}
 
 pub mod computer;
 

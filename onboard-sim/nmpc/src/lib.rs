@@ -3,15 +3,14 @@
 //! [`solve`] takes a [`Problem`] and, if there is one, a [`WarmStart`]. It always returns a [`Solution`], whose
 //! [`SolveStatus`] says how the solve ended. [`solve_into`] is the same without allocation.
 //!
-//! * [`problem`]: the problem and its conditions, as data.
+//! * [`problem`]: the problem and its conditions, as data, and a lower bound of the touchdown speed, which shows starts
+//!   that cannot be landed.
 //! * [`dynamics`]: the planar equations of motion, their integrator and their exact derivatives.
 //! * [`rollout`]: states and cost of given inputs.
-//! * `bound`: a lower bound of the touchdown speed, which shows starts that cannot be landed.
-//! * `model`: the problem as the solver reads it. The solver is the crate [`stages`], whose page has the formulation,
-//!   the steps and the references.
 //! * `intervals`: the dynamics of all intervals with exact first and second derivatives, in vector registers.
-//! * `workspace`: the solver's buffers, between a problem and its solution.
-//! * `resample`: converts a solution into a start for a problem with other nodes.
+//! * `workspace`: the problem as the solver reads it, the solver's buffers, and the conversion of a solution into a start
+//!   for a problem with other nodes. The solver is the crate [`stages`], whose page has the formulation, the steps and the
+//!   references.
 //! * [`free_time`]: a search for the best final time, around the solver.
 //! * [`paper`]: the landing paper's vehicle and problem.
 //! * [`space`]: the landing in space, with a lean in any direction and the fins.
@@ -27,19 +26,16 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
-mod bound;
 pub mod dynamics;
 pub mod free_time;
 mod intervals;
-mod model;
 pub mod paper;
 pub mod problem;
-mod resample;
 pub mod rollout;
 pub mod space;
 mod workspace;
 
-pub use bound::best_touchdown_speed_m_s;
+pub use self::problem::best_touchdown_speed_m_s;
 pub use problem::{FinalBox, Problem, SolverLimits};
 pub use workspace::Workspace;
 

@@ -1,12 +1,15 @@
-//! The solver's buffers, between a problem and its solution.
+//! The solver's buffers, between a problem and its solution; the problem as the solver reads it; and the start from a
+//! solution with other nodes.
 
 use alloc::vec::Vec;
+use core::array::from_fn;
+use core::f64::consts::PI;
 use core::iter::repeat;
-
-use stages::{Start, Status};
+use stages::{Condition, InputRange, Model, Settings, Start, Status};
 
 use crate::dynamics::PlanarState;
-use crate::{Problem, Solution, SolveStatus, WarmStart};
+use crate::intervals::Blocks;
+use crate::{Problem, Solution, SolveStatus, WarmStart, rollout};
 
 /// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on them.
 #[derive(Debug, Clone, Default)]
@@ -127,4 +130,241 @@ impl Workspace {
     pub fn sweep(&mut self, problem: &Problem) -> bool {
         self.solver.sweep(problem)
     }
+}
+
+// The landing problem, as the solver reads it.
+
+/// Bends of the cold guesses' pitch, in amplitudes. Those after the first two are only tried if the first two do not
+/// land.
+const BENDS: [f64; 4] = [1.0, -1.0, 3.3, -3.3];
+const NARROW_BENDS: usize = 2;
+
+impl Problem {
+    /// Weights of the deviations from the target at a node.
+    #[inline]
+    fn node_weights(&self) -> [f64; 6] {
+        self.state_weights.map(|weight| weight * self.step_s)
+    }
+}
+
+impl Model<6, 1> for Problem {
+    type Intervals = Blocks;
+    type StateCurvature = [f64; 6];
+    type InputCurvature = [f64; 1];
+
+    #[inline]
+    fn intervals(&self) -> usize {
+        self.thrust_n.len()
+    }
+
+    #[inline]
+    fn initial(&self) -> [f64; 6] {
+        self.initial.to_array()
+    }
+
+    #[inline]
+    fn input_ranges(&self) -> [InputRange; 1] {
+        [InputRange { lower: -self.gimbal_limit_rad, upper: self.gimbal_limit_rad, unit: 1.0 }]
+    }
+
+    fn append_conditions(&self, conditions: &mut Vec<Condition>) {
+        self.append_all_conditions(conditions);
+    }
+
+    #[inline]
+    fn settings(&self) -> Settings {
+        self.solver.settings(NARROW_BENDS, BENDS.len() - NARROW_BENDS)
+    }
+
+    /// States on the straight line from the start to the target, the pitch bent by `amplitude sin(m pi k / N)`. The
+    /// vehicle tilts one way and then the other, which wastes surplus thrust and ends upright. The path need not be
+    /// flyable. Inputs are zero.
+    fn guess(&self, index: usize, states: &mut [[f64; 6]], inputs_rad: &mut [[f64; 1]]) {
+        let count = self.intervals();
+        let amplitude_rad = BENDS[index] * self.solver.guess_amplitude_rad;
+        let half_waves = f64::from(self.solver.guess_half_waves);
+        let from = self.initial.to_array();
+        let to = self.target.to_array();
+        for (k, state) in states.iter_mut().enumerate() {
+            let share = k as f64 / count as f64;
+            *state = from_fn(|i| from[i] + share * (to[i] - from[i]));
+            if k > 0 {
+                state[2] += amplitude_rad * libm::sin(half_waves * PI * share);
+            }
+        }
+        inputs_rad.fill([0.0]);
+    }
+
+    fn evaluate(
+        &self,
+        states: &[[f64; 6]],
+        inputs_rad: &[[f64; 1]],
+        costates: &[[f64; 6]],
+        derivatives: bool,
+        blocks: &mut Blocks,
+    ) {
+        if derivatives {
+            blocks.evaluate::<true>(self, states, inputs_rad, costates);
+        } else {
+            blocks.evaluate::<false>(self, states, inputs_rad, costates);
+        }
+    }
+
+    fn next(&self, k: usize, state: &[f64; 6], [gimbal_rad]: &[f64; 1]) -> [f64; 6] {
+        rollout::stages(self, k, state, *gimbal_rad).1
+    }
+
+    /// Running cost (Eq. 28 of the landing paper).
+    fn cost(&self, states: &[[f64; 6]], inputs_rad: &[[f64; 1]]) -> f64 {
+        let mut squares = [0.0; 6];
+        for state in &states[1..] {
+            let deviation = self.deviation(state);
+            for (sum, value) in squares.iter_mut().zip(&deviation) {
+                *sum += value * value;
+            }
+        }
+        let state_part: f64 = squares.iter().zip(&self.state_weights).map(|(sum, weight)| sum * weight).sum();
+        let input_part: f64 = inputs_rad.iter().map(|[input]| input * input).sum();
+        0.5 * self.step_s * (state_part + self.input_weight * input_part)
+    }
+
+    #[inline]
+    fn state_slope(&self, _: usize, state: &[f64; 6]) -> [f64; 6] {
+        let (weights, deviation) = (self.node_weights(), self.deviation(state));
+        from_fn(|i| weights[i] * deviation[i])
+    }
+
+    #[inline]
+    fn state_curvature(&self, _: usize, _: &[f64; 6]) -> [f64; 6] {
+        self.node_weights()
+    }
+
+    #[inline]
+    fn input_slope(&self, _: usize, [input_rad]: &[f64; 1]) -> [f64; 1] {
+        [self.input_weight * self.step_s * input_rad]
+    }
+
+    #[inline]
+    fn input_curvature(&self, _: usize, _: &[f64; 1]) -> [f64; 1] {
+        [self.input_weight * self.step_s]
+    }
+
+    fn slope_along(&self, states: &[[f64; 6]], changes: &[[f64; 6]]) -> f64 {
+        let mut along = [0.0; 6];
+        for (state, change) in states.iter().zip(changes) {
+            let deviation = self.deviation(state);
+            for i in 0..6 {
+                along[i] += deviation[i] * change[i];
+            }
+        }
+        along
+            .iter()
+            .zip(&self.state_weights)
+            .fold(0.0, |slope, (sum, weight)| slope + self.step_s * weight * sum)
+    }
+}
+
+// Converts a solution into a start for a problem with other nodes: if the horizon ends earlier or later, its intervals
+// are at other times.
+//
+// States and costates are interpolated between nodes, and gimbal angles are averaged over each new interval.
+// Multipliers of input limits and of the floor are proportional to the length of an interval, like the running cost. A
+// limit's multiplier is the smallest of the intervals that a new one covers, because an input that was on the limit
+// for part of the new interval is off it on average. Conditions at the end keep their multipliers, because they count
+// nodes from the end.
+
+/// A node this close to an old node, in intervals, counts as the same node.
+const SAME_NODE: f64 = 1e-6;
+
+impl Solution {
+    /// This solution as a start for a problem that begins `from_s` after its own problem and has `intervals` intervals
+    /// of `step_s`. Beyond the solution's end its last values are held. If nothing was solved or the times are not
+    /// finite, the start is empty, so that it fits no problem.
+    pub fn resampled(&self, from_s: f64, step_s: f64, intervals: usize) -> WarmStart {
+        let mut warm = WarmStart::default();
+        self.resample_into(from_s, step_s, intervals, &mut warm);
+        warm
+    }
+
+    /// [`resampled`](Self::resampled) without allocation, if the warm start was this long before.
+    pub fn resample_into(&self, from_s: f64, step_s: f64, intervals: usize, warm: &mut WarmStart) {
+        warm.clear();
+        let count = self.inputs_rad.len();
+        let ratio = step_s / self.step_s;
+        let from = from_s / self.step_s;
+        if count == 0 || self.states.len() != count + 1 || !(from.is_finite() && ratio > 0.0) {
+            return;
+        }
+        let place = |node: usize| {
+            let place = (from + ratio * node as f64).clamp(0.0, count as f64);
+            let nearest = libm::round(place);
+            if (place - nearest).abs() <= SAME_NODE { nearest } else { place }
+        };
+        for node in 0..=intervals {
+            let at = place(node);
+            warm.states.push(PlanarState::from_array(between(&self.states, at, PlanarState::to_array)));
+            // The costate of the first node has no meaning.
+            if self.costates.len() == count + 1 {
+                warm.costates.push(between(&self.costates, at.max(1.0), |costate| costate));
+            }
+        }
+        for interval in 0..intervals {
+            let (begins, ends) = (place(interval), place(interval + 1));
+            let covered = covered(begins, ends, count);
+            let mut sum = 0.0;
+            let mut least = [f64::INFINITY; 2];
+            for k in covered.clone() {
+                let share = (ends.min((k + 1) as f64) - begins.max(k as f64)).max(0.0);
+                sum += share * self.inputs_rad[k];
+                if let Some(limits) = self.limit_multipliers.get(k) {
+                    least = [least[0].min(limits[0]), least[1].min(limits[1])];
+                }
+            }
+            let alone = self.inputs_rad[covered.start];
+            warm.inputs_rad.push(if covered.len() == 1 { alone } else { sum / (ends - begins) });
+            if self.limit_multipliers.len() == count {
+                warm.limit_multipliers.push(least.map(|multiplier| ratio * multiplier));
+            }
+        }
+        warm.end_multipliers.extend_from_slice(&self.end_multipliers);
+        if !self.floor_multipliers.is_empty() {
+            let floor = |node: usize| {
+                node.checked_sub(1).and_then(|row| self.floor_multipliers.get(row)).copied().unwrap_or(0.0)
+            };
+            warm.floor_multipliers.extend((1..intervals).map(|node| {
+                let at = place(node);
+                let before = at as usize;
+                let along = at - before as f64;
+                ratio * (floor(before) + along * (floor(before + 1) - floor(before)))
+            }));
+        }
+    }
+}
+
+impl WarmStart {
+    /// Clears the start and keeps its capacity.
+    fn clear(&mut self) {
+        let Self { states, costates, limit_multipliers, inputs_rad, end_multipliers, floor_multipliers } =
+            self;
+        states.clear();
+        costates.clear();
+        limit_multipliers.clear();
+        inputs_rad.clear();
+        end_multipliers.clear();
+        floor_multipliers.clear();
+    }
+}
+
+/// The values at a place between nodes.
+fn between<T: Copy>(nodes: &[T], at: f64, values: impl Fn(T) -> [f64; 6]) -> [f64; 6] {
+    let before = (at as usize).min(nodes.len() - 1);
+    let (one, other) = (values(nodes[before]), values(nodes[(before + 1).min(nodes.len() - 1)]));
+    let along = at - before as f64;
+    core::array::from_fn(|i| one[i] + along * (other[i] - one[i]))
+}
+
+/// The intervals, of `count`, that a span between two places covers; at least one.
+fn covered(begins: f64, ends: f64, count: usize) -> core::ops::Range<usize> {
+    let first = (begins as usize).min(count - 1);
+    first..(libm::ceil(ends) as usize).clamp(first + 1, count)
 }

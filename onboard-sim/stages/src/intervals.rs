@@ -1,13 +1,13 @@
 //! The dynamics at a point, as the solver reads them. [`DenseIntervals`](crate::DenseIntervals) has whole matrices;
-//! a model whose matrices have a known structure can have its own.
+//! a model whose matrices have a known structure can have its own. Also what the backward sweep makes of them:
+//! its stages, the value function, and second derivatives of the cost.
+#![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
+use core::array::from_fn;
 use core::fmt::Debug;
-
 use pulp::Simd;
 
-use crate::curvature::Curvature;
-use crate::stage::{Feedback, Stage};
-use crate::value::Value;
+use crate::dense::Factor;
 
 /// All intervals of a horizon, evaluated at a point: where each ends, and its derivatives.
 ///
@@ -77,4 +77,192 @@ pub struct Hessian<const NX: usize, const NU: usize> {
     pub ux: [[f64; NX]; NU],
     /// By the input, twice.
     pub uu: [[f64; NU]; NU],
+}
+
+// One stage of the backward sweep: what it is given, and what it finds.
+
+/// Smallest curvature by an input that counts as positive, relative to the input's own terms.
+const LEAST_CURVATURE: f64 = 1e-11;
+
+/// An interval to be eliminated, apart from its own derivatives: the objective at the node before it and by its inputs.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'a, C, R, const NX: usize, const NU: usize> {
+    /// Difference between the end of the interval and the next node.
+    pub defect: [f64; NX],
+    /// Fraction of the dynamics' curvature that is taken.
+    pub share: f64,
+    /// Second and first derivative of the objective by the state.
+    pub state_terms: (&'a C, &'a [f64; NX]),
+    /// Second and first derivative of the objective by the inputs, apart from what comes through the states.
+    pub input_terms: (&'a R, &'a [f64; NU]),
+}
+
+impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage<'_, C, R, NX, NU> {
+    /// Adds the inputs' own curvature to the one that comes through the states, and factorises the sum if it is positive
+    /// definite.
+    #[inline(always)]
+    pub fn factor(&self, mut by_inputs: [[f64; NU]; NU]) -> Option<Factor<NU>> {
+        let (own, _) = self.input_terms;
+        own.add_to(&mut by_inputs);
+        Factor::of(by_inputs, &from_fn(|i| LEAST_CURVATURE * (1.0 + own.diagonal(i))))
+    }
+}
+
+/// The feedback of the inputs at a stage: `du = -(offset + gain dx)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feedback<const NX: usize, const NU: usize> {
+    pub gain: [[f64; NX]; NU],
+    pub offset: [f64; NU],
+    /// Second derivative by input (rows) and state, reduced by the factor of the one by the inputs.
+    pub reduced: [[f64; NX]; NU],
+    pub factor: Factor<NU>,
+}
+
+impl<const NX: usize, const NU: usize> Feedback<NX, NU> {
+    pub(crate) const ZERO: Self =
+        Self { gain: [[0.0; NX]; NU], offset: [0.0; NU], reduced: [[0.0; NX]; NU], factor: Factor::ZERO };
+}
+
+/// Slope of the value function before an interval, with its inputs eliminated.
+#[inline(always)]
+pub(crate) fn slope_before<const NX: usize, const NU: usize>(
+    slopes: &[f64; NX],
+    pulled: &[f64; NX],
+    reduced: &[[f64; NX]; NU],
+    push: &[[f64; 1]; NU],
+) -> [f64; NX] {
+    let mut slope = from_fn(|i| slopes[i] + pulled[i]);
+    for (row, [push]) in reduced.iter().zip(push) {
+        for (entry, value) in slope.iter_mut().zip(row) {
+            *entry -= value * push;
+        }
+    }
+    slope
+}
+
+// The quadratic part of the value function of the backward sweep.
+
+/// A symmetric matrix over the states, in the order in which a model's [`eliminate`](crate::Interval::eliminate) reads it
+/// fastest. `[[f64; N]; N]` is it row by row.
+pub trait Value<const NX: usize>: Copy + Debug {
+    const ZERO: Self;
+
+    /// Adds a second derivative of the cost.
+    fn add<C: Curvature<NX>>(&mut self, curvature: &C);
+
+    /// Adds the product with a vector to `sum`.
+    fn add_times(&self, vector: &[f64; NX], sum: &mut [f64; NX]);
+}
+
+impl<const NX: usize> Value<NX> for [[f64; NX]; NX] {
+    const ZERO: Self = [[0.0; NX]; NX];
+
+    #[inline(always)]
+    fn add<C: Curvature<NX>>(&mut self, curvature: &C) {
+        curvature.add_to(self);
+    }
+
+    #[inline(always)]
+    fn add_times(&self, vector: &[f64; NX], sum: &mut [f64; NX]) {
+        for (row, value) in self.iter().zip(vector) {
+            for (entry, column) in sum.iter_mut().zip(row) {
+                *entry += column * value;
+            }
+        }
+    }
+}
+
+// Second derivatives of the cost: only the diagonal, or the whole matrix.
+
+/// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a whole symmetric
+/// matrix.
+pub trait Curvature<const N: usize>: Copy + Debug {
+    const ZERO: Self;
+
+    /// An entry of the diagonal.
+    fn diagonal(&self, i: usize) -> f64;
+
+    /// Adds to an entry of the diagonal.
+    fn add_to_diagonal(&mut self, i: usize, value: f64);
+
+    /// Adds all entries to a matrix.
+    fn add_to(&self, sum: &mut [[f64; N]; N]);
+
+    /// The product with a vector.
+    fn times(&self, vector: &[f64; N]) -> [f64; N];
+}
+
+impl<const N: usize> Curvature<N> for [f64; N] {
+    const ZERO: Self = [0.0; N];
+
+    #[inline(always)]
+    fn diagonal(&self, i: usize) -> f64 {
+        self[i]
+    }
+
+    #[inline(always)]
+    fn add_to_diagonal(&mut self, i: usize, value: f64) {
+        self[i] += value;
+    }
+
+    #[inline(always)]
+    fn add_to(&self, sum: &mut [[f64; N]; N]) {
+        for i in 0..N {
+            sum[i][i] += self[i];
+        }
+    }
+
+    #[inline(always)]
+    fn times(&self, vector: &[f64; N]) -> [f64; N] {
+        from_fn(|i| self[i] * vector[i])
+    }
+}
+
+impl<const N: usize> Curvature<N> for [[f64; N]; N] {
+    const ZERO: Self = [[0.0; N]; N];
+
+    #[inline(always)]
+    fn diagonal(&self, i: usize) -> f64 {
+        self[i][i]
+    }
+
+    #[inline(always)]
+    fn add_to_diagonal(&mut self, i: usize, value: f64) {
+        self[i][i] += value;
+    }
+
+    #[inline(always)]
+    fn add_to(&self, sum: &mut [[f64; N]; N]) {
+        for (row, own) in sum.iter_mut().zip(self) {
+            for (entry, value) in row.iter_mut().zip(own) {
+                *entry += value;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn times(&self, vector: &[f64; N]) -> [f64; N] {
+        from_fn(|i| self[i].iter().zip(vector).map(|(entry, value)| entry * value).sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_diagonal_acts_like_the_whole_matrix_with_it() {
+        let (mut diagonal, mut whole) = ([2.0, -3.0], [[2.0, 0.0], [0.0, -3.0]]);
+        diagonal.add_to_diagonal(1, 0.5);
+        whole.add_to_diagonal(1, 0.5);
+        let (mut one, mut other) = ([[1.0; 2]; 2], [[1.0; 2]; 2]);
+        diagonal.add_to(&mut one);
+        whole.add_to(&mut other);
+        let numbers =
+            |sum: [[f64; 2]; 2], product: [f64; 2], entry: f64| vec![sum[0], sum[1], product, [entry; 2]];
+        assert_eq!(
+            numbers(one, diagonal.times(&[1.0, 4.0]), diagonal.diagonal(1)),
+            numbers(other, whole.times(&[1.0, 4.0]), whole.diagonal(1))
+        );
+    }
 }

@@ -27,7 +27,7 @@
 //!
 //! 1. [`Model::evaluate`]: compute `F`, its derivatives `A_k`, `B_k`, and the second derivative of `lambda_{k+1}' F_k`
 //!    in all intervals.
-//! 2. `residual`: stops if the optimality conditions hold; lowers the barrier `mu` if its problem is solved.
+//! 2. `iterate`: stops if the optimality conditions hold; lowers the barrier `mu` if its problem is solved.
 //! 3. `newton`: eliminates slacks and limit multipliers, which leaves diagonal terms at the nodes.
 //! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. In the backward sweep an
 //!    interval eliminates itself ([`Interval::eliminate`]), so that a model can keep the value function in the order of its
@@ -35,9 +35,9 @@
 //!    runs again with half the dynamics' curvature, and then without it.
 //! 5. `newton`: finds the longest fractions of the step that keep slacks and multipliers positive, primal and dual
 //!    separately.
-//! 6. `filter`: halves the step until defects or objective make progress.
+//! 6. `newton`: halves the step until defects or objective make progress.
 //!
-//! `solver` is the loop. A cold solve runs it from the model's guesses (`start`). A warm solve (`warm`) takes over
+//! `solver` is the loop. A cold solve runs it from the model's guesses (`start`). A warm solve takes over
 //! states, inputs and all multipliers, and first checks whether they are still optimal. If not, it treats the active
 //! limits and conditions as equations (`clamped`), which needs no barrier and no line search. A solve that may take only a
 //! few iterations ends with that. If it does not converge, the loop starts at the last barrier, and raises it once if the
@@ -61,42 +61,29 @@
 
 extern crate alloc;
 
-mod allowance;
 mod barrier;
-mod bend;
 mod clamped;
-mod condition;
-mod curvature;
 mod dense;
-mod factor;
-mod filter;
 mod intervals;
 mod iterate;
-mod lagrangian;
-mod layers;
 mod model;
 mod newton;
-mod outcome;
-mod residual;
 mod riccati;
 mod sides;
 mod solver;
-mod stage;
 mod start;
-mod value;
-mod warm;
 
-pub use condition::Condition;
-pub use curvature::Curvature;
+pub use self::dense::Factor;
+pub use self::intervals::Curvature;
+pub use self::intervals::Value;
+pub use self::intervals::{Feedback, Stage};
+pub use self::model::Condition;
+pub use self::start::{Outcome, Status};
 pub use dense::{Dense, DenseIntervals};
-pub use factor::Factor;
 pub use intervals::{Hessian, Interval, Intervals};
 pub use model::{InputRange, Model, Settings};
-pub use outcome::{Outcome, Status};
 pub use solver::Workspace;
-pub use stage::{Feedback, Stage};
 pub use start::Start;
-pub use value::Value;
 
 #[cfg(test)]
 mod tests;

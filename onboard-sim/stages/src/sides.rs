@@ -3,10 +3,10 @@
 use alloc::vec::Vec;
 
 use crate::barrier::{Elastic, LAST_BARRIER, Limits};
-use crate::curvature::Curvature;
+use crate::intervals::Curvature;
 use crate::intervals::Intervals;
+use crate::iterate::{Residual, larger, push_nodes};
 use crate::model::{InputRange, Model};
-use crate::residual::{Residual, larger, push_nodes};
 use crate::solver::Workspace;
 
 /// Second derivative by an input on its limit.

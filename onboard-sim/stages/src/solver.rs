@@ -1,18 +1,14 @@
-//! The main loop of the solver.
+//! The main loop of the solver, and how much it may work.
 
 use alloc::vec::Vec;
 
-use crate::allowance::Allowance;
 use crate::barrier::LAST_BARRIER;
-use crate::condition::Condition;
-use crate::filter::{Filter, Measures};
-use crate::iterate::Iterate;
-use crate::model::Model;
-use crate::newton::{Fractions, Newton};
-use crate::outcome::{Outcome, SolveEnd, Status};
-use crate::residual::Residual;
+use crate::iterate::{Iterate, Residual};
+use crate::model::{Condition, Model};
+use crate::newton::{Filter, Fractions, Measures, Newton};
 use crate::sides::Sides;
-use crate::start::{self, Start};
+use crate::start;
+use crate::start::{Outcome, SolveEnd, Start, Status};
 
 /// When limits and conditions change sides, the barrier is raised at least to this value and by this factor.
 pub(crate) const RAISED_BARRIER: f64 = 1e-2;
@@ -247,5 +243,93 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
     pub(crate) fn residual(&mut self, model: &M) -> Residual {
         Residual::of(model, &self.conditions, &self.current, &mut self.scratch)
+    }
+}
+
+// How much a workspace may still work: a bound on the time of several solves together that no clock decides.
+
+/// Passes that are left. A pass is one interval evaluated with its derivatives, or eliminated by a backward sweep: nearly all
+/// of a solve's time is in these two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Allowance {
+    /// `None` without a bound.
+    left: Option<usize>,
+}
+
+impl Allowance {
+    pub(crate) fn spend(&mut self, passes: usize) {
+        self.left = self.left.map(|left| left.saturating_sub(passes));
+    }
+
+    pub(crate) fn is_spent(&self) -> bool {
+        self.left == Some(0)
+    }
+}
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
+    /// Allows the coming solves so many passes together, or any number; a pass is one interval evaluated with its derivatives, or
+    /// eliminated by a backward sweep. An iteration that has begun is finished. A solve without passes ends
+    /// at its iteration limit: cold with its first guess, warm with the start's inputs.
+    pub fn allow(&mut self, passes: Option<usize>) {
+        self.allowance = Allowance { left: passes };
+    }
+
+    /// Whether nothing is left of what was allowed.
+    pub fn is_spent(&self) -> bool {
+        self.allowance.is_spent()
+    }
+}
+
+// The Lagrangian of a problem at the solution of another problem. By the envelope theorem, its derivative by a
+// parameter of dynamics, cost or conditions equals the derivative of the optimal price.
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
+    /// Cost, plus costates times the defects of the dynamics, minus the conditions times their multipliers, at a
+    /// solution of a problem with as many intervals; NaN if it has another number.
+    pub fn lagrangian(&mut self, model: &M, solution: &Start<NX, NU>) -> f64 {
+        let count = model.intervals();
+        if solution.states.len() != count + 1 || solution.costates.len() != count + 1 {
+            return f64::NAN;
+        }
+        self.resize(model);
+        let point = &mut self.trial;
+        point.states.copy_from_slice(solution.states);
+        point.inputs.copy_from_slice(solution.inputs);
+        point.costates.copy_from_slice(solution.costates);
+        point.evaluate(model, false);
+        let mut sum = point.cost(model);
+        for k in 0..count {
+            for (gap, costate) in point.defect(k).iter().zip(&point.costates[k + 1]) {
+                sum += gap * costate;
+            }
+        }
+        for (condition, multiplier) in self.conditions.iter().zip(solution.condition_multipliers) {
+            sum -= multiplier * condition.value(&point.states);
+        }
+        sum
+    }
+}
+
+// The single layers of an iteration, for benchmarks.
+
+impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
+    /// Starts from a warm start whose length fits, and raises the barrier until the sweeps are well scaled.
+    pub fn load(&mut self, model: &M, warm: &Start<NX, NU>) {
+        self.resize(model);
+        start::warm(model, &self.conditions, warm, LAST_BARRIER, &mut self.current);
+        start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
+    }
+
+    /// Dynamics, first and second derivatives of every interval.
+    pub fn evaluate_intervals(&mut self, model: &M) {
+        self.current.evaluate(model, true);
+    }
+
+    /// One Newton step at the evaluated intervals: backward and forward sweep; whether the inertia was right.
+    pub fn sweep(&mut self, model: &M) -> bool {
+        self.newton.assemble(model, &self.conditions, &self.current, RAISED_BARRIER);
+        let solved = self.newton.sweep.backward(&self.current, 1.0);
+        self.newton.solve(model, &self.conditions, &self.current, RAISED_BARRIER);
+        solved
     }
 }

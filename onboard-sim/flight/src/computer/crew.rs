@@ -1,15 +1,17 @@
-//! What the crew may ask for by radio, and how the flight computer answers.
+//! What the crew may ask for by radio, what the flight computer decides, and how it answers.
 
 use alloc::format;
-use alloc::string::String;
-
-use crate::rules::arming::{self, Check, Uplink};
-use crate::rules::operator::Operator;
-use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal, StartPoint};
-use crate::rules::two_person::Station;
+use alloc::string::{String, ToString as _};
 
 use super::news::Severity;
 use super::table::PhaseTable;
+use super::{Commander, Computer, Input};
+use crate::computer::memory::remembers;
+use crate::rules::arming;
+use crate::rules::arming::{Check, Uplink};
+use crate::rules::operator::Operator;
+use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_SILENT_S, transition};
+use crate::rules::two_person::{self, Act, Ask, CONFIRM_WITHIN_S, Reply, Station, TAP_WITHIN_S, TwoPerson};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
@@ -174,4 +176,288 @@ pub(super) fn refused(
     };
     table.say(Severity::Warning, format!("{} refused: {reason}", event.name()));
     Answer { ending, reason: Some(reason) }
+}
+
+// Decides the crew's requests, and holds the countdown when the commanding station falls silent or a tap is overdue.
+
+/// What the computer remembers of its crew.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CrewMemory {
+    pub two_person: TwoPerson,
+    /// Who has held the last countdown, or whose silence has.
+    pub held_by: Option<Operator>,
+}
+
+remembers!(CrewMemory { two_person, held_by });
+
+/// An ask, and who has confirmed it.
+type Agreed = (Ask, Operator);
+
+impl Computer {
+    /// Decides a request; `None` for an abort in the air, which the pilot handles in this frame.
+    pub(super) fn answer(&mut self, request: &Request) -> Option<Answer> {
+        let mode = *self.table.mode();
+        let time_s = self.table.time_s();
+        let Request { asked, uplink, station, by, .. } = *request;
+        if let Some(reason) = self.why_not_of(request) {
+            return Some(self.deny(asked, reason));
+        }
+        // Whatever else the crew wants, the check is over first.
+        let check_ended = !matches!(asked, Asked::Check | Asked::CheckStill) && self.end_check(asked.name());
+        if check_ended && matches!(asked, Asked::Arm | Asked::Start) {
+            let reason = "a check of the vehicle ran, and has ended now; ask again";
+            return Some(Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) });
+        }
+        match asked {
+            Asked::Tap => return Some(self.tap(by)),
+            Asked::TakeCommand => return Some(self.take_command(request)),
+            Asked::Check | Asked::CheckStill => return Some(self.begin_check(asked, by)),
+            Asked::EndCheck => return Some(Answer::ACCEPTED),
+            _ if is_so_already(&mode, asked) => return Some(Answer::ACCEPTED),
+            _ => {}
+        }
+        if asked == Asked::Abort && !mode.interlocks.abort_latched {
+            let who = match (by, station) {
+                (Some(by), _) => Some(format!("{by}")),
+                (None, Some(station)) if self.people.is_some() => {
+                    Some(format!("station {station}, with the key that all share,"))
+                }
+                _ => None,
+            };
+            if let Some(who) = who {
+                self.table.say(Severity::Warning, format!("{who} aborts"));
+            }
+        }
+        let on_ground = mode.phase.on_pad() || matches!(mode.phase, Phase::Touchdown | Phase::Safed);
+        if asked == Asked::Abort && !on_ground {
+            return None;
+        }
+        let checks = self.arming_checks_by(uplink);
+        let start = self.start_point();
+        let event = event_of(asked, &checks, (self.countdown_s, start), self.abort_event())?;
+        if let (Asked::Hold, true, Some(station)) = (asked, mode.may_hold(start, time_s), station) {
+            let who = by.map_or_else(String::new, |by| format!("{by}, "));
+            self.table.say(Severity::Notice, format!("{who}station {station} asks for a hold"));
+        }
+        // What the phase table would refuse is not worth a second person's confirmation.
+        let refusal = transition(&mode, event, time_s).refusal;
+        let agreed = match refusal.map_or_else(|| self.agree(request), |_| Ok(None)) {
+            Ok(agreed) => agreed,
+            Err(answer) => return Some(answer),
+        };
+        Some(match self.table.happen(event) {
+            Ok(_) => {
+                self.note_done(asked, by, agreed);
+                Answer::ACCEPTED
+            }
+            Err(refusal) => refused(&mut self.table, asked, event, refusal, &checks),
+        })
+    }
+
+    /// Why this sender may ask for nothing of the kind.
+    fn why_not_of(&self, request: &Request) -> Option<String> {
+        let people = self.people?;
+        let Request { asked, station, by, .. } = *request;
+        if station.is_none() {
+            let shared = act_of(asked).is_some() && people != People::One;
+            return shared.then(|| "two people arm and start, not the vehicle by itself".into());
+        }
+        // Whoever holds any key of this crew may stop the launch: the links let nobody else through.
+        if matches!(asked, Asked::Abort | Asked::Hold) {
+            return None;
+        }
+        match by {
+            None => Some("only an operator with a key of their own commands".into()),
+            Some(by) if !by.role.may_command() => Some(format!("{by} only looks on")),
+            Some(_) => None,
+        }
+    }
+
+    /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
+    fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
+        let Request { asked, station, by, confirms, .. } = *request;
+        let (Some(People::Two { first_ask }), Some(act), Some(by), Some(station)) =
+            (self.people, act_of(asked), by, station)
+        else {
+            return Ok(None);
+        };
+        let time_s = self.table.time_s();
+        let waited = self.crew.two_person.waiting(time_s);
+        match self.crew.two_person.request(act, confirms, (by, station), first_ask, time_s) {
+            Reply::Agreed { ask, confirmed_by } => Ok(Some((ask, confirmed_by))),
+            Reply::Asked(ask) => {
+                let reason = ask_in_words(&ask, time_s);
+                if waited != Some(ask) {
+                    self.table.say(Severity::Notice, reason.clone());
+                }
+                Err(Answer { ending: Ending::Asked, reason: Some(reason) })
+            }
+            Reply::Refused(refusal) => Err(self.deny(asked, why_no_agreement(refusal, act, time_s))),
+        }
+    }
+
+    /// Notes what an accepted request means for the crew.
+    fn note_done(&mut self, asked: Asked, by: Option<Operator>, agreed: Option<Agreed>) {
+        let time_s = self.table.time_s();
+        let commander = self.commander.and_then(|commander| commander.by);
+        let commands = |by: Operator| commander.is_some_and(|commander| commander.number == by.number);
+        let two_person = &mut self.crew.two_person;
+        match (asked, agreed) {
+            (Asked::Arm, Some((ask, _))) => two_person.armed(ask),
+            // Whose station commands is watched by its silence already: the other one of the two taps.
+            (Asked::Start, Some((ask, confirmed_by))) if commands(confirmed_by) => {
+                two_person.begin_taps(ask.by, time_s);
+            }
+            (Asked::Start, Some((_, confirmed_by))) => two_person.begin_taps(confirmed_by, time_s),
+            (Asked::Disarm | Asked::Hold | Asked::Abort, _) => {
+                two_person.withdraw();
+                two_person.end_taps();
+            }
+            _ => {}
+        }
+        if asked == Asked::Hold {
+            self.crew.held_by = by;
+        }
+        if let Some((ask, confirmed_by)) = agreed {
+            let words = format!("{}: asked by {}, confirmed by {confirmed_by}", ask.act.name(), ask.by);
+            self.table.say(Severity::Notice, words);
+        }
+    }
+
+    pub(super) fn deny(&mut self, asked: Asked, reason: String) -> Answer {
+        self.table.say(Severity::Warning, format!("{} refused: {reason}", asked.name()));
+        Answer { ending: Ending::Denied, reason: Some(reason) }
+    }
+
+    fn tap(&mut self, by: Option<Operator>) -> Answer {
+        let time_s = self.table.time_s();
+        if by.is_some_and(|by| self.crew.two_person.tap(by, time_s)) {
+            return Answer::ACCEPTED;
+        }
+        let reason = match self.crew.two_person.tapping() {
+            Some(tapping) => format!("{} taps", tapping.by),
+            None => "no countdown that two people have started".into(),
+        };
+        self.deny(Asked::Tap, reason)
+    }
+
+    /// A station takes the command from one that is silent.
+    fn take_command(&mut self, request: &Request) -> Answer {
+        let Some(station) = request.station else {
+            return self.deny(Asked::TakeCommand, "no station".into());
+        };
+        let armed = self.table.mode().interlocks.armed;
+        let Some(Commander { station: before, age_s, by: before_by }) = self.commander.filter(|_| armed)
+        else {
+            return self.deny(Asked::TakeCommand, "no station has armed the vehicle".into());
+        };
+        if before == station {
+            return Answer::ACCEPTED;
+        }
+        let named = |station: Station, by: Option<Operator>| {
+            by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
+        };
+        let (old, new) = (named(before, before_by), named(station, request.by));
+        if age_s <= UPLINK_SILENT_S {
+            return self.deny(Asked::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
+        }
+        // Nobody commands and taps: that takes two.
+        if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping(), request.by)
+            && tapping.by.number == by.number
+        {
+            return self.deny(Asked::TakeCommand, format!("{by} taps: hold the countdown first"));
+        }
+        // A role hands over to its like; range safety may always take over.
+        if let (Some(before_by), Some(by)) = (before_by, request.by)
+            && by.role != before_by.role
+            && by.role != crate::rules::operator::Role::RangeSafety
+        {
+            let wanted = before_by.role.name();
+            return self
+                .deny(Asked::TakeCommand, format!("only {wanted} or RANGE SAFETY takes over from {old}"));
+        }
+        let silence = if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "not heard".into() };
+        self.table.say(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
+        Answer::ACCEPTED
+    }
+
+    /// The answer to an abort that the pilot has handled.
+    pub(super) fn abort_answer(&self) -> Answer {
+        if self.table.mode().interlocks.abort_latched {
+            return Answer::ACCEPTED;
+        }
+        Answer { ending: Ending::Failed, reason: Some("the flight ended before it".into()) }
+    }
+
+    /// Holds the countdown if the station that armed the vehicle has fallen silent.
+    pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
+        let Some(Commander { station, age_s, by }) = input.commander else { return };
+        if age_s > UPLINK_SILENT_S
+            && self.hold(HoldCause::UplinkSilent, || {
+                format!("nothing heard of {station} for {UPLINK_SILENT_S} s")
+            })
+        {
+            self.crew.held_by = by;
+        }
+    }
+
+    /// Holds a running countdown, and says why; not in its last moment, when nothing holds any more.
+    fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
+        let start = self.start_point();
+        if !self.table.mode().may_hold(start, self.table.time_s()) {
+            return false;
+        }
+        self.table.say(Severity::Critical, why());
+        self.table.happen(Event::Hold { cause, start }).is_ok()
+    }
+
+    /// Holds the countdown if the tap of whoever confirmed the start is overdue. After the release taps mean nothing.
+    pub(super) fn watch_the_taps(&mut self) {
+        if self.table.mode().countdown_end_s.is_none() {
+            self.crew.two_person.end_taps();
+            return;
+        }
+        let Some(by) = self.crew.two_person.lapsed(self.table.time_s()) else { return };
+        if self.hold(HoldCause::TapOverdue, || format!("no tap of {by} for {TAP_WITHIN_S} s")) {
+            self.crew.held_by = Some(by);
+            self.crew.two_person.end_taps();
+        }
+    }
+}
+
+/// What takes two people.
+fn act_of(asked: Asked) -> Option<Act> {
+    match asked {
+        Asked::Arm => Some(Act::Arm),
+        Asked::Start => Some(Act::Start),
+        Asked::Disarm
+        | Asked::Hold
+        | Asked::Abort
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck => None,
+    }
+}
+
+fn ask_in_words(ask: &Ask, time_s: f64) -> String {
+    let mut others = ask.by.role.others();
+    let [one, other] = [others.next(), others.next()].map(|role| role.map_or("", |role| role.name()));
+    let left_s = ask.left_s(time_s).clamp(0.0, CONFIRM_WITHIN_S);
+    format!("{} asks to {}: {one} or {other} must confirm within {left_s:.0} s", ask.by, ask.act.name())
+}
+
+fn why_no_agreement(refusal: two_person::Refusal, act: Act, time_s: f64) -> String {
+    match refusal {
+        two_person::Refusal::Observer => "observers command nothing".to_string(),
+        two_person::Refusal::AnotherAsks(ask) => ask_in_words(&ask, time_s),
+        two_person::Refusal::NothingToConfirm => {
+            format!("nobody asks to {}, or not by that number any more", act.name())
+        }
+        two_person::Refusal::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
+        two_person::Refusal::SameRole(ask) => {
+            format!("{} asked: another role than {} must confirm", ask.by, ask.by.role.name())
+        }
+    }
 }

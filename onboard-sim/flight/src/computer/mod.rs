@@ -4,58 +4,45 @@
 //! give the same outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing
 //! are all decided here, through one [phase table](crate::rules::phase).
 //!
-//! * [`table`]: the phase table as the computer uses it: each event goes through it once.
-//! * [`crew`], `requests`: the crew's requests, and the decision about each.
-//! * [`news`], `motor_watch`: the computer's messages to the crew.
-//! * [`pad_check`], `checking`: the check that the crew asks for on the pad.
-//! * [`pad`], `self_test`, `readiness`, `on_the_pad`: from power-up to the release.
+//! * [`table`]: the phase table as the computer uses it: each event goes through it once; what an abort would do now.
+//! * [`crew`]: the crew's requests, and the decision about each.
+//! * [`news`]: the computer's messages to the crew.
+//! * [`pad_check`]: the check that the crew asks for on the pad.
+//! * [`pad`]: from power-up to the release.
 //! * [`pilot`]: flies the rocket from its release.
-//! * `start`: power-up, and starting from a recorded moment.
-//! * [`saved`]: what is kept through a reset, and going on from it.
-//! * `abort_effect`: what an abort would do now.
-//! * `memory`, `digest`: one number for the whole memory, to compare a replay with a log.
+//! * [`saved`]: power-up; what is kept through a reset, and going on from it.
+//! * `memory`: one number for the whole memory, to compare a replay with a log.
 
-mod abort_effect;
-mod checking;
 pub mod crew;
-mod digest;
-mod input;
 pub(crate) mod memory;
-mod motor_watch;
 pub mod news;
-mod on_the_pad;
-mod output;
 pub mod pad;
 pub mod pad_check;
 pub mod pilot;
-mod readiness;
-mod requests;
 pub mod saved;
-mod self_test;
-mod start;
 pub mod table;
 
 use alloc::boxed::Box;
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-pub use self::abort_effect::AbortEffect;
-use self::crew::{Answer, People};
-pub use self::input::{Commander, Input, LogState, Rehearsed};
-use self::motor_watch::MotorWatch;
-use self::news::{Readiness, Severity};
-pub use self::output::{Commands, Output};
-use self::pad::PadWatch;
+pub use self::crew::CrewMemory;
+use self::crew::{Answer, Asked, People, Request};
+use self::memory::remembers;
+use self::news::{MotorWatch, News, Readiness, Severity};
+use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
-pub use self::requests::CrewMemory;
-use self::self_test::{ANSWERING_RAD, SelfTest};
+use self::pilot::{BoosterCommands, Pilot, PilotInput, PilotOutput, Sensed};
+pub use self::table::AbortEffect;
 use self::table::PhaseTable;
-use crate::computer::pilot::{Pilot, PilotInput, PilotOutput};
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
-use crate::rules::arming::Uplink;
+use crate::rules::arming::{PredictedLanding, Uplink};
+use crate::rules::operator::Operator;
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
+use crate::rules::two_person::Station;
 use crate::vehicle::mission::ArmingLimits;
 use crate::vehicle::rigid::RigidState;
 
@@ -72,6 +59,8 @@ struct Release {
     frame: u64,
     time_s: f64,
 }
+
+remembers!(Release { frame, time_s });
 
 /// The flight computer and everything that it remembers.
 #[derive(Debug, Clone)]
@@ -308,4 +297,138 @@ impl Computer {
 pub fn flight_time_s(frame: u64) -> f64 {
     // Saturating, because a recorded frame may have any number.
     frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3
+}
+
+// The input of one frame of the flight computer: everything it depends on besides its memory.
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogState {
+    /// The log is being written, or the operator chose to fly without one.
+    pub running: bool,
+    /// Free space for it, bytes.
+    pub space_bytes: u64,
+}
+
+remembers!(LogState { running } but { space_bytes });
+
+impl LogState {
+    /// No log yet.
+    pub const NONE: Self = Self { running: false, space_bytes: 0 };
+}
+
+/// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rehearsed {
+    /// It found plans, and landed within the limits of the legs.
+    pub warm: bool,
+    /// The result in words.
+    pub found: String,
+    /// Its touchdown; `None` if it did not come down.
+    pub landing: Option<PredictedLanding>,
+}
+
+/// The station that armed the vehicle, and how long ago it was last heard, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Commander {
+    pub station: Station,
+    pub age_s: f64,
+    /// Whose key it armed with.
+    pub by: Option<Operator>,
+}
+
+/// Everything that a frame depends on besides the computer's memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Input<'a> {
+    /// Number of the frame since power-up.
+    pub frame: u64,
+    /// Vehicle time at its end, s.
+    pub time_s: f64,
+    pub sensed: Sensed,
+    /// Where the gimbal is (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Where the fins are, rad.
+    pub fins_rad: [f64; 4],
+    /// A foot touches the ground.
+    pub contact: bool,
+    pub igniter_continuity: bool,
+    /// The wire between booster and vehicle is whole.
+    pub booster_attached: bool,
+    pub pin_out: bool,
+    /// Voltage of the battery, V; `None` if it is not measured.
+    pub battery_v: Option<f64>,
+    pub log: LogState,
+    /// The uplink of the station that is heard best.
+    pub uplink: Uplink,
+    /// The station that armed the vehicle, if one did.
+    pub commander: Option<Commander>,
+    /// How many people an arming and a start take; `None` without operators.
+    pub people: Option<People>,
+    /// Requests since the last frame, in order.
+    pub requests: &'a [Request],
+    /// Result of the rehearsal, once it is over.
+    pub rehearsed: Option<&'a Rehearsed>,
+}
+
+impl Input<'_> {
+    /// A frame in the air of a computer that was [released at once](Computer::released), made from its record in a
+    /// pilot's log: no station is connected, and a recorded abort becomes a request.
+    pub fn in_the_air(input: &PilotInput) -> Self {
+        const ABORT: [Request; 1] = [Request {
+            asked: Asked::Abort,
+            uplink: Uplink::NotNeeded,
+            station: None,
+            by: None,
+            confirms: None,
+        }];
+        Self {
+            frame: input.frame,
+            time_s: input.time_s,
+            sensed: input.sensed,
+            gimbal_rad: [0.0; 2],
+            fins_rad: input.fins_rad,
+            contact: input.contact,
+            igniter_continuity: input.igniter_continuity,
+            booster_attached: input.booster_attached,
+            pin_out: true,
+            battery_v: None,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            people: None,
+            requests: if input.abort { &ABORT } else { &[] },
+            rehearsed: None,
+        }
+    }
+}
+
+// The output of one frame of the flight computer.
+
+/// Commands to the actuators.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Commands {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Opening angles of the fins, rad.
+    pub fins_rad: [f64; 4],
+    /// Current through the landing motor's igniter.
+    pub ignite: bool,
+    /// The parachute is ejected.
+    pub parachute: bool,
+    pub booster: BoosterCommands,
+}
+
+remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute, booster });
+
+/// The output of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    pub commands: Commands,
+    /// The countdown has ended in this frame: the simulation releases the vehicle where its flight begins.
+    pub released: bool,
+    /// An answer to each request, in order.
+    pub answers: Vec<Answer>,
+    /// Reports, in order.
+    pub news: Vec<News>,
+    /// A plan was made.
+    pub planned: bool,
 }

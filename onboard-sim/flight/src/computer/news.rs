@@ -4,9 +4,11 @@ use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 
-use crate::computer::memory::{Memory, Remembers};
+use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::rules::arming::{Check, UPLINK_CHECK};
-use crate::rules::phase::{Effect, HOLD_LIMIT_S, Interlocks, Phase};
+use crate::rules::phase::{
+    Effect, HOLD_LIMIT_S, Interlocks, MISFIRE_WAIT_S, MOTOR_HOT_S, Mode, MotorStatus, Phase,
+};
 
 /// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -93,5 +95,120 @@ impl Readiness {
         let complaint = failing.map(|check| check.name);
         let changed = complaint != core::mem::replace(&mut self.0, complaint);
         failing.filter(|_| changed).and_then(Check::refusal).map(|reason| format!("not ready: {reason}"))
+    }
+}
+
+// Tells the crew each change of the landing motor's state: the safety of anyone who approaches the vehicle depends on
+// it.
+
+/// The state that the crew was last told of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Told {
+    status: MotorStatus,
+    /// On the ground after the flight.
+    landed: bool,
+    /// The vehicle may be approached without waiting.
+    free: bool,
+}
+
+remembers!(Told { status, landed, free });
+
+/// Watches the landing motor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MotorWatch(Told);
+
+impl Remembers for MotorWatch {
+    fn remember(&self, memory: &mut Memory) {
+        self.0.remember(memory);
+    }
+}
+
+impl Default for MotorWatch {
+    /// A vehicle with its pin in, as it is powered up.
+    fn default() -> Self {
+        Self(Told { status: MotorStatus::PinIn, landed: false, free: true })
+    }
+}
+
+impl MotorWatch {
+    /// A message if the state has changed.
+    pub(super) fn news(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
+        use MotorStatus as M;
+        let now = Told {
+            status: mode.motor_status(time_s),
+            landed: matches!(mode.phase, Phase::Touchdown | Phase::Safed),
+            free: mode.approach_wait_s(time_s) == Some(0.0),
+        };
+        let before = core::mem::replace(&mut self.0, now);
+        if now == before {
+            return None;
+        }
+        let (severity, words) = match now {
+            Told { status: M::Live, landed: true, free: false } => {
+                let words = format!("LIVE MOTOR: do not approach for {MISFIRE_WAIT_S} s, then pin first");
+                return Some((Severity::Critical, words));
+            }
+            Told { status: M::Live, landed: true, free: true } => {
+                (Severity::Critical, "LIVE MOTOR: the wait is over; put the pin in before anything else")
+            }
+            // All other states are told once, when the status changes.
+            _ if now.status == before.status => return None,
+            Told { status: M::Hot, .. } => {
+                return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
+            }
+            Told { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
+                (Severity::Info, "pin out: landing motor live")
+            }
+            Told { status: M::Live, landed: false, .. } => {
+                (Severity::Critical, "landing motor live: no light")
+            }
+            Told { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
+            Told { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
+            // The crew was told when the motor was commanded to light.
+            Told { status: M::Burning, .. } => return None,
+        };
+        Some((severity, words.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rules::phase::{Interlocks, Motor};
+
+    fn mode(phase: Phase, motor: Motor, pin_out: bool) -> Mode {
+        let interlocks = Interlocks { pin_out, ..Interlocks::default() };
+        Mode { phase, interlocks, motor, ..Mode::power_up(0.0) }
+    }
+
+    #[test]
+    fn the_crew_is_told_how_long_to_wait_at_a_live_motor_and_when_the_wait_is_over() {
+        let mut watch = MotorWatch::default();
+        let live = mode(Phase::Touchdown, Motor::Unlit, true);
+        let (severity, words) = watch.news(&live, 1.0).unwrap();
+        assert_eq!((severity, words.contains("do not approach for 60 s")), (Severity::Critical, true));
+        assert_eq!(watch.news(&live, 59.9), None, "once");
+        let (severity, words) = watch.news(&live, 60.0).unwrap();
+        assert_eq!((severity, words.contains("put the pin in")), (Severity::Critical, true));
+        let pinned = mode(Phase::Touchdown, Motor::Unlit, false);
+        assert!(watch.news(&pinned, 61.0).unwrap().1.starts_with("pin in"));
+        assert_eq!(watch.news(&mode(Phase::Safed, Motor::Unlit, false), 61.1), None);
+    }
+
+    #[test]
+    fn each_change_of_the_motor_in_a_flight_is_told_once() {
+        let mut watch = MotorWatch::default();
+        let mut told = |phase, motor, time_s| {
+            watch.news(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)
+        };
+        assert_eq!(told(Phase::PadIdle, Motor::Unlit, 1.0), "pin out: landing motor live");
+        assert_eq!(told(Phase::PadArmed, Motor::Unlit, 2.0), "");
+        assert_eq!(told(Phase::LandArmed, Motor::Unlit, 3.0), "");
+        assert_eq!(told(Phase::Powered, Motor::Burning, 4.0), "");
+        let burnt_out = Motor::BurntOut { at_s: 9.0 };
+        assert_eq!(told(Phase::Powered, burnt_out, 9.0), "burn-out: motor hot for 60 s");
+        assert_eq!(told(Phase::Touchdown, burnt_out, 10.0), "");
+        assert_eq!(told(Phase::Touchdown, burnt_out, 69.0), "landing motor burnt out and cooled");
+        assert_eq!(told(Phase::Safed, burnt_out, 69.1), "");
     }
 }

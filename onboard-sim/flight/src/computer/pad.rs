@@ -1,12 +1,19 @@
 //! Finds from the sensors whether the vehicle stands still on its pad, or how it hangs below its drone, and in which
-//! attitude.
+//! attitude; the self-test, the arming checks, and all that happens from power-up to the release.
 
+use alloc::format;
+use alloc::vec::Vec;
 use nalgebra::Vector3;
 
-use crate::computer::memory::remembers;
+use super::news::Severity;
+use super::{Computer, Input, Release};
+use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::computer::pilot::Sensed;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
 use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
+use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
+use crate::rules::phase::{Event, Phase, StartPoint};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::{RigidState, upright};
 
 /// The stance is evaluated every so many frames: once a second.
@@ -183,5 +190,241 @@ pub(super) fn as_measured(sensed: &Sensed) -> Measurements {
             valid_at_s: estimate.time_s,
         }),
         lidar_range_m: None,
+    }
+}
+
+// The self-test at power-up: every actuator is moved and brought back.
+
+/// Fins and gimbal are moved by this much, rad.
+const MOVED_RAD: f64 = 0.05;
+/// An actuator farther than this from its command counts as not answering, rad.
+pub(super) const ANSWERING_RAD: f64 = 0.02;
+/// The self-test has failed if it has not passed this long after power-up, s.
+const LIMIT_S: f64 = 3.0;
+
+/// Progress of the self-test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SelfTest {
+    NotBegun,
+    Moved,
+    BroughtBack,
+    Failed,
+}
+
+impl Remembers for SelfTest {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+/// The next action of the self-test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum TestStep {
+    /// Command every actuator to this angle from its rest, rad.
+    Command(f64),
+    /// It has passed.
+    Passed,
+    /// It has failed just now.
+    Failed,
+    /// Nothing yet.
+    Wait,
+}
+
+impl SelfTest {
+    /// Called until the test has passed, with the time since power-up. `answering`: every actuator has reached its commanded angle.
+    pub(super) fn step(&mut self, answering: bool, since_s: f64) -> TestStep {
+        match self {
+            Self::NotBegun => {
+                *self = Self::Moved;
+                TestStep::Command(MOVED_RAD)
+            }
+            Self::Moved if answering => {
+                *self = Self::BroughtBack;
+                TestStep::Command(0.0)
+            }
+            Self::BroughtBack if answering => TestStep::Passed,
+            Self::Moved | Self::BroughtBack if since_s > LIMIT_S => {
+                *self = Self::Failed;
+                TestStep::Failed
+            }
+            Self::Moved | Self::BroughtBack | Self::Failed => TestStep::Wait,
+        }
+    }
+}
+
+// Whether the vehicle may be armed, from its checks of itself on the pad.
+
+impl Computer {
+    /// Attitude and motion on the pad.
+    pub fn stance(&self) -> Stance {
+        self.pad.stance(self.start_point() == StartPoint::Drone)
+    }
+
+    /// The estimated state on the pad, at rest at the origin.
+    pub fn believed_on_the_pad(&self) -> RigidState {
+        self.pad.believed()
+    }
+
+    /// The arming checks with the present values; the uplink is that of the station heard best.
+    pub fn arming_checks(&self) -> Vec<Check> {
+        self.arming_checks_by(self.uplink)
+    }
+
+    pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Vec<Check> {
+        let locks = &self.table.mode().interlocks;
+        let stance = self.stance();
+        let (controller_warm, controller_found, predicted_landing) = match &self.rehearsed {
+            Some(rehearsed) => (rehearsed.warm, rehearsed.found.clone(), rehearsed.landing.clone()),
+            None => (false, "no rehearsal yet".into(), None),
+        };
+        let input = ArmingInput {
+            pin_out: locks.pin_out,
+            abort_latched: locks.abort_latched,
+            tilt_rad: stance.tilt_rad,
+            rotation_rad_s: stance.rotation_rad_s,
+            speed_m_s: stance.speed_m_s,
+            self_test_passed: self.table.mode().phase != Phase::Safe,
+            is_checking: self.pad_check.is_busy(self.frame),
+            estimator_converged: stance.settled,
+            hanging_m: stance.hanging_m,
+            fins_answering: self.fins_answering,
+            igniter_continuity: self.igniter_continuity,
+            log_running: self.log.running,
+            log_space_bytes: self.log.space_bytes,
+            battery_v: self.battery_v,
+            controller_warm,
+            controller_found,
+            predicted_landing,
+            uplink,
+        };
+        arming_checks(&self.arming, &input)
+    }
+
+    pub(super) fn complain_of_readiness(&mut self) {
+        if self.table.mode().phase == Phase::PadIdle
+            && let Some(words) = self.readiness.news(&self.arming_checks())
+        {
+            self.table.say(Severity::Warning, words);
+        }
+    }
+}
+
+// From power-up to the release: self-test, readiness, countdown.
+
+impl Computer {
+    /// One frame on the pad.
+    pub(super) fn wait_on_the_pad(&mut self, input: &Input<'_>) {
+        if self.table.mode().phase == Phase::Safe {
+            self.test_itself(input);
+        }
+        if self.rehearsed.is_some() {
+            self.complain_of_readiness();
+        }
+        match self.start_point() {
+            // A drone's pilot lets go, and the fall is felt.
+            StartPoint::Drone => self.wait_below_the_drone(),
+            _ if self.countdown_is_over() => self.let_go(),
+            StartPoint::Pad => self.wait_on_the_rail(input),
+            StartPoint::Apogee => {}
+        }
+        self.check_itself(input);
+    }
+
+    /// A motor may light that nobody lit.
+    fn wait_on_the_rail(&mut self, input: &Input<'_>) {
+        if self.pilot.feels_lift_off(&input.sensed) {
+            self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
+            if self.table.happen(Event::LiftOff).is_ok() {
+                self.begin_flight();
+            }
+        }
+    }
+
+    fn wait_below_the_drone(&mut self) {
+        if !self.pad.falls() {
+            return;
+        }
+        let released = if self.countdown_is_over() {
+            self.table.happen(Event::ReleasedAt(StartPoint::Drone))
+        } else {
+            self.table.say(Severity::Critical, "RELEASED before it was cleared".into());
+            let parachute_fills = self.parachute_fills_below_the_drone();
+            self.table.happen(Event::ReleasedEarly { parachute_fills })
+        };
+        if released.is_ok() {
+            self.begin_flight();
+        }
+    }
+
+    pub(super) fn start_point(&self) -> StartPoint {
+        self.pilot.mission().start.at
+    }
+
+    /// Moves every actuator and brings it back. The test is not passed before the sensors were felt for a second.
+    fn test_itself(&mut self, input: &Input<'_>) {
+        let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
+        let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
+            && self.fins_answering == [true; 4];
+        // A computer that restarts begins its test late on the vehicle's clock.
+        let since_s = input.time_s - self.table.mode().entered_at_s;
+        match self.self_test.step(answering, since_s) {
+            TestStep::Command(angle_rad) => {
+                let closed_rad = self.closed_rad();
+                self.commands.gimbal_rad = [angle_rad; 2];
+                self.commands.fins_rad = [closed_rad + angle_rad; 4];
+            }
+            TestStep::Passed if self.pad.has_felt() => {
+                let _ = self.table.happen(Event::SelfTestPassed);
+            }
+            TestStep::Failed => {
+                let fins = self.fins_answering.iter().filter(|answers| **answers).count();
+                let words = format!("self-test failed: an actuator does not answer ({fins} of 4 fins do)");
+                self.table.say(Severity::Error, words);
+            }
+            TestStep::Passed | TestStep::Wait => {}
+        }
+    }
+
+    pub(super) fn closed_rad(&self) -> f64 {
+        self.pilot.mission().airframe.fins.closed_rad()
+    }
+
+    pub(super) fn countdown_is_over(&self) -> bool {
+        self.table.mode().countdown_remaining_s(self.table.time_s()).is_some_and(|left_s| left_s <= 0.0)
+    }
+
+    /// The countdown has ended: the flight begins where the simulation releases the vehicle.
+    pub(super) fn let_go(&mut self) {
+        let event = match self.start_point() {
+            StartPoint::Pad => Event::CountdownElapsed,
+            at => Event::ReleasedAt(at),
+        };
+        if self.table.happen(event).is_ok() {
+            self.begin_flight();
+        }
+    }
+
+    /// A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
+    fn begin_flight(&mut self) {
+        self.release = Some(Release { frame: self.frame, time_s: self.table.time_s() });
+        let mission = self.pilot.mission();
+        if let (Some(launch), Some(start)) = (&mission.launch, self.pad.at_rest())
+            && mission.start.at == StartPoint::Pad
+        {
+            let believed = RigidState {
+                world_from_body: start.world_from_body,
+                ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
+            };
+            self.pilot.stand(&believed, start.gyro_bias_rad_s);
+        }
+    }
+
+    /// Whether the parachute fills before a vehicle that falls from its drone meets the ground.
+    fn parachute_fills_below_the_drone(&self) -> bool {
+        let parachute = &self.pilot.mission().airframe.parachute;
+        // From rest it falls faster and faster: the speed when the lines are taut.
+        let delay_s = parachute.ejection_delay_s;
+        let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
+        self.pad.stance(true).hanging_m.is_some_and(|height_m| height_m > fall_m)
     }
 }

@@ -7,6 +7,7 @@
 
 use serde::Deserialize;
 
+use crate::computer::memory::remembers;
 use crate::guidance::vertical::{Band, Column};
 use crate::vehicle::burn::Burn;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -46,6 +47,8 @@ pub struct IgnitionOutlook {
     /// Time until the command should go out, s; negative when late.
     pub command_in_s: Option<f64>,
 }
+
+remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
 
 /// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
 /// 0.8 of its terminal speed. Halved or doubled: no flight changes.

@@ -10,7 +10,7 @@ use alloc::format;
 use alloc::vec;
 use alloc::vec::Vec;
 
-pub use crate::rules::check::{Check, all_passed, first_refusal};
+pub use crate::rules::arming::{Check, all_passed, first_refusal};
 use crate::vehicle::mission::GateLimits;
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,6 @@
 //! The people who may command: their names and their roles. Which key belongs to whom is not known here.
 
+use crate::computer::memory::{Memory, Remembers};
 use core::fmt;
 
 /// What an operator is there for.
@@ -84,6 +85,13 @@ pub struct Operator {
     pub number: u8,
     pub role: Role,
     pub name: Name,
+}
+
+impl Remembers for Operator {
+    fn remember(&self, memory: &mut Memory) {
+        [self.number, self.role as u8].remember(memory);
+        self.name.bytes().remember(memory);
+    }
 }
 
 impl fmt::Display for Operator {

@@ -1,33 +1,25 @@
 //! The planar dynamics in every interval, with exact first and second derivatives: several intervals at once in vector
 //! registers (`lanes`).
 //!
-//! * `block`: inputs and results of an evaluation.
-//! * `step`: the RK4 step and its adjoint; `tangent`: its tangent and curvature.
-//! * `line`: one interval's derivatives, out of the lanes; `rows`: as the sweeps of the solver need them, with `four` for
-//!   vectors and `split` for the value function.
+//! * `step`: the RK4 step, its adjoint, its tangent and its curvature.
+//! * `rows`: one interval's derivatives, out of the lanes, as the sweeps of the solver need them, and the value function.
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
-mod block;
-mod four;
 mod lanes;
-mod line;
 mod rows;
-mod split;
 mod step;
-mod tangent;
+#[cfg(test)]
+mod tests;
 
 use alloc::vec::Vec;
 use core::array::from_fn;
-
 use pulp::{Arch, NullaryFnOnce};
 
+use self::lanes::{LANES, Lanes};
+use self::rows::{Line, Rows, Split};
+use self::step::evaluate;
 use crate::Problem;
-use block::{Block, Constants, D, Points};
-use lanes::LANES;
-use line::Line;
-use rows::Rows;
-use split::Split;
-use step::evaluate;
+use crate::dynamics::{ModelKind, PlanarModel};
 
 /// The intervals of a horizon.
 #[derive(Debug, Clone, Default)]
@@ -77,7 +69,7 @@ impl Blocks {
                 (false, false) => Kernel::<DERIVATIVES, false, false> { constants, points, block }.run(arch),
             }
             if DERIVATIVES {
-                line::write(block, lines);
+                rows::write(block, lines);
             }
         }
     }
@@ -140,5 +132,176 @@ impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>
     }
 }
 
-#[cfg(test)]
-mod tests;
+// The inputs and results of the evaluation of intervals, for several nodes at once.
+
+/// Directions of differentiation: theta, u, w, q, delta.
+const DIRECTIONS: usize = 5;
+const TH: usize = 0;
+const U: usize = 1;
+const W: usize = 2;
+const Q: usize = 3;
+const D: usize = 4;
+
+/// Number of entries of a symmetric matrix over the directions.
+const PAIRS: usize = 15;
+
+/// Position of each pair of directions in a packed upper triangle, row by row.
+const fn pair(row: usize, column: usize) -> usize {
+    row * (9 - row) / 2 + column
+}
+
+/// Sign of `w sin(theta)` in the horizontal velocity, by which the printed equations differ.
+const fn lateral_sign(printed: bool) -> f64 {
+    if printed { -1.0 } else { 1.0 }
+}
+
+/// The constants of an interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Constants {
+    step_s: f64,
+    mass_kg: f64,
+    arm_per_inertia: f64,
+    /// These three at the model's own mass.
+    drag_per_m: f64,
+    lateral_drag_per_m: f64,
+    crossflow_per_m: f64,
+    gravity_m_s2: f64,
+    printed: bool,
+}
+
+impl Constants {
+    fn of(model: &PlanarModel, step_s: f64) -> Self {
+        let params = &model.params;
+        let printed = model.kind == ModelKind::AsPrinted;
+        Self {
+            step_s,
+            mass_kg: params.mass_kg,
+            arm_per_inertia: params.thrust_arm_m / params.pitch_inertia_kg_m2,
+            drag_per_m: params.drag_per_m,
+            lateral_drag_per_m: params.lateral_drag_per_m,
+            crossflow_per_m: params.crossflow_per_m,
+            gravity_m_s2: params.gravity_m_s2,
+            printed,
+        }
+    }
+
+    /// Whether there is an air force across the body; without it the equations are shorter.
+    fn pushed_across(&self) -> bool {
+        !self.printed && (self.lateral_drag_per_m != 0.0 || self.crossflow_per_m != 0.0)
+    }
+}
+
+/// The points of linearisation: state at the beginning of each interval, input, thrust, mass, and the costate of the
+/// state after it.
+#[derive(Debug, Clone, Copy)]
+struct Points {
+    state: [Lanes; 6],
+    gimbal: Lanes,
+    thrust: Lanes,
+    inverse_mass: Lanes,
+    /// The model's own mass divided by the mass in the interval.
+    lightness: Lanes,
+    costate: [Lanes; 6],
+}
+
+impl Points {
+    /// At rest, at the model's own mass.
+    fn rest(c: &Constants) -> Self {
+        Self {
+            state: [Lanes::ZERO; 6],
+            gimbal: Lanes::ZERO,
+            thrust: Lanes::ZERO,
+            inverse_mass: Lanes::splat(1.0 / c.mass_kg),
+            lightness: Lanes::splat(1.0),
+            costate: [Lanes::ZERO; 6],
+        }
+    }
+}
+
+/// Intervals and their derivatives.
+#[derive(Debug, Clone, PartialEq)]
+struct Block {
+    /// The state after the interval.
+    after: [Lanes; 6],
+    /// Derivative of `lambda . step` by theta, u, w, q, delta; by x and z it is lambda's own.
+    pulled: [Lanes; DIRECTIONS],
+    /// Derivatives of x, z, u and w after the interval by the directions.
+    tangent: [[Lanes; DIRECTIONS]; 4],
+    /// Derivative of q after the interval by delta; that of theta is half a step times it.
+    turn: Lanes,
+    /// Second derivative of `lambda . step` by the directions, packed.
+    curvature: [Lanes; PAIRS],
+}
+
+impl Block {
+    const EMPTY: Self = Self {
+        after: [Lanes::ZERO; 6],
+        pulled: [Lanes::ZERO; DIRECTIONS],
+        tangent: [[Lanes::ZERO; DIRECTIONS]; 4],
+        turn: Lanes::ZERO,
+        curvature: [Lanes::ZERO; PAIRS],
+    };
+}
+
+/// The values that are constant over the interval.
+#[derive(Clone, Copy)]
+struct Held {
+    /// Acceleration along the nose axis and along the second body axis, m/s^2. Except for the sign, each is the
+    /// derivative of the other by the gimbal angle.
+    push: Lanes,
+    side: Lanes,
+    /// Pitch acceleration, rad/s^2, and its derivative by the gimbal angle.
+    turn_acc: Lanes,
+    turn_acc_d: Lanes,
+    /// Air forces per mass and squared speed, 1/m.
+    drag: Lanes,
+    lateral_drag: Lanes,
+    crossflow: Lanes,
+}
+
+impl Held {
+    #[inline(always)]
+    fn of(c: &Constants, points: &Points) -> Self {
+        let (sin, cos) = points.gimbal.sin_cos();
+        let acceleration = points.thrust * points.inverse_mass;
+        let torque = points.thrust * c.arm_per_inertia;
+        Self {
+            push: acceleration * cos,
+            side: -(acceleration * sin),
+            turn_acc: -(torque * sin),
+            turn_acc_d: -(torque * cos),
+            drag: points.lightness * c.drag_per_m,
+            lateral_drag: points.lightness * c.lateral_drag_per_m,
+            crossflow: points.lightness * c.crossflow_per_m,
+        }
+    }
+}
+
+/// The values of a stage that the derivatives need.
+#[derive(Clone, Copy)]
+struct Stage {
+    sin: Lanes,
+    cos: Lanes,
+    u: Lanes,
+    w: Lanes,
+    q: Lanes,
+    x_dot: Lanes,
+    z_dot: Lanes,
+    u_dot: Lanes,
+    w_dot: Lanes,
+    /// Derivative of the drag's acceleration by u and w.
+    drag_u: Lanes,
+    drag_w: Lanes,
+    /// Derivative of the air's acceleration across the body by u and w.
+    across_u: Lanes,
+    across_w: Lanes,
+    /// u and w over the speed.
+    along: Lanes,
+    across: Lanes,
+}
+
+const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+/// The fraction of the step at which a stage lies, by which q and delta move its pitch and pitch rate.
+const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+/// Fraction of half a squared step by which the pitch acceleration moves a stage's pitch.
+const TURNED: [f64; 4] = [0.0, 0.0, 0.5, 1.0];

@@ -1,14 +1,11 @@
-//! One interval's derivatives, as the sweeps use them.
+//! One interval's derivatives, as the sweeps use them, and the value function.
 #![expect(clippy::inline_always, reason = "fixed-size kernels of a few dozen instructions")]
 
 use pulp::{Scalar, Simd};
-use stages::{Curvature, Feedback, Stage};
+use stages::{Curvature, Feedback, Stage, Value};
 
-use super::block::{Block, D, pair};
-use super::four::Four;
-use super::lanes::Lanes;
-use super::line::Line;
-use super::split::Split;
+use super::lanes::{Four, LANES, Lanes};
+use super::{Block, D, DIRECTIONS, pair};
 
 /// Indices of the states.
 const X: usize = 0;
@@ -182,5 +179,90 @@ impl stages::Interval<6, 1> for Rows<'_> {
         by_gimbal += share * self.gimbal_twice * dd;
         let [theta, u, w, q] = bent.0;
         ([0.0, 0.0, theta, u, w, q], [by_gimbal])
+    }
+}
+
+// One interval's evaluation, turned from the lanes of its block into rows that the sweeps load whole.
+
+/// One interval's derivatives by theta, u, w and q, row by row. Its block has those that are by the gimbal angle alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Line {
+    /// Of x, z, u and w after the interval.
+    pub(super) tangent: [Lanes; 4],
+    /// Of the derivatives of `lambda . step` by theta, u, w, q and the gimbal angle.
+    pub(super) curvature: [Lanes; 5],
+}
+
+impl Line {
+    pub(super) const EMPTY: Self = Self { tangent: [Lanes::ZERO; 4], curvature: [Lanes::ZERO; 5] };
+}
+
+/// Lane by lane, four values.
+#[inline]
+fn transposed(a: &Lanes, b: &Lanes, c: &Lanes, d: &Lanes) -> [Lanes; LANES] {
+    [
+        Lanes([a.0[0], b.0[0], c.0[0], d.0[0]]),
+        Lanes([a.0[1], b.0[1], c.0[1], d.0[1]]),
+        Lanes([a.0[2], b.0[2], c.0[2], d.0[2]]),
+        Lanes([a.0[3], b.0[3], c.0[3], d.0[3]]),
+    ]
+}
+
+/// Writes the lines of a block's intervals. It is not inlined: within the evaluation the compiler would give up the vectors there,
+/// which takes 2.4 times as long.
+#[inline(never)]
+pub(super) fn write(block: &Block, lines: &mut [Line; LANES]) {
+    for (row, tangent) in block.tangent.iter().enumerate() {
+        let turned = transposed(&tangent[0], &tangent[1], &tangent[2], &tangent[3]);
+        for lane in 0..LANES {
+            lines[lane].tangent[row] = turned[lane];
+        }
+    }
+    let bent = |i: usize, j: usize| &block.curvature[if i <= j { pair(i, j) } else { pair(j, i) }];
+    for row in 0..DIRECTIONS {
+        let turned = transposed(bent(row, 0), bent(row, 1), bent(row, 2), bent(row, 3));
+        for lane in 0..LANES {
+            lines[lane].curvature[row] = turned[lane];
+        }
+    }
+}
+
+// The quadratic part of the value function, split where its vectors are.
+
+/// A symmetric matrix over the states: for each state its entries by x, by z, and by theta, u, w and q.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Split {
+    pub(super) x: [f64; 6],
+    pub(super) z: [f64; 6],
+    pub(super) rest: [Lanes; 6],
+}
+
+impl Split {
+    #[inline(always)]
+    pub(super) fn row(&self, i: usize) -> [f64; 6] {
+        let [theta, u, w, q] = self.rest[i].0;
+        [self.x[i], self.z[i], theta, u, w, q]
+    }
+}
+
+impl Value<6> for Split {
+    const ZERO: Self = Self { x: [0.0; 6], z: [0.0; 6], rest: [Lanes::ZERO; 6] };
+
+    #[inline(always)]
+    fn add<C: Curvature<6>>(&mut self, curvature: &C) {
+        let mut whole = core::array::from_fn(|i| self.row(i));
+        curvature.add_to(&mut whole);
+        for (i, [x, z, rest @ ..]) in whole.into_iter().enumerate() {
+            (self.x[i], self.z[i], self.rest[i]) = (x, z, Lanes(rest));
+        }
+    }
+
+    #[inline(always)]
+    fn add_times(&self, vector: &[f64; 6], sum: &mut [f64; 6]) {
+        for (i, value) in vector.iter().enumerate() {
+            for (entry, column) in sum.iter_mut().zip(&self.row(i)) {
+                *entry += column * value;
+            }
+        }
     }
 }

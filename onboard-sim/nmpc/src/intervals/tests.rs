@@ -2,9 +2,9 @@ use proptest::prelude::*;
 use pulp::{Scalar, Simd, WithSimd};
 use stages::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
-use super::block::{DIRECTIONS, pair};
 use super::lanes::Lanes;
 use super::*;
+use super::{DIRECTIONS, pair};
 use crate::dynamics::{ModelKind, PlanarModel, PlanarState};
 use crate::paper;
 
@@ -174,7 +174,7 @@ proptest! {
         for vehicle in &vehicles() {
             let block = block(vehicle, &point);
             let mut lines = [Line::EMPTY; LANES];
-            line::write(&block, &mut lines);
+            super::rows::write(&block, &mut lines);
             let rows = Rows::of(&block, &lines[1], 1, STEP_S);
             let columns: [[f64; 6]; 7] = from_fn(|j| match j {
                 6 => rows.push(&[0.0; 6], &[1.0]),

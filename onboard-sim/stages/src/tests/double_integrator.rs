@@ -1,8 +1,9 @@
-//! A mass that is pushed along a line: position and speed, one force.
+//! A mass that is pushed along a line: position and speed, one force. Also a bound on the work of
+//! several solves.
 
-use super::optimality::Optimality;
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
-use super::solved;
+use super::{Kept, Optimality, solved};
+use crate::{Status, Workspace};
 
 pub(super) const INTERVALS: usize = 40;
 const STEP_S: f64 = 0.1;
@@ -87,4 +88,40 @@ fn a_target_out_of_reach_costs_its_price() {
     Optimality::of(&model, &workspace).assert_within(1e-6);
     assert!(outcome.miss > 0.1, "{outcome:?}");
     assert!(workspace.condition_multipliers().any(|multiplier| multiplier.abs() >= model.price));
+}
+
+// A bound on the work of several solves together.
+
+/// With one pass a cold solve evaluates its guess and ends there; with many it finds what it finds without a bound, bit for bit.
+#[test]
+fn a_solve_ends_when_its_passes_are_spent() {
+    let model = problem(0.27);
+    let mut free = Workspace::default();
+    let whole = free.solve(&model, None);
+    assert!(whole.status == Status::Converged && whole.iterations > 3, "{whole:?}");
+
+    let mut bounded = Workspace::default();
+    let mut done = Vec::new();
+    for iterations in 0..=3 * whole.iterations {
+        bounded.allow(Some(1 + 2 * iterations * INTERVALS));
+        done.push(bounded.solve(&model, None).iterations);
+    }
+    assert_eq!(done[0], 0, "the guess is evaluated, and that is more than a pass");
+    assert!(done.is_sorted() && done.last() == Some(&whole.iterations), "{done:?}");
+    assert_eq!(Kept::of(&bounded).farthest_input(&Kept::of(&free)).to_bits(), 0.0_f64.to_bits());
+}
+
+/// What a solve has spent is missing in the next one.
+#[test]
+fn solves_share_their_passes() {
+    let model = problem(0.27);
+    let mut workspace = Workspace::default();
+    workspace.allow(Some(6 * INTERVALS));
+    let first = workspace.solve(&model, None);
+    assert!(workspace.is_spent() && first.status == Status::IterationLimit, "{first:?}");
+    let second = workspace.solve(&model, None);
+    assert!(second.iterations == 0 && second.status == Status::IterationLimit, "{second:?}");
+    workspace.allow(None);
+    assert_eq!(workspace.solve(&model, None).status, Status::Converged);
+    assert!(!workspace.is_spent());
 }

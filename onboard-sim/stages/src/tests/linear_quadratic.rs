@@ -5,7 +5,7 @@ use core::array::from_fn;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
-use super::optimality::Optimality;
+use super::Optimality;
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
 use super::{Kept, solved};
 use crate::{Model, Status};

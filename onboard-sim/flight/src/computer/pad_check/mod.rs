@@ -7,24 +7,25 @@
 //! The gyro is not calibrated here: [the watch on the pad](super::pad) finds its bias in every second at rest, and the
 //! flight begins with the last one. The check shows that bias.
 
-mod finding;
-mod still;
 mod sweep;
 #[cfg(test)]
 mod tests;
 
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-pub use self::finding::{Finding, Item, SURFACES, Verdict};
-use self::still::Still;
-use self::sweep::Sweep;
+use self::sweep::{Still, Sweep};
+use super::crew::{Answer, Asked, Ending};
+use super::news::Severity;
+use super::pad::{SelfTest, as_measured};
+use super::{Computer, Input};
 use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::estimation::estimator::Measurements;
 use crate::rules::operator::Operator;
+use crate::rules::phase::Phase;
 use crate::vehicle::airframe::Airframe;
-use crate::vehicle::mission::Mission;
-use crate::vehicle::mission::{ArmingLimits, StartPoint};
+use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 
 /// How the last check stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -173,7 +174,7 @@ impl PadCheck {
                 self.findings.extend(still.findings(mission, arming, hangs));
             }
         }
-        self.findings.extend(finding::of_switches(&seen.switches, mission, arming));
+        self.findings.extend(findings_of_switches(&seen.switches, mission, arming));
         let failed = self.findings.iter().any(|found| found.verdict == Verdict::NotOk);
         self.state = if failed { CheckState::Failed } else { CheckState::Passed };
         self.stage = Stage::Resting;
@@ -210,7 +211,7 @@ impl PadCheck {
 
     /// How much of the running check is done, percent.
     pub fn progress_percent(&self) -> u8 {
-        let still_frames = u64::from(still::FRAMES);
+        let still_frames = u64::from(sweep::STILL_FRAMES);
         let (done, all) = match &self.stage {
             Stage::Resting => return if self.state == CheckState::NotRun { 0 } else { 100 },
             Stage::Sweeping(sweep) => {
@@ -224,6 +225,281 @@ impl PadCheck {
 
     /// Its end in words, for the crew.
     pub(super) fn words(&self) -> String {
-        finding::words(&self.findings)
+        words_of_findings(&self.findings)
+    }
+}
+
+// One line of the check: an item, the value found, the limits and the verdict.
+
+/// The surfaces: gimbal pitch and yaw, fins 1 to 4.
+pub const SURFACES: usize = 6;
+
+/// What was looked at. Values are SI: rad, s, rad/s, m/s^2, m, m/s, V, bytes; a switch is 1 or 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Item {
+    /// How far a surface went, from end to end.
+    Range(usize),
+    /// How far a surface stood from its command, at most.
+    Error(usize),
+    /// How much later a surface arrived than one that turns at once at its airframe's rate.
+    Lag(usize),
+    /// Mean rotation rate at rest: what the estimator starts with.
+    GyroBias,
+    GyroNoise,
+    /// Mean length of the specific force.
+    Gravity,
+    AccelerometerNoise,
+    BarometerNoise,
+    /// Satellite fixes in the time that the sensors were watched.
+    GnssFixes,
+    GnssSpeed,
+    /// The last range; on a pad it may be too near to be measured.
+    LidarRange,
+    IgniterContinuity,
+    BoosterWire,
+    PinOut,
+    BatteryVoltage,
+    LogRunning,
+    LogSpace,
+}
+
+impl Item {
+    /// Its number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then the others.
+    pub fn number(self) -> u8 {
+        let of_surface = |surface: usize, which: u8| 3 * u8::try_from(surface).unwrap_or(u8::MAX / 4) + which;
+        match self {
+            Self::Range(surface) => of_surface(surface, 0),
+            Self::Error(surface) => of_surface(surface, 1),
+            Self::Lag(surface) => of_surface(surface, 2),
+            Self::GyroBias => 32,
+            Self::GyroNoise => 33,
+            Self::Gravity => 34,
+            Self::AccelerometerNoise => 35,
+            Self::BarometerNoise => 36,
+            Self::GnssFixes => 37,
+            Self::GnssSpeed => 38,
+            Self::LidarRange => 39,
+            Self::IgniterContinuity => 48,
+            Self::BoosterWire => 49,
+            Self::PinOut => 50,
+            Self::BatteryVoltage => 51,
+            Self::LogRunning => 52,
+            Self::LogSpace => 53,
+        }
+    }
+
+    fn name(self) -> String {
+        let surface = |surface: usize| match surface {
+            0 => "gimbal pitch".into(),
+            1 => "gimbal yaw".into(),
+            fin => format!("fin {}", fin - 1),
+        };
+        match self {
+            Self::Range(of) => format!("{} range", surface(of)),
+            Self::Error(of) => format!("{} error", surface(of)),
+            Self::Lag(of) => format!("{} lag", surface(of)),
+            Self::GyroBias => "gyro bias".into(),
+            Self::GyroNoise => "gyro noise".into(),
+            Self::Gravity => "gravity".into(),
+            Self::AccelerometerNoise => "accelerometer noise".into(),
+            Self::BarometerNoise => "barometer noise".into(),
+            Self::GnssFixes => "GNSS fixes".into(),
+            Self::GnssSpeed => "GNSS speed".into(),
+            Self::LidarRange => "lidar".into(),
+            Self::IgniterContinuity => "igniter continuity".into(),
+            Self::BoosterWire => "booster wire".into(),
+            Self::PinOut => "pin".into(),
+            Self::BatteryVoltage => "battery".into(),
+            Self::LogRunning => "log".into(),
+            Self::LogSpace => "log space".into(),
+        }
+    }
+}
+
+impl Remembers for Item {
+    fn remember(&self, memory: &mut Memory) {
+        self.number().remember(memory);
+    }
+}
+
+/// What a value means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Verdict {
+    /// Shown only: here nothing is wrong with any value.
+    NotJudged = 0,
+    Ok = 1,
+    NotOk = 2,
+}
+
+impl Remembers for Verdict {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+/// A value with its limits; NaN is no limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    pub item: Item,
+    /// NaN: there was none.
+    pub value: f64,
+    pub least: f64,
+    pub most: f64,
+    pub verdict: Verdict,
+}
+
+impl Finding {
+    /// A value that must not be less. One that is not a number fails.
+    fn at_least(item: Item, value: f64, least: f64) -> Self {
+        Self { item, value, least, most: f64::NAN, verdict: judged(value >= least) }
+    }
+
+    /// A value that must not be more. One that is not a number fails.
+    fn at_most(item: Item, value: f64, most: f64) -> Self {
+        Self { item, value, least: f64::NAN, most, verdict: judged(value <= most) }
+    }
+
+    fn between(item: Item, value: f64, least: f64, most: f64) -> Self {
+        Self { item, value, least, most, verdict: judged((least..=most).contains(&value)) }
+    }
+
+    fn only_shown(item: Item, value: f64) -> Self {
+        Self { item, value, least: f64::NAN, most: f64::NAN, verdict: Verdict::NotJudged }
+    }
+}
+
+/// The larger of two; not a number, unlike with `max`, if one of them is not.
+fn larger(one: f64, other: f64) -> f64 {
+    if one.is_nan() || one >= other { one } else { other }
+}
+
+fn judged(ok: bool) -> Verdict {
+    if ok { Verdict::Ok } else { Verdict::NotOk }
+}
+
+/// Switches, battery and log.
+fn findings_of_switches(
+    switches: &PadSwitches,
+    mission: &Mission,
+    arming: &ArmingLimits,
+) -> impl Iterator<Item = Finding> {
+    let closed = |item, closed: bool| Finding::at_least(item, f64::from(u8::from(closed)), 1.0);
+    let on_a_rail = mission.start.at == StartPoint::Pad;
+    [
+        Some(closed(Item::IgniterContinuity, switches.igniter_continuity)),
+        on_a_rail.then(|| closed(Item::BoosterWire, switches.booster_attached)),
+        // In while people work at the vehicle, out before it is armed: both are right in their time.
+        Some(Finding::only_shown(Item::PinOut, f64::from(u8::from(switches.pin_out)))),
+        switches.battery_v.map(|volts| Finding::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        Some(closed(Item::LogRunning, switches.log_running)),
+        Some(Finding::at_least(
+            Item::LogSpace,
+            switches.log_space_bytes as f64,
+            arming.log_space_min_bytes as f64,
+        )),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// How many values are outside their limits, and which is the first.
+fn words_of_findings(findings: &[Finding]) -> String {
+    let mut failed = findings.iter().filter(|found| found.verdict == Verdict::NotOk);
+    match (failed.next(), failed.count()) {
+        (None, _) => format!("check passed: {} values found", findings.len()),
+        (Some(first), 0) => format!("check FAILED: {}", first.item.name()),
+        (Some(first), more) => format!("check FAILED: {} and {more} more", first.item.name()),
+    }
+}
+
+// The check that the crew asks for on the pad: when it may run, and what ends it.
+
+impl Computer {
+    /// The last check on the pad.
+    pub fn pad_check(&self) -> &PadCheck {
+        &self.pad_check
+    }
+
+    /// Why no check may run now.
+    fn why_no_check(&self) -> Option<String> {
+        let mode = self.table.mode();
+        let locks = mode.interlocks;
+        let reason = match mode.phase {
+            _ if locks.abort_latched => "an abort is latched: restart to clear it",
+            _ if self.release.is_some() || !mode.phase.on_pad() => "not on the pad",
+            _ if locks.armed || mode.countdown_end_s.is_some() => "armed: disarm first",
+            // A self-test that has failed is a reason to look closer.
+            Phase::Safe if self.self_test != SelfTest::Failed => "the self-test is not over",
+            _ => return None,
+        };
+        Some(reason.into())
+    }
+
+    /// Begins a check. One that runs goes on: a repeated request is no other one.
+    pub(super) fn begin_check(&mut self, asked: Asked, by: Option<Operator>) -> Answer {
+        if let Some(reason) = self.why_no_check() {
+            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason) };
+        }
+        if self.pad_check.is_running() {
+            return Answer::ACCEPTED;
+        }
+        let moves = asked == Asked::Check;
+        self.pad_check.begin(&self.pilot.mission().airframe, moves, by);
+        let who = by.map_or_else(String::new, |by| format!("{by}: "));
+        let what = if moves { "gimbal and fins MOVE" } else { "nothing moves" };
+        self.table.say(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
+        Answer::ACCEPTED
+    }
+
+    /// Ends a running check, and brings the surfaces to rest. Returns whether one ran.
+    pub(super) fn end_check(&mut self, why: &str) -> bool {
+        let ran = self.pad_check.stop(self.frame);
+        if ran {
+            self.rest_surfaces();
+            self.table.say(Severity::Warning, format!("check of the vehicle ended early: {why}"));
+        }
+        ran
+    }
+
+    fn rest_surfaces(&mut self) {
+        (self.commands.gimbal_rad, self.commands.fins_rad) = ([0.0; 2], [self.closed_rad(); 4]);
+    }
+
+    /// One frame of a running check. It ends here at the latest, whatever has happened in this frame.
+    pub(super) fn check_itself(&mut self, input: &Input<'_>) {
+        if !self.pad_check.is_running() {
+            return;
+        }
+        if let Some(reason) = self.why_no_check() {
+            // In the air the pilot commands from the next frame on.
+            self.end_check(&reason);
+            return;
+        }
+        let ([pitch_rad, yaw_rad], [one, two, three, four]) = (input.gimbal_rad, input.fins_rad);
+        let seen = Seen {
+            surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
+            measured: &as_measured(&input.sensed),
+            switches: PadSwitches {
+                igniter_continuity: self.igniter_continuity,
+                booster_attached: self.booster_attached,
+                pin_out: input.pin_out,
+                battery_v: self.battery_v,
+                log_running: self.log.running,
+                log_space_bytes: self.log.space_bytes,
+            },
+        };
+        let told = self.pad_check.step(&seen, self.pilot.mission(), &self.arming);
+        self.rest_surfaces();
+        match told {
+            Some((surface @ 0..2, angle_rad)) => self.commands.gimbal_rad[surface] = angle_rad,
+            Some((surface, angle_rad)) => self.commands.fins_rad[surface - 2] = angle_rad,
+            None => {}
+        }
+        match self.pad_check.state() {
+            CheckState::Passed => self.table.say(Severity::Notice, self.pad_check.words()),
+            CheckState::Failed => self.table.say(Severity::Warning, self.pad_check.words()),
+            CheckState::NotRun | CheckState::Running | CheckState::Stopped => {}
+        }
     }
 }

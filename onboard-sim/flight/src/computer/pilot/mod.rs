@@ -5,37 +5,27 @@
 //! landing.
 
 mod ascent;
-mod assumed;
-mod digest;
-mod fin_watch;
-mod hopeless;
-mod inspect;
 mod known;
 mod outlook;
-mod restart;
-#[cfg(test)]
-pub(super) mod sample;
 mod step;
 
-use ascent::{AscentWatch, axial_m_s2};
-use fin_watch::FinWatch;
-use known::Known;
-pub use outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
-pub use restart::SavedPilot;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use nalgebra::Vector3;
-
+use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
+use self::known::{Burning, Known};
+pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
+use crate::computer::memory::remembers;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::guidance::baseline::{Baseline, Law};
-use crate::guidance::powered::ControlLevel;
-use crate::guidance::powered::{PoweredGuidance, PoweredReport};
-use crate::rules::phase::Phase;
+use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
+use crate::rules::phase::{Mode, Phase};
 use crate::vehicle::airframe::MassModel;
-use crate::vehicle::mission::Mission;
-use crate::vehicle::mission::StartPoint;
+use crate::vehicle::atmosphere::Air;
+use crate::vehicle::dynamics::PlanarState;
+use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
@@ -81,6 +71,8 @@ pub struct BoosterCommands {
     pub separate: bool,
 }
 
+remembers!(BoosterCommands { ignite, separate });
+
 /// The commands of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PilotOutput {
@@ -123,6 +115,25 @@ pub struct Pilot {
     /// Since when a lasting reason has kept the gate shut, s.
     gate_shut_since_s: Option<f64>,
 }
+
+remembers!(Pilot {
+    known,
+    estimator,
+    estimate,
+    ascent,
+    apogee_m,
+    ignited_at_s,
+    outlook,
+    powered,
+    baseline,
+    aim_loop,
+    fin_share,
+    fins_rad,
+    fin_watch,
+    gimbal_rad,
+    gate_refusal,
+    gate_shut_since_s,
+});
 
 impl Pilot {
     /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of that estimate.
@@ -234,5 +245,216 @@ impl Pilot {
     /// The gate check that failed at the last evaluation, if any.
     pub fn gate_refusal(&self) -> Option<&'static str> {
         self.gate_refusal
+    }
+}
+
+// For replay: reads the pilot's state and changes its settings from outside the flight.
+
+impl Pilot {
+    /// The same memory with another mission: other vehicle data, gains, limits and settings. The frame length, the
+    /// estimator's configuration and the start stay as they were.
+    #[must_use]
+    pub fn reconfigured(&self, mission: &Mission) -> Self {
+        let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
+        Self {
+            powered: self.powered.reconfigured(&mission.powered),
+            aim_loop: self.aim_loop.reconfigured(mission.aim),
+            known: Known { mission: mission.clone(), mass, ..self.known.clone() },
+            ..self.clone()
+        }
+    }
+
+    /// The states of the plan being flown and the step between them, s, if there is a plan. They lie in the plane of
+    /// the landing, in the frame that moves with the wind along that plane and coincided with the ground's when the
+    /// plan began.
+    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
+        self.powered.planned()
+    }
+
+    /// The plane of the landing, once it is chosen.
+    pub fn plane(&self) -> Option<&Plane> {
+        self.powered.plane()
+    }
+
+    /// The mission it flies.
+    pub fn mission(&self) -> &Mission {
+        &self.known.mission
+    }
+
+    /// The landing planned in this frame, solved separately; `None` if none was planned. `before` is this pilot one
+    /// frame earlier.
+    pub(crate) fn landing_planned(
+        &self,
+        before: &Self,
+        mode: &Mode,
+        input: &PilotInput,
+    ) -> Option<LandingSolved> {
+        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
+        let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
+        let estimate = self.estimate.as_ref()?;
+        // As in the frame itself, `Pilot::step`.
+        let density_kg_m3 =
+            Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
+        let mass = self.known.mass_now(Some(burning_s));
+        let lands_here = mode.interlocks.lands_here;
+        let burning = Burning { burning_s, mass, density_kg_m3, lands_here };
+        let (preferred, fallback) = self.known.situations_to_plan(estimate, &burning, &input.fins_rad);
+        before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
+    }
+}
+
+// What a pilot saves for a restart in the air, and how it goes on.
+
+/// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has
+/// seen of its ascent and of its fins. Covariances of the estimator, outlook, plan and gimbal loop are not kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SavedPilot {
+    motor: MotorEstimate,
+    estimate: Option<Estimate>,
+    ascent: AscentWatch,
+    apogee_m: f64,
+    ignited_at_s: Option<f64>,
+    fin_share: f64,
+    fins_rad: [f64; 4],
+    fin_watch: FinWatch,
+    gimbal_rad: [f64; 2],
+}
+
+impl Pilot {
+    pub(super) fn saved(&self) -> SavedPilot {
+        SavedPilot {
+            motor: self.known.motor,
+            estimate: self.estimate,
+            ascent: self.ascent,
+            apogee_m: self.apogee_m,
+            ignited_at_s: self.ignited_at_s,
+            fin_share: self.fin_share,
+            fins_rad: self.fins_rad,
+            fin_watch: self.fin_watch,
+            gimbal_rad: self.gimbal_rad,
+        }
+    }
+
+    /// This pilot, which was just powered up, from what was saved before a reset that ended at `time_s`. The saved estimate
+    /// is extrapolated over the lost time with the last measured rates and forces, and gets the same uncertainty as
+    /// at apogee.
+    #[must_use]
+    pub(super) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
+        let mission = &self.known.mission;
+        let uncertainty = StartUncertainty::at_apogee();
+        let estimator = saved.estimate.map_or_else(
+            || self.estimator.clone(),
+            |estimate| {
+                let lost_s = (time_s - estimate.time_s).max(0.0);
+                let mut believed = estimate.state;
+                // It keeps its last rotation rate; the force has the direction at half of the lost time.
+                let half = nalgebra::UnitQuaternion::from_scaled_axis(believed.rate_rad_s * (0.5 * lost_s));
+                believed.world_from_body *= half;
+                let force = believed.world_from_body * estimate.specific_force_m_s2;
+                believed.world_from_body *= half;
+                let acceleration_m_s2 = force - nalgebra::Vector3::z() * mission.gravity_m_s2;
+                believed.position_m +=
+                    believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
+                believed.velocity_m_s += acceleration_m_s2 * lost_s;
+                Estimator::new(&mission.estimator, &uncertainty, time_s, &believed)
+                    .with_gyro_bias(estimate.gyro_bias_rad_s)
+            },
+        );
+        let SavedPilot {
+            motor,
+            estimate,
+            ascent,
+            apogee_m,
+            ignited_at_s,
+            fin_share,
+            fins_rad,
+            fin_watch,
+            gimbal_rad,
+        } = *saved;
+        let mut resumed = Self {
+            estimator,
+            estimate,
+            ascent,
+            apogee_m,
+            ignited_at_s,
+            fin_share,
+            fins_rad,
+            fin_watch,
+            gimbal_rad,
+            ..self.clone()
+        };
+        resumed.known.motor = motor;
+        resumed
+    }
+}
+
+#[cfg(test)]
+pub(super) mod sample {
+    //! A pilot about to fall, and inputs for it: for the tests of these modules.
+
+    use nalgebra::Vector3;
+
+    use super::{Pilot, PilotInput, Sensed};
+    use crate::computer::Computer;
+    use crate::computer::table::PhaseTable;
+    use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
+    use crate::guidance::baseline::Law;
+    use crate::vehicle::rigid::RigidState;
+
+    /// A phase table as it is right after the release.
+    pub(super) fn released() -> PhaseTable {
+        let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let computer = Computer::at_power_up(&mission, Law::Nmpc, &RigidState::upright(300.0));
+        computer.released().into_table()
+    }
+
+    /// The pilot of mk2, upright at rest, 300 m up.
+    pub(super) fn falling() -> Pilot {
+        let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
+        Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
+    }
+
+    /// The input of a frame with almost no specific force, turning at a rate.
+    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
+        let imu = ImuSample {
+            gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
+            specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
+        };
+        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
+        PilotInput {
+            frame,
+            time_s: 0.005 * frame as f64,
+            sensed: Sensed::Measured(measured),
+            fins_rad: [0.0; 4],
+            contact: false,
+            igniter_continuity: true,
+            booster_attached: false,
+            abort: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use crate::computer::pilot::sample::{falling, input, released};
+
+    #[test]
+    fn the_attitude_is_extrapolated_over_the_lost_time() {
+        let mut pilot = falling();
+        pilot.step(&mut released(), &input(1, 0.0));
+        let mut estimate = pilot.estimate.expect("the pilot has an estimate");
+        estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
+        pilot.estimate = Some(estimate);
+        let found = falling()
+            .resumed(&pilot.saved(), estimate.time_s + 0.2)
+            .estimator
+            .estimate()
+            .state
+            .world_from_body;
+        let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
+        let expected = estimate.state.world_from_body * turned;
+        assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
     }
 }

@@ -1,11 +1,14 @@
-//! The pilot's forecast for the next seconds.
+//! The pilot's forecast for the next seconds, and the parachute if it shows that no landing will be possible.
 
 use nalgebra::{Vector2, Vector3};
 
-use super::Pilot;
+use super::{Pilot, PilotInput};
+use crate::computer::memory::remembers;
+use crate::estimation::estimator::Estimate;
 use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
-use crate::rules::phase::Phase;
+use crate::rules::gate::GateInput;
+use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 
 /// The commit height is the height that the parachute needs, times this. Halved and doubled: 144, 132.
@@ -30,6 +33,15 @@ pub struct Outlook {
     /// Distance from the pad at which the vehicle would touch down without further steering, m.
     pub touchdown_distance_m: f64,
 }
+
+remembers!(Outlook {
+    ignition,
+    commit_height_m,
+    height_m,
+    predicted_speed_m_s,
+    lands_ahead,
+    touchdown_distance_m
+});
 
 impl Outlook {
     /// Height of the feet below which the parachute does not fill before it reaches the ground, m.
@@ -104,11 +116,95 @@ impl Pilot {
     }
 }
 
+// Releases the parachute while there is height for it, if the ignition gate will not open.
+
+/// A reason that has kept the gate shut for this long, s, will not go away before ignition. Halved or doubled: no flight changes.
+const LASTS_S: f64 = 0.5;
+/// The decision is taken this long before the room for the parachute ends, s. Halved and doubled: 144, 143.
+const BEFORE_S: f64 = 0.1;
+/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
+/// them: such a vehicle tumbles, or does not know where it is. Halved and doubled: 59, 144.
+const FAR_BEYOND: f64 = 2.0;
+/// A fin that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights. If the gate stays shut for
+/// longer than this after ignition was due, s, there is another reason. Halved or doubled: no flight changes.
+const OVERDUE_S: f64 = 0.1;
+
+impl Pilot {
+    /// The event that the gate will not open any more, as soon as waiting gains nothing.
+    ///
+    /// Above the commit height: the gate has been shut for a lasting reason, and this is the last chance for the parachute
+    /// with its margin. Below: ignition is due and refused, or no landing is possible from here any more. The motor must
+    /// never be lit outside the gate, so only the parachute is left, without the margin.
+    pub(super) fn gate_will_not_open(
+        &mut self,
+        mode: &Mode,
+        input: &PilotInput,
+        estimate: &Estimate,
+    ) -> Option<Event> {
+        let found = self.gate_input(mode, input, estimate);
+        if mode.phase.in_descent() && self.is_shut_by_what_lasts(&found) {
+            self.gate_shut_since_s.get_or_insert(input.time_s);
+        } else {
+            self.gate_shut_since_s = None;
+        }
+        if !mode.phase.in_descent() || self.outlook.commit_height_m <= 0.0 {
+            return None;
+        }
+        let lasts = self.gate_shut_since_s.is_some_and(|since_s| {
+            // A stuck fin has already been watched for long enough.
+            self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S
+        });
+        let feet_m = self.feet_height_m(estimate);
+        let decided_m = BEFORE_S * (-estimate.state.velocity_m_s.z).max(0.0);
+        let filling_m = self.outlook.filling_height_m();
+        let above_commit_m = feet_m - self.outlook.commit_height_m;
+        let hopeless = if above_commit_m > 0.0 {
+            lasts && above_commit_m < decided_m
+        } else {
+            let last_room = feet_m - filling_m < decided_m;
+            let overdue_s = self.ignition_overdue_s(estimate);
+            let refused = overdue_s.is_some() && self.gate_shut_by(&found).is_some();
+            let outside = found.predicted_touchdown_x_m > self.known.mission.gate.fence_radius_m;
+            let too_low = self.outlook.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
+            (lasts && (refused || last_room))
+                || (refused
+                    && last_room
+                    && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= OVERDUE_S)))
+                || too_low
+        };
+        // Any lower, the parachute reaches the ground before it is ejected.
+        let ejected = feet_m > filling_m - self.known.airframe().parachute.inflation_distance_m;
+        (hopeless && ejected).then_some(Event::GateShutForGood { parachute_fills: feet_m > filling_m })
+    }
+
+    /// Whether a reason that usually lasts keeps the gate shut.
+    ///
+    /// The fence needs no margin: steering does not bring the vehicle back. From the commit height to ignition it has half a
+    /// second, and the wind carries the predicted touchdown 0.3 to 1.8 m further out (1000 `harsh` flights).
+    fn is_shut_by_what_lasts(&self, found: &GateInput) -> bool {
+        let limits = &self.known.mission.gate;
+        let speed_error_m_s = (found.speed_m_s - found.predicted_speed_m_s).abs();
+        !found.fins_confirmed
+            || !found.estimator_healthy
+            || !found.igniter_continuity
+            || found.tilt_rad > FAR_BEYOND * limits.tilt_max_deg.to_radians()
+            || found.pitch_rate_rad_s > FAR_BEYOND * limits.pitch_rate_max_deg_s.to_radians()
+            || found.predicted_touchdown_x_m > limits.fence_radius_m
+            || found.height_disagreement_m > FAR_BEYOND * limits.height_disagreement_max_m
+            || speed_error_m_s > FAR_BEYOND * limits.speed_error_max_fraction * found.predicted_speed_m_s
+            || !self.outlook.lands_ahead
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::computer::pilot::PilotInput;
-    use crate::computer::pilot::sample::{falling, input, released};
+    use nalgebra::{Vector2, Vector3};
+
+    use crate::computer::pilot::sample::{self, input, released};
+    use crate::computer::pilot::{PilotInput, Sensed};
+    use crate::estimation::estimator::StartUncertainty;
+    use crate::vehicle::rigid::RigidState;
 
     /// Whether an abort in the very next frame releases the parachute.
     fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {
@@ -117,9 +213,9 @@ mod tests {
 
     #[test]
     fn an_abort_in_the_first_frame_knows_the_height() {
-        let pilot = falling();
+        let pilot = sample::falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
-        assert!(abort_releases(&mut falling().resumed(&pilot.saved(), 0.1), 21));
+        assert!(abort_releases(&mut sample::falling().resumed(&pilot.saved(), 0.1), 21));
     }
 
     #[test]
@@ -130,5 +226,122 @@ mod tests {
         let at_apogee = touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, 0.0), 80.0);
         assert_eq!(at_apogee, Vector2::new(-22.0, 12.0));
         assert_eq!(touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, -0.2), -0.1), place_m.xy());
+    }
+
+    fn falling(time_s: f64) -> Estimate {
+        let mut state = RigidState::upright(250.0 - 38.0 * time_s);
+        state.velocity_m_s.z = -38.0;
+        Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
+    }
+
+    /// What is wrong in a fall, at the height of the centre of gravity, m.
+    type Wrong = fn(f64, &mut Estimate, &mut PilotInput);
+
+    const NOTHING: Wrong = |_, _, _| {};
+
+    /// How a fall at 38 m/s ended.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Ended {
+        /// With the parachute, released at a height, m; whether the loss was recorded.
+        Parachute(f64, bool),
+        /// With the ignition, commanded at a height, m.
+        Ignition(f64),
+        /// With neither.
+        Unbraked,
+    }
+
+    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m.
+    fn fall(wrong: Wrong) -> Ended {
+        let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
+        let start = RigidState::upright(250.0);
+        let mut pilot = Pilot::starting(&mission, 0.0, &start, &StartUncertainty::at_apogee());
+        let (mut table, mut fins_rad) = (released(), [0.0; 4]);
+        let ended = (1..1300).find_map(|frame| {
+            let time_s = frame as f64 * 0.005;
+            let mut estimate = falling(time_s);
+            let height_m = estimate.state.position_m.z;
+            let mut input = PilotInput {
+                frame,
+                time_s,
+                sensed: Sensed::Known(estimate),
+                fins_rad,
+                contact: false,
+                igniter_continuity: true,
+                booster_attached: false,
+                abort: false,
+            };
+            wrong(height_m, &mut estimate, &mut input);
+            let output = pilot.step(&mut table, &PilotInput { sensed: Sensed::Known(estimate), ..input });
+            fins_rad = output.fins_rad;
+            let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
+            let parachute = output.parachute.then_some(Ended::Parachute(height_m, lost));
+            parachute.or_else(|| output.ignite.then_some(Ended::Ignition(height_m)))
+        });
+        ended.unwrap_or(Ended::Unbraked)
+    }
+
+    #[track_caller]
+    fn assert_parachute(wrong: Wrong, between_m: core::ops::Range<f64>) {
+        let ended = fall(wrong);
+        let filled = matches!(ended, Ended::Parachute(at_m, false) if between_m.contains(&at_m));
+        assert!(filled, "{ended:?}, not between {between_m:?} m");
+    }
+
+    /// 1.5 times a second's fall and 20 m of inflation, and the feet below the centre of gravity.
+    const AT_COMMIT_HEIGHT_M: core::ops::Range<f64> = 87.0..93.0;
+
+    #[test]
+    fn a_fall_with_nothing_wrong_ends_with_the_ignition() {
+        let ended = fall(NOTHING);
+        assert!(matches!(ended, Ended::Ignition(at_m) if (60.0..80.0).contains(&at_m)), "{ended:?}");
+    }
+
+    #[test]
+    fn what_lasts_brings_the_parachute_above_the_commit_height() {
+        assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
+        assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
+        // The fence is at 120 m.
+        assert_parachute(|_, estimate, _| estimate.state.position_m.x = 121.0, AT_COMMIT_HEIGHT_M);
+        let drifting_out: Wrong = |height_m, estimate, _| {
+            estimate.state.velocity_m_s.x = 5.0;
+            estimate.state.position_m.x = 121.0 - 5.0 * height_m / 38.0;
+        };
+        assert_parachute(drifting_out, AT_COMMIT_HEIGHT_M);
+    }
+
+    #[test]
+    fn inside_the_fence_it_lands() {
+        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0);
+        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
+    }
+
+    #[test]
+    fn a_gate_shut_after_the_commit_height_brings_the_parachute_while_it_fills() {
+        let filling_m = 58.0..75.0;
+        let out_of_the_fence: Wrong = |height_m, estimate, _| {
+            estimate.state.position_m.y = if height_m < 80.0 { 121.0 } else { 119.0 };
+        };
+        assert_parachute(out_of_the_fence, filling_m.clone());
+        let open_circuit: Wrong = |height_m, _, input| input.igniter_continuity = height_m > 73.0;
+        assert_parachute(open_circuit, filling_m.clone());
+        let turning: Wrong = |height_m, estimate, _| {
+            estimate.state.rate_rad_s.y = if height_m < 80.0 { 1.2 } else { 0.0 };
+        };
+        assert_parachute(turning, filling_m);
+    }
+
+    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for somewhat longer.
+    #[test]
+    fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
+        let Ended::Ignition(due_m) = fall(NOTHING) else { panic!("no ignition") };
+        let ended = fall(|height_m, estimate, _| {
+            estimate.state.rate_rad_s.y = if height_m > 66.0 && height_m < 80.0 { 1.2 } else { 0.0 };
+        });
+        assert!(matches!(ended, Ended::Ignition(at_m) if at_m < 66.0 && at_m < due_m), "{ended:?}");
+    }
+
+    #[test]
+    fn an_operators_abort_with_the_gate_shut_brings_the_parachute_while_it_fills() {
+        assert_parachute(|height_m, _, input| input.abort = height_m < 86.0, 85.0..86.0);
     }
 }

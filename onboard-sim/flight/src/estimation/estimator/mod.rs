@@ -17,17 +17,11 @@
 pub mod alignment;
 mod config;
 mod covariance;
-mod digest;
-mod gates;
 mod health;
-mod heights;
-mod history;
-mod measurements;
 mod strapdown;
 #[cfg(test)]
 mod tests;
 mod updates;
-mod vehicle;
 mod wind;
 
 use nalgebra::{Vector2, Vector3};
@@ -38,18 +32,12 @@ use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET,
     GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
 };
-use self::gates::Surprise;
-pub use self::gates::{GateCounters, Gates};
-pub use self::health::{Doubt, Health};
-use self::heights::HeightChannel;
-pub use self::heights::HeightSources;
-use self::history::History;
-pub use self::measurements::{
-    GnssFix, ImuSample, LARGEST_RATE_RAD_S, LARGEST_SPECIFIC_FORCE_M_S2, Measurements,
-};
-use self::strapdown::{Noise, Nominal, Pending};
-pub use self::vehicle::VehicleNow;
+pub use self::health::{Doubt, GateCounters, Gates, Health, HeightSources};
+use self::health::{HeightChannel, Surprise};
+use self::strapdown::{History, Noise, Nominal, Pending};
 use self::wind::Sideways;
+pub use self::wind::VehicleNow;
+use crate::computer::memory::remembers;
 use crate::vehicle::rigid::RigidState;
 
 /// Standard deviations of an estimate, from the diagonal of the covariance.
@@ -66,6 +54,15 @@ pub struct Sigmas {
     /// Wind, world x and y, m/s.
     pub wind_m_s: Vector2<f64>,
 }
+
+remembers!(Sigmas {
+    position_m,
+    velocity_m_s,
+    attitude_rad,
+    gyro_bias_rad_s,
+    accelerometer_bias_m_s2,
+    wind_m_s,
+});
 
 /// The output of the estimator after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -88,6 +85,18 @@ pub struct Estimate {
     /// Whether the estimate may be used.
     pub health: Health,
 }
+
+remembers!(Estimate {
+    time_s,
+    state,
+    specific_force_m_s2,
+    wind_m_s,
+    gyro_bias_rad_s,
+    accelerometer_bias_m_s2,
+    sigmas,
+    heights,
+    health,
+});
 
 impl Estimate {
     /// An exact estimate from the true state, for flights and tests without an estimator.
@@ -151,6 +160,12 @@ pub struct Estimator {
     restarted_at_s: f64,
     surprised_at_s: f64,
 }
+
+// Configuration, noise and the initial uncertainty come from the mission.
+remembers!(Estimator {
+    start_s, frames, nominal, covariance, pending, history, heights, sideways, gates, surprise, last_imu, rate_rad_s,
+    specific_force_m_s2, last_good, restarts, restarted_at_s, surprised_at_s,
+} but { config, noise, start });
 
 impl Estimator {
     /// Starts at a time, s, from a state with this uncertainty.
@@ -335,4 +350,53 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[LIDAR_LATE] = config.lidar_late_s;
     sigmas[SLOPE..].fill(libm::tan(config.ground_slope_deg.to_radians()));
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
+}
+
+// The measurements of one frame, as plain data. A log of them is enough to run the estimator again.
+
+/// Beyond the range of hobby gyros (4,000 deg/s), rad/s.
+pub const LARGEST_RATE_RAD_S: f64 = 75.0;
+/// Beyond the range of high-g accelerometers (200 g), m/s^2.
+pub const LARGEST_SPECIFIC_FORCE_M_S2: f64 = 2000.0;
+
+/// Inertial measurement unit, the mean over the frame that has just ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuSample {
+    /// Rotation rate in body axes, rad/s.
+    pub gyro_rad_s: Vector3<f64>,
+    /// Specific force (acceleration minus gravity) at the centre of gravity, body axes, m/s^2.
+    pub specific_force_m_s2: Vector3<f64>,
+}
+
+remembers!(ImuSample { gyro_rad_s, specific_force_m_s2 });
+
+impl ImuSample {
+    /// Whether an inertial unit can send these numbers: they are below [`LARGEST_RATE_RAD_S`] and
+    /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
+    pub fn is_plausible(&self) -> bool {
+        self.gyro_rad_s.iter().all(|rate| rate.abs() <= LARGEST_RATE_RAD_S)
+            && self.specific_force_m_s2.iter().all(|force| force.abs() <= LARGEST_SPECIFIC_FORCE_M_S2)
+    }
+}
+
+/// One fix of the satellite receiver. It arrives late: it has the position at the time `valid_at_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GnssFix {
+    /// Position in the world, relative to the pad, m.
+    pub position_m: Vector3<f64>,
+    pub velocity_m_s: Vector3<f64>,
+    /// Time of validity, s on the flight computer's clock.
+    pub valid_at_s: f64,
+}
+
+/// All measurements of one frame; a sensor that did not report is `None`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurements {
+    /// The inertial sample; every frame has one.
+    pub imu: ImuSample,
+    /// Height of the centre of gravity above the pad from the static pressure, m.
+    pub pressure_altitude_m: Option<f64>,
+    pub gnss: Option<GnssFix>,
+    /// Distance to the ground along body `-x` from the lidar, m.
+    pub lidar_range_m: Option<f64>,
 }

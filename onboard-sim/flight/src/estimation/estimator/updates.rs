@@ -4,7 +4,7 @@ use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
     GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, POSITION, SLOPE, VELOCITY, WIND,
 };
-use super::history::Since;
+use super::strapdown::Since;
 use super::{Estimator, GnssFix};
 
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:

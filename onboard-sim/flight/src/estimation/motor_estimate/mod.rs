@@ -9,15 +9,13 @@
 //! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
 //! extended Kalman filter over `(s, b, t0, d, n)` finds all five; it finds `d` before ignition, while the vehicle falls.
 
-mod digest;
-mod ignition;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{Matrix5, Vector2, Vector5};
 use serde::{Deserialize, Serialize};
 
-use self::ignition::Detector;
+use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::vehicle::airframe::BadValue;
 use crate::vehicle::burn::{Burn, Deviation};
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -138,6 +136,18 @@ pub enum MotorStage {
     },
 }
 
+impl Remembers for MotorStage {
+    fn remember(&self, memory: &mut Memory) {
+        let (stage, at_s): (u8, Option<f64>) = match self {
+            Self::Waiting => (0, None),
+            Self::Burning => (1, None),
+            Self::EndedEarly { at_s } => (2, Some(*at_s)),
+        };
+        stage.remember(memory);
+        at_s.remember(memory);
+    }
+}
+
 /// Thrust with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedThrust {
@@ -160,6 +170,9 @@ pub struct MotorEstimate {
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
 }
+
+// The prior is constant; everything that changes is in the mean and the covariance.
+remembers!(MotorEstimate { detector, stage, mean, covariance, felt_at_s, starved_frames } but { prior });
 
 const IMPULSE: usize = 0;
 const STRETCH: usize = 1;
@@ -203,7 +216,7 @@ impl MotorEstimate {
         let sigmas = Vector5::new(
             prior.impulse_sigma,
             prior.burn_time_sigma,
-            ignition::SIGMA_S,
+            IGNITION_SIGMA_S,
             prior.air_sigma,
             prior.shape_sigma,
         );
@@ -454,4 +467,61 @@ impl MotorEstimate {
 /// gives the same bits as one without a fifth state: logs of that filter still verify.
 fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
     one.fixed_rows::<4>(0).dot(&other.fixed_rows::<4>(0)) + one[SHAPE] * other[SHAPE]
+}
+
+// Finds the instant of ignition with a resolution finer than a frame.
+
+/// The motor burns when the thrust is above this fraction of the peak in two frames in a row. Halved and doubled: 142, 147.
+const CAUGHT_SHARE: f64 = 0.1;
+/// Standard deviation of the instant, s. Halved and doubled: 145, 144.
+const IGNITION_SIGMA_S: f64 = 0.004;
+/// The curve's own rise to that fraction is searched up to this time, and in steps of this length, s.
+/// Halved or doubled: no flight changes.
+const RISE_S: f64 = 0.3;
+const RISE_STEP_S: f64 = 0.0005;
+
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Detector {
+    /// Middle of the last frame, s, and its thrust, N.
+    last: Option<(f64, f64)>,
+    /// When the thrust rose through the threshold, if the last frame was above it, s.
+    crossed_s: Option<f64>,
+}
+
+remembers!(Detector { last, crossed_s });
+
+impl Detector {
+    /// Whether the last frame was above the threshold; the next frame then decides.
+    fn suspects(&self) -> bool {
+        self.crossed_s.is_some()
+    }
+
+    /// Takes a frame's mean thrust. Returns the instant of ignition when this is the second frame above the threshold.
+    fn take(&mut self, curve: &impl NominalThrust, middle_s: f64, thrust_n: f64) -> Option<f64> {
+        let mark_n = CAUGHT_SHARE * curve.peak_n();
+        let before = self.last.replace((middle_s, thrust_n));
+        if thrust_n <= mark_n {
+            self.crossed_s = None;
+            return None;
+        }
+        if let Some(crossed_s) = self.crossed_s {
+            return Some(crossed_s - rise_s(curve, mark_n));
+        }
+        self.crossed_s = Some(match before {
+            Some((before_s, before_n)) if thrust_n > before_n && before_n <= mark_n => {
+                before_s + (middle_s - before_s) * (mark_n - before_n) / (thrust_n - before_n)
+            }
+            _ => middle_s,
+        });
+        None
+    }
+}
+
+/// How long the curve itself takes to rise to the threshold, s.
+fn rise_s(curve: &impl NominalThrust, mark_n: f64) -> f64 {
+    let steps = (RISE_S / RISE_STEP_S) as u32;
+    (0..steps)
+        .map(|step| f64::from(step) * RISE_STEP_S)
+        .find(|time_s| curve.thrust_n(*time_s) >= mark_n)
+        .unwrap_or(0.0)
 }

@@ -12,40 +12,26 @@
 //!
 //! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s.
 
-mod digest;
-mod flown;
-mod homing;
-mod inspect;
-mod plane;
 mod report;
-mod settings;
 mod situation;
 mod space;
-#[cfg(test)]
-mod tests;
 
 use alloc::vec::Vec;
-
-use flown::{Flown, largest_tilt_rad};
-pub use homing::Homing;
-pub(crate) use homing::here_m;
-pub use inspect::LandingSolved;
-pub use plane::Plane;
-pub use report::{ControlLevel, PoweredReport};
-pub use settings::PoweredSettings;
-use situation::Ahead;
-pub use situation::PoweredSituation;
-use space::SpaceGuidance;
-pub use space::SpaceSettings;
-
 use nalgebra::Vector3;
+use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
+use nmpc::{Problem, SolveStatus};
+use serde::Deserialize;
 
+pub use self::report::{ControlLevel, LandingSolved, PoweredReport, PoweredSettings};
+use self::situation::{Ahead, Flown, largest_tilt_rad};
+pub use self::situation::{Plane, PoweredSituation};
+use self::space::SpaceGuidance;
+pub use self::space::SpaceSettings;
+use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{FinalBox, SolverLimits};
 use crate::vehicle::rigid::RigidState;
-use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
-use nmpc::{Problem, SolveStatus};
 
 /// Longest and shortest horizons, intervals.
 const MOST_INTERVALS: usize = 60;
@@ -99,6 +85,11 @@ pub struct PoweredGuidance {
     unused: Flown,
     space: SpaceGuidance,
 }
+
+// The settings come from the mission. A search does not depend on the workspace. The trial solutions are cleared before
+// each solve and only keep their capacity, and so does what becomes the flown plan. (If a problem cannot be posed, the trial
+// keeps an older final time, which is reported but decides nothing.)
+remembers!(PoweredGuidance { plane, flown, report, space } but { settings, workspace, trial, set_aside, unused });
 
 impl PoweredGuidance {
     /// Guidance without a plan, whose plans in a plane need no more memory than it has, however long the motor burns.
@@ -397,5 +388,98 @@ impl PoweredGuidance {
             rate_in_world_rad_s: plane.turning(q_rad_s),
             acceleration_in_world_rad_s2: plane.turning(turning_rad_s2),
         }
+    }
+}
+
+// Chooses the landing point of a plan along its plane.
+
+/// Limits of the homing to the pad: a plan lands only as near as necessary, and diverts no farther than a moderate lean
+/// reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Homing {
+    /// Distance from the pad that counts as near enough, m.
+    pub near_m: f64,
+    /// Largest diversion of a plan, per squared second that is left, m/s^2.
+    pub reach_m_s2: f64,
+}
+
+impl Homing {
+    /// The landing point along the plane, m from the pad, at a velocity of `along_m_s` with `left_s` to go.
+    fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+        let free_m = here_m(x_m, along_m_s, left_s);
+        let reach_m = self.reach_m_s2 * left_s * left_s;
+        free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)
+    }
+}
+
+/// The landing point without homing, m from the pad: the end of a constant deceleration from `along_m_s` in `left_s`.
+/// It needs the smallest lean.
+pub(crate) fn here_m(x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+    x_m + 0.5 * along_m_s * left_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    use crate::vehicle::burn::Burn;
+    use crate::vehicles::mission::builtin;
+
+    // What the guidance flies when no plan is good.
+
+    /// mk2 in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3 m/s: it has to turn away more
+    /// thrust than it can without hovering.
+    fn too_high(high: bool) -> PoweredGuidance {
+        let mission = builtin("mk2").unwrap().unwrap();
+        let feet_below_cg_m = 0.44;
+        let situation = PoweredSituation {
+            burn: Burn::nominal(&mission.motor_curve),
+            burning_s: 2.5,
+            mass_at_ignition_kg: 3.1,
+            inertia_kg_m2: 0.12,
+            arm_m: 0.4,
+            feet_below_cg_m,
+            foot_radius_m: 0.4,
+            gravity_m_s2: 9.80665,
+            air_density_kg_m3: 1.2,
+            wind_m_s: Vector3::zeros(),
+            body_drag_area_m2: 0.003,
+            crossflow_area_m2: 0.062,
+            fin_drag_area_m2: 0.0,
+            gimbal_limit_rad: 5.0_f64.to_radians(),
+            lands_here: false,
+            high,
+        };
+        let state = RigidState {
+            velocity_m_s: Vector3::new(3.0, 0.0, -5.0),
+            world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -0.07)
+                * RigidState::upright(0.0).world_from_body,
+            ..RigidState::upright(7.0 + feet_below_cg_m)
+        };
+        let mut guidance = PoweredGuidance::new(mission.powered);
+        guidance.plan(0.0, &state, &situation, None);
+        guidance
+    }
+
+    #[test]
+    fn a_vehicle_that_is_high_flies_a_hard_plan_and_does_not_brake_upright() {
+        let low = too_high(false);
+        assert!(low.report().touchdown.u_m_s < HARD_M_S, "{:?}", low.report());
+        assert_eq!(low.report().level, ControlLevel::Stabiliser);
+
+        let high = too_high(true);
+        assert_eq!(high.report().level, ControlLevel::BestFeasible, "{:?}", high.report());
+        assert!(high.report().largest_tilt_rad > 45.0_f64.to_radians(), "{:?}", high.report());
+    }
+
+    #[test]
+    fn a_plan_diverts_to_the_edge_of_the_pad_within_its_reach() {
+        let homing = Homing { near_m: 6.0, reach_m_s2: 0.5 };
+        assert!((homing.target_m(4.0, 0.0, 4.0) - 4.0).abs() < 1e-12, "near enough");
+        assert!((homing.target_m(10.0, 0.0, 4.0) - 6.0).abs() < 1e-12, "to the edge");
+        assert!((homing.target_m(-50.0, 0.0, 4.0) + 42.0).abs() < 1e-12, "8 m are in reach in 4 s");
+        assert!((homing.target_m(10.0, -4.0, 4.0) - 2.0).abs() < 1e-12, "braking evenly ends there");
     }
 }

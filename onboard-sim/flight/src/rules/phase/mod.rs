@@ -6,18 +6,16 @@
 //! it.
 
 mod event;
-mod hold;
-mod latch;
-mod motor;
+#[cfg(test)]
+mod tests;
 mod transition;
 
-pub use crate::vehicle::mission::StartPoint;
-pub use event::{Effect, Effects, Event, Refusal};
-pub use hold::{HOLD_LIMIT_S, Hold, HoldCause, LAST_HOLD_S, UPLINK_SILENT_S};
-pub use latch::Latch;
-pub use motor::{MISFIRE_WAIT_S, MOTOR_HOT_S, Motor, MotorStatus};
 use serde::{Deserialize, Serialize};
-pub use transition::{Transition, transition};
+
+pub use self::event::{Effect, Effects, Event, Refusal};
+pub use self::transition::{Transition, transition};
+use crate::computer::memory::{Memory, Remembers, remembers};
+pub use crate::vehicle::mission::StartPoint;
 
 /// How long nobody may approach the pad after an abort there, s.
 pub const PAD_ABORT_WAIT_S: f64 = 60.0;
@@ -148,6 +146,15 @@ pub struct Interlocks {
     pub lands_here: bool,
 }
 
+remembers!(Interlocks {
+    pin_out,
+    armed,
+    landing_motor_inhibited,
+    abort_latched,
+    no_light_latched,
+    lands_here
+});
+
 /// Phase, latches, countdown and motor: the whole state of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
@@ -163,6 +170,17 @@ pub struct Mode {
     pub hold: Option<Hold>,
     /// The state of the landing motor.
     pub motor: Motor,
+}
+
+impl Remembers for Mode {
+    fn remember(&self, memory: &mut Memory) {
+        let Self { phase, interlocks, entered_at_s, countdown_end_s, hold, motor } = self;
+        phase.index().remember(memory);
+        interlocks.remember(memory);
+        (*entered_at_s, *countdown_end_s).remember(memory);
+        hold.remember(memory);
+        motor.remember(memory);
+    }
 }
 
 impl Mode {
@@ -208,5 +226,205 @@ impl Mode {
     }
 }
 
-#[cfg(test)]
-mod tests;
+// The hold of a countdown.
+
+/// The station that armed the vehicle counts as silent when no frame of it was accepted for this long, s.
+pub const UPLINK_SILENT_S: f64 = 2.0;
+
+/// A held vehicle disarms after this long without a new start, s.
+pub const HOLD_LIMIT_S: f64 = 60.0;
+
+/// So long before the release, s, and later nothing holds the countdown any more: a hold that comes as late as the release
+/// itself must not leave the crew in doubt whether the motor lights. An abort and a disarm still end it.
+pub const LAST_HOLD_S: f64 = 2.0;
+
+/// Why a countdown was held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum HoldCause {
+    /// No frame of the station that armed the vehicle was accepted for [`UPLINK_SILENT_S`].
+    UplinkSilent = 1,
+    /// A station asked for a hold.
+    Commanded = 2,
+    /// Whoever confirmed the start has not tapped in time.
+    TapOverdue = 3,
+}
+
+impl Remembers for HoldCause {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Hold {
+    pub cause: HoldCause,
+    /// When the countdown was held, vehicle time, s.
+    pub at_s: f64,
+}
+
+remembers!(Hold { cause, at_s });
+
+impl StartPoint {
+    /// From when on nothing holds, s before the release. `None` below a drone: its pilot lets go at no set time after the
+    /// countdown, so a hold comes in time until then.
+    pub fn last_hold_s(self) -> Option<f64> {
+        (self != Self::Drone).then_some(LAST_HOLD_S)
+    }
+}
+
+impl Mode {
+    /// Whether a countdown runs that may still be held.
+    pub fn may_hold(&self, start: StartPoint, time_s: f64) -> bool {
+        let in_time = |end_s: f64| start.last_hold_s().is_none_or(|last_s| end_s - time_s > last_s);
+        self.countdown_end_s.is_some_and(in_time)
+    }
+
+    /// Why the last countdown was held, and the time left until the vehicle disarms, s; `None` unless it is held.
+    pub fn held(&self, time_s: f64) -> Option<(HoldCause, f64)> {
+        let hold = self.hold.filter(|_| self.phase == Phase::PadArmed)?;
+        Some((hold.cause, (hold.at_s + HOLD_LIMIT_S - time_s).max(0.0)))
+    }
+}
+
+// Why the landing motor is inhibited for good.
+
+/// What has latched an abort, or the inhibition of a landing motor that gave no thrust.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum Latch {
+    /// An abort of the crew.
+    Commanded = 1,
+    /// The vehicle lifted off although nobody had armed it.
+    UncommandedLiftOff = 2,
+    /// It was released although nobody had cleared the release.
+    UncommandedRelease = 3,
+    /// The booster stayed on.
+    NoSeparation = 4,
+    /// The ignition gate did not open in time.
+    Gate = 5,
+    /// The landing motor was commanded to light and gave no thrust.
+    NoLight = 6,
+    /// The ascent motor did not lift the vehicle off.
+    Other = 7,
+}
+
+impl Latch {
+    /// What an accepted event has latched; `None` if it has latched nothing.
+    pub fn of(event: &Event, before: Interlocks, after: Interlocks) -> Option<Self> {
+        let latches = |of: fn(&Interlocks) -> bool| of(&after) && !of(&before);
+        if !(latches(|locks| locks.abort_latched) || latches(|locks| locks.no_light_latched)) {
+            return None;
+        }
+        Some(match event {
+            Event::AbortRequested { .. } => Self::Commanded,
+            Event::LiftOff => Self::UncommandedLiftOff,
+            Event::ReleasedEarly { .. } => Self::UncommandedRelease,
+            Event::Apogee { .. } => Self::NoSeparation,
+            Event::GateShutForGood { .. } => Self::Gate,
+            Event::NoThrustTimeout => Self::NoLight,
+            _ => Self::Other,
+        })
+    }
+}
+
+// The state of the landing motor, for a person who approaches the vehicle.
+//
+// A motor that was not lit stays dangerous on the ground: only software keeps it from lighting, and after an ignition
+// command it may light late. A burnt motor is hot. The vehicle is not SAFED in either case.
+
+/// How long nobody may approach a motor that was not lit or did not light on command, s. The safety codes of the
+/// National Association of Rocketry ask for 60 s after the last launch attempt. Here the time counts from the
+/// touchdown, because that was the last shock to the igniter line.
+pub const MISFIRE_WAIT_S: f64 = 60.0;
+
+/// How long a burnt motor counts as hot, s. The value was chosen, not measured. It equals the misfire wait, so that a
+/// crew has to remember only one number.
+pub const MOTOR_HOT_S: f64 = 60.0;
+
+/// The state of the landing motor.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub enum Motor {
+    /// Never commanded to light.
+    #[default]
+    Unlit,
+    /// Commanded to light; its thrust is not confirmed yet.
+    Commanded,
+    /// Its thrust is confirmed.
+    Burning,
+    /// Burnt out at this vehicle time, s.
+    BurntOut { at_s: f64 },
+}
+
+/// The motor's state for a person near the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MotorStatus {
+    /// Not lit, and the pin is in: the igniter line is cut by hand.
+    PinIn,
+    /// Not lit, and only software keeps it from lighting.
+    Live,
+    /// Commanded to light, or burning.
+    Burning,
+    /// Burnt out and hot.
+    Hot,
+    /// Burnt out and cooled.
+    Burnt,
+}
+
+impl Remembers for MotorStatus {
+    fn remember(&self, memory: &mut Memory) {
+        (*self as u8).remember(memory);
+    }
+}
+
+impl Mode {
+    /// The motor's status at a vehicle time.
+    pub fn motor_status(&self, time_s: f64) -> MotorStatus {
+        // After "no light", and on the ground, the command no longer means that the motor burns; it may still light
+        // late.
+        let expected = self.phase == Phase::Ignition && !self.interlocks.no_light_latched;
+        match self.motor {
+            Motor::Burning => MotorStatus::Burning,
+            Motor::Commanded if expected => MotorStatus::Burning,
+            Motor::BurntOut { at_s } if time_s < at_s + MOTOR_HOT_S => MotorStatus::Hot,
+            Motor::BurntOut { .. } => MotorStatus::Burnt,
+            Motor::Unlit | Motor::Commanded if self.interlocks.pin_out => MotorStatus::Live,
+            Motor::Unlit | Motor::Commanded => MotorStatus::PinIn,
+        }
+    }
+
+    /// Time until the vehicle may be approached, s, 0 if it may be now; `None` while this is unknown: armed, in the
+    /// air, or with a burning motor.
+    pub fn approach_wait_s(&self, time_s: f64) -> Option<f64> {
+        let until = |end_s: f64| Some((end_s - time_s).max(0.0));
+        match (self.phase, self.motor_status(time_s)) {
+            (Phase::Safe | Phase::PadIdle, _) => Some(self.pad_wait_remaining_s(time_s).unwrap_or(0.0)),
+            // The vehicle is never SAFED before the wait is over.
+            (Phase::Safed, _) | (Phase::Touchdown, MotorStatus::Burnt) => Some(0.0),
+            (Phase::Touchdown, MotorStatus::Live | MotorStatus::PinIn) => {
+                until(self.entered_at_s + MISFIRE_WAIT_S)
+            }
+            (Phase::Touchdown, MotorStatus::Hot) => match self.motor {
+                Motor::BurntOut { at_s } => until(at_s + MOTOR_HOT_S),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Whether the vehicle on the ground may become SAFED.
+    ///
+    /// # Errors
+    /// Why its motor is still dangerous.
+    pub fn may_be_safed(&self, time_s: f64) -> Result<(), Refusal> {
+        match self.motor_status(time_s) {
+            MotorStatus::Live => Err(Refusal::MotorLive),
+            MotorStatus::Burning => Err(Refusal::MotorBurning),
+            MotorStatus::Hot => Err(Refusal::MotorHot),
+            // The pin was put in too soon: only time ends the danger of a late light, not the pin.
+            MotorStatus::PinIn if self.approach_wait_s(time_s) != Some(0.0) => Err(Refusal::MisfireWait),
+            MotorStatus::PinIn | MotorStatus::Burnt => Ok(()),
+        }
+    }
+}

@@ -353,7 +353,6 @@ fn each_way_to_an_inhibited_motor_has_its_cause() {
 }
 
 mod ground;
-mod holds;
 
 fn any_event() -> impl Strategy<Value = Event> {
     prop::sample::select(every_event())

@@ -1,0 +1,509 @@
+//! The vehicle as data: masses, shape, fins, gimbal, legs and parachute.
+//!
+//! Stations are heights above the nozzle exit of the upright vehicle, positive towards the nose. So the arm of the
+//! thrust is the station of the centre of gravity. The controller's model and the simulated truth use the same data.
+
+use alloc::string::String;
+use serde::Deserialize;
+
+use crate::vehicle::fins::FinModel;
+
+/// A vehicle.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Airframe {
+    /// Name of a built-in landing motor, or the text of its `.eng` or `.rse` file.
+    pub motor: String,
+    /// How the landing motor is lit. A single igniter if absent.
+    #[serde(default)]
+    pub igniter: Igniter,
+    /// Masses and their positions.
+    pub mass: Mass,
+    /// The fuselage.
+    pub body: Body,
+    pub fins: FinData,
+    /// The thrust-vectoring actuator.
+    pub gimbal: Gimbal,
+    pub legs: Legs,
+    /// The recovery parachute.
+    pub parachute: Parachute,
+}
+
+/// A value of an airframe is outside its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{key} is {found}; {required} is accepted")]
+pub struct BadValue {
+    pub key: &'static str,
+    pub found: f64,
+    pub required: &'static str,
+}
+
+impl Airframe {
+    /// Checks that every value is inside its range.
+    ///
+    /// # Errors
+    ///
+    /// [`BadValue`] names the first key with a wrong value.
+    pub fn validate(&self) -> Result<(), BadValue> {
+        validate(self)
+    }
+
+    /// The fins' aerodynamic model.
+    pub fn fin_model(&self) -> FinModel {
+        FinModel {
+            reference_area_m2: self.body.reference_area_m2,
+            drag_coefficient: self.fins.drag_coefficient,
+            lift_coefficient: self.fins.lift_coefficient,
+            length_m: self.fins.length_m,
+            body_diameter_m: self.body.diameter_m,
+        }
+    }
+
+    /// Drag area in a tail-first fall with all fins at one opening angle, m^2.
+    pub fn drag_area_m2(&self, opening_rad: f64) -> f64 {
+        self.body.reference_area_m2
+            * (self.body.axial_drag_coefficient + 4.0 * self.fins.drag_coefficient * libm::sin(opening_rad))
+    }
+
+    /// Drag area of the fins together at their opening angles, m^2.
+    pub fn fin_drag_area_m2(&self, openings_rad: &[f64; 4]) -> f64 {
+        let each_m2 = self.fins.drag_coefficient * self.body.reference_area_m2;
+        each_m2 * openings_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
+    }
+
+    /// Height of a station above the feet when upright, m.
+    pub fn above_feet_m(&self, station_m: f64) -> f64 {
+        station_m - self.legs.foot_station_m
+    }
+}
+
+// Mass, centre of gravity and inertia as the propellant burns.
+
+/// The mass properties at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassProperties {
+    pub mass_kg: f64,
+    /// Centre of gravity, m above the nozzle: also the arm of the thrust.
+    pub cg_station_m: f64,
+    /// Moment of inertia about the pitch or yaw axis through the centre of gravity, kg m^2.
+    pub pitch_inertia_kg_m2: f64,
+    /// Moment of inertia about the roll axis, kg m^2.
+    pub roll_inertia_kg_m2: f64,
+    /// Change of the pitch inertia per kilogram burnt, m^2; negative.
+    pub pitch_inertia_slope_m2: f64,
+}
+
+/// The vehicle without propellant, and the place of the propellant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassModel {
+    dry_mass_kg: f64,
+    dry_cg_station_m: f64,
+    dry_pitch_inertia_kg_m2: f64,
+    roll_inertia_kg_m2: f64,
+    propellant_mass_kg: f64,
+    propellant_station_m: f64,
+}
+
+impl MassModel {
+    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes).
+    pub fn new(mass: &Mass, propellant_mass_kg: f64) -> Self {
+        let dry_mass_kg = mass.loaded_kg - propellant_mass_kg;
+        let moment_kg_m = mass.loaded_kg * mass.loaded_cg_station_m;
+        let dry_cg_station_m = (moment_kg_m - propellant_mass_kg * mass.propellant_station_m) / dry_mass_kg;
+        let reduced_kg = dry_mass_kg * propellant_mass_kg / mass.loaded_kg;
+        let apart_m = dry_cg_station_m - mass.propellant_station_m;
+        Self {
+            dry_mass_kg,
+            dry_cg_station_m,
+            dry_pitch_inertia_kg_m2: mass.loaded_pitch_inertia_kg_m2 - reduced_kg * apart_m * apart_m,
+            roll_inertia_kg_m2: mass.roll_inertia_kg_m2,
+            propellant_mass_kg,
+            propellant_station_m: mass.propellant_station_m,
+        }
+    }
+
+    /// Mass without propellant, kg.
+    pub fn dry_mass_kg(&self) -> f64 {
+        self.dry_mass_kg
+    }
+
+    /// The same vehicle with all masses and inertias scaled.
+    #[must_use]
+    pub fn scaled(self, scale: f64) -> Self {
+        Self {
+            dry_mass_kg: self.dry_mass_kg * scale,
+            dry_pitch_inertia_kg_m2: self.dry_pitch_inertia_kg_m2 * scale,
+            roll_inertia_kg_m2: self.roll_inertia_kg_m2 * scale,
+            propellant_mass_kg: self.propellant_mass_kg * scale,
+            ..self
+        }
+    }
+
+    /// The mass properties after some propellant has burnt, kg (limited to between none and all).
+    pub fn at(&self, burnt_kg: f64) -> MassProperties {
+        let left_kg = self.propellant_mass_kg - burnt_kg.clamp(0.0, self.propellant_mass_kg);
+        let mass_kg = self.dry_mass_kg + left_kg;
+        let moment_kg_m = self.dry_mass_kg * self.dry_cg_station_m + left_kg * self.propellant_station_m;
+        let apart_m = self.dry_cg_station_m - self.propellant_station_m;
+        let dry_share = self.dry_mass_kg / mass_kg;
+        MassProperties {
+            mass_kg,
+            cg_station_m: moment_kg_m / mass_kg,
+            pitch_inertia_kg_m2: self.dry_pitch_inertia_kg_m2 + left_kg * dry_share * apart_m * apart_m,
+            roll_inertia_kg_m2: self.roll_inertia_kg_m2,
+            pitch_inertia_slope_m2: -dry_share * dry_share * apart_m * apart_m,
+        }
+    }
+}
+
+// The sections of an airframe, one struct each, with their accessors in SI and radians.
+
+/// How the landing motor is lit.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Igniter {
+    /// Scatter of the ignition delay, as a multiple of that of a single igniter. Two in parallel have about half of it.
+    pub scatter_scale: f64,
+}
+
+impl Default for Igniter {
+    /// A single igniter.
+    fn default() -> Self {
+        Self { scatter_scale: 1.0 }
+    }
+}
+
+/// Masses with the landing motor full, and the place of the propellant.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mass {
+    /// Mass with the landing motor full, kg.
+    pub loaded_kg: f64,
+    /// Centre of gravity with the landing motor full, m above the nozzle.
+    pub loaded_cg_station_m: f64,
+    /// Moment of inertia about the pitch or yaw axis through that centre of gravity, kg m^2.
+    pub loaded_pitch_inertia_kg_m2: f64,
+    /// Moment of inertia about the roll axis, kg m^2; the propellant's part is neglected.
+    pub roll_inertia_kg_m2: f64,
+    /// Middle of the propellant, m above the nozzle.
+    pub propellant_station_m: f64,
+}
+
+/// The fuselage: a cylinder from the nozzle to the nose.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Length from nozzle to nose, m.
+    pub length_m: f64,
+    pub diameter_m: f64,
+    /// Reference area of the axial drag coefficient and of the fins' coefficients, m^2.
+    pub reference_area_m2: f64,
+    /// Axial drag coefficient on the reference area.
+    pub axial_drag_coefficient: f64,
+    /// Crossflow drag coefficient on length times diameter.
+    pub crossflow_drag_coefficient: f64,
+}
+
+/// The four fins and their servos. Opening angle from the body: 0 closed, 90 degrees deployed.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FinData {
+    /// Position of the hinges, m above the nozzle.
+    pub station_m: f64,
+    /// Length of a fin, m (the paper's L_f).
+    pub length_m: f64,
+    /// Drag coefficient of an open fin on the body's reference area (Eq. 2).
+    pub drag_coefficient: f64,
+    /// Lift coefficient of an open fin on the body's reference area (Eq. 2).
+    pub lift_coefficient: f64,
+    /// Opening angle at the closed stop, degrees.
+    pub closed_deg: f64,
+    /// Opening angle at the open stop, degrees.
+    pub open_deg: f64,
+    /// Smallest opening angle used for control, degrees.
+    pub control_min_deg: f64,
+    /// The servo of each fin.
+    pub servo: Servo,
+}
+
+impl FinData {
+    /// Opening angle at the closed stop, rad.
+    pub fn closed_rad(&self) -> f64 {
+        self.closed_deg.to_radians()
+    }
+
+    /// Opening angle at the open stop, rad.
+    pub fn open_rad(&self) -> f64 {
+        self.open_deg.to_radians()
+    }
+
+    /// Smallest opening angle used for control, rad.
+    pub fn control_min_rad(&self) -> f64 {
+        self.control_min_deg.to_radians()
+    }
+}
+
+/// The thrust-vectoring actuator: two axes with the same servo.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gimbal {
+    /// Mechanical stop on either side, degrees.
+    pub limit_deg: f64,
+    /// The servo of each axis.
+    pub servo: Servo,
+}
+
+impl Gimbal {
+    /// Mechanical stop on either side, rad.
+    pub fn limit_rad(&self) -> f64 {
+        self.limit_deg.to_radians()
+    }
+}
+
+/// A servo: a pure delay, then a rate limit, then play between its horn and its load.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Servo {
+    /// Slew rate under load, degrees per second.
+    pub rate_deg_s: f64,
+    /// Delay between a command and the first motion, s.
+    pub delay_s: f64,
+    /// Total play (backlash) between horn and load, degrees.
+    pub slop_deg: f64,
+}
+
+impl Servo {
+    /// Slew rate under load, rad/s.
+    pub fn rate_rad_s(&self) -> f64 {
+        self.rate_deg_s.to_radians()
+    }
+
+    /// Total play between horn and load, rad.
+    pub fn slop_rad(&self) -> f64 {
+        self.slop_deg.to_radians()
+    }
+}
+
+/// Four legs, 90 degrees apart. Each has a spring and a damper along the vertical, and a foot with friction.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Legs {
+    /// Station of the feet, m above the nozzle; negative.
+    pub foot_station_m: f64,
+    /// Distance of each foot from the axis, m.
+    pub foot_radius_m: f64,
+    /// Stiffness of one leg, N/m.
+    pub stiffness_n_m: f64,
+    /// Damping of one leg, N s/m.
+    pub damping_n_s_m: f64,
+    /// Friction coefficient between foot and ground.
+    pub friction_coefficient: f64,
+}
+
+/// The recovery parachute, attached at the nose.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parachute {
+    /// Canopy area, m^2.
+    pub area_m2: f64,
+    /// Drag coefficient on the canopy area.
+    pub drag_coefficient: f64,
+    /// Time from the command until the lines are taut, s.
+    pub ejection_delay_s: f64,
+    /// Distance through the air from taut lines to the fully open canopy, m.
+    pub inflation_distance_m: f64,
+}
+
+// Range checks of an airframe: one line for each key.
+
+type Check = Result<(), BadValue>;
+
+/// Longest servo delay, s: the length of the simulation's delay line.
+const DELAY_MAX_S: f64 = 0.1;
+
+fn require(ok: bool, key: &'static str, found: f64, required: &'static str) -> Check {
+    if ok { Ok(()) } else { Err(BadValue { key, found, required }) }
+}
+
+fn positive(key: &'static str, value: f64) -> Check {
+    require(value.is_finite() && value > 0.0, key, value, "a finite number above 0")
+}
+
+fn not_negative(key: &'static str, value: f64) -> Check {
+    require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more,")
+}
+
+fn validate(airframe: &Airframe) -> Check {
+    igniter(airframe)?;
+    masses(airframe)?;
+    shape(airframe)?;
+    actuators(airframe)?;
+    recovery(airframe)
+}
+
+fn igniter(airframe: &Airframe) -> Check {
+    let scale = airframe.igniter.scatter_scale;
+    require((0.0..=3.0).contains(&scale), "igniter.scatter_scale", scale, "0 (no scatter) to 3")
+}
+
+fn masses(airframe: &Airframe) -> Check {
+    let mass = &airframe.mass;
+    positive("mass.loaded_kg", mass.loaded_kg)?;
+    positive("mass.loaded_cg_station_m", mass.loaded_cg_station_m)?;
+    positive("mass.loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2)?;
+    positive("mass.roll_inertia_kg_m2", mass.roll_inertia_kg_m2)?;
+    require(
+        (0.0..mass.loaded_cg_station_m).contains(&mass.propellant_station_m),
+        "mass.propellant_station_m",
+        mass.propellant_station_m,
+        "0 or more and below mass.loaded_cg_station_m",
+    )
+}
+
+fn shape(airframe: &Airframe) -> Check {
+    let (body, fins) = (&airframe.body, &airframe.fins);
+    positive("body.length_m", body.length_m)?;
+    positive("body.diameter_m", body.diameter_m)?;
+    positive("body.reference_area_m2", body.reference_area_m2)?;
+    not_negative("body.axial_drag_coefficient", body.axial_drag_coefficient)?;
+    not_negative("body.crossflow_drag_coefficient", body.crossflow_drag_coefficient)?;
+    require(
+        (0.0..=body.length_m).contains(&fins.station_m),
+        "fins.station_m",
+        fins.station_m,
+        "0 (the nozzle) to body.length_m",
+    )?;
+    positive("fins.length_m", fins.length_m)?;
+    not_negative("fins.drag_coefficient", fins.drag_coefficient)?;
+    not_negative("fins.lift_coefficient", fins.lift_coefficient)
+}
+
+fn actuators(airframe: &Airframe) -> Check {
+    let (fins, gimbal) = (&airframe.fins, &airframe.gimbal);
+    for (key, value_deg) in [
+        ("fins.closed_deg", fins.closed_deg),
+        ("fins.open_deg", fins.open_deg),
+        ("fins.control_min_deg", fins.control_min_deg),
+    ] {
+        require((0.0..=90.0).contains(&value_deg), key, value_deg, "0 (closed) to 90 (open)")?;
+    }
+    require(
+        fins.closed_deg <= fins.control_min_deg && fins.control_min_deg < fins.open_deg,
+        "fins.control_min_deg",
+        fins.control_min_deg,
+        "fins.closed_deg or more and below fins.open_deg",
+    )?;
+    require(
+        gimbal.limit_deg > 0.0 && gimbal.limit_deg < 90.0,
+        "gimbal.limit_deg",
+        gimbal.limit_deg,
+        "above 0 and below 90",
+    )?;
+    servo(&fins.servo, ["fins.servo.rate_deg_s", "fins.servo.delay_s", "fins.servo.slop_deg"])?;
+    servo(&gimbal.servo, ["gimbal.servo.rate_deg_s", "gimbal.servo.delay_s", "gimbal.servo.slop_deg"])
+}
+
+fn servo(servo: &Servo, [rate, delay, slop]: [&'static str; 3]) -> Check {
+    positive(rate, servo.rate_deg_s)?;
+    require((0.0..=DELAY_MAX_S).contains(&servo.delay_s), delay, servo.delay_s, "0 to 0.1")?;
+    require((0.0..10.0).contains(&servo.slop_deg), slop, servo.slop_deg, "0 or more and below 10")
+}
+
+fn recovery(airframe: &Airframe) -> Check {
+    let (legs, parachute) = (&airframe.legs, &airframe.parachute);
+    require(
+        legs.foot_station_m.is_finite() && legs.foot_station_m < 0.0,
+        "legs.foot_station_m",
+        legs.foot_station_m,
+        "a finite number below 0 (under the nozzle)",
+    )?;
+    positive("legs.foot_radius_m", legs.foot_radius_m)?;
+    positive("legs.stiffness_n_m", legs.stiffness_n_m)?;
+    not_negative("legs.damping_n_s_m", legs.damping_n_s_m)?;
+    not_negative("legs.friction_coefficient", legs.friction_coefficient)?;
+    positive("parachute.area_m2", parachute.area_m2)?;
+    positive("parachute.drag_coefficient", parachute.drag_coefficient)?;
+    not_negative("parachute.ejection_delay_s", parachute.ejection_delay_s)?;
+    positive("parachute.inflation_distance_m", parachute.inflation_distance_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicles::motors;
+
+    #[test]
+    fn every_builtin_airframe_is_sound_and_has_its_motor() {
+        for name in crate::vehicles::airframe::builtin_names() {
+            let airframe = crate::vehicles::airframe::builtin(name).unwrap();
+            let motor = motors::builtin(&airframe.motor).unwrap();
+            let propellant_kg = motor.propellant_mass_kg();
+            let model = MassModel::new(&airframe.mass, propellant_kg);
+            let (full, empty) = (model.at(0.0), model.at(propellant_kg));
+            assert!(empty.pitch_inertia_kg_m2 > 0.0 && empty.pitch_inertia_kg_m2 < full.pitch_inertia_kg_m2);
+            // A vehicle that falls for long is turned by its fins; one that is dropped must not be.
+            let turned_by_fins = !name.starts_with("vlr");
+            assert!(empty.cg_station_m > full.cg_station_m, "{name}");
+            assert!(!turned_by_fins || empty.cg_station_m < airframe.fins.station_m, "{name}");
+            // The propellant burns in the middle of the motor.
+            assert!((airframe.mass.propellant_station_m - motor.length_m() / 2.0).abs() < 1e-3, "{name}");
+        }
+    }
+
+    /// The terminal speed with open fins is the landing paper's 39.4 m/s at 3 kg and sea level.
+    #[test]
+    fn val_landing_paper_terminal_speed_with_open_fins() {
+        let airframe = crate::vehicles::airframe::builtin("mk2-h53").unwrap();
+        let area_m2 = airframe.drag_area_m2(core::f64::consts::FRAC_PI_2);
+        let speed_m_s = (2.0 * airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2)).sqrt();
+        assert!((speed_m_s - 39.4).abs() < 0.05, "{speed_m_s}");
+    }
+
+    #[test]
+    fn a_bad_value_is_named_in_the_error() {
+        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        airframe.gimbal.limit_deg = -3.0;
+        let error = airframe.validate().unwrap_err().to_string();
+        assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
+    }
+
+    #[test]
+    fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
+        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        assert_eq!(airframe.igniter, Igniter { scatter_scale: 1.0 });
+        for (scale, ok) in
+            [(0.0, true), (0.5, true), (3.0, true), (-0.1, false), (3.1, false), (f64::NAN, false)]
+        {
+            airframe.igniter.scatter_scale = scale;
+            let checked = airframe.validate();
+            assert_eq!(checked.is_ok(), ok, "{scale}");
+            assert!(ok || checked.unwrap_err().key == "igniter.scatter_scale");
+        }
+    }
+
+    /// A 2 kg vehicle at 1 m with 1 kg of propellant at 0.25 m, worked by hand.
+    #[test]
+    fn val_hand_parallel_axes() {
+        let loaded = Mass {
+            loaded_kg: 3.0,
+            loaded_cg_station_m: 0.75,
+            loaded_pitch_inertia_kg_m2: 0.5,
+            roll_inertia_kg_m2: 0.01,
+            propellant_station_m: 0.25,
+        };
+        let model = MassModel::new(&loaded, 1.0);
+        let full = model.at(0.0);
+        assert!((full.mass_kg - 3.0).abs() < 1e-15 && (full.cg_station_m - 0.75).abs() < 1e-15);
+        assert!((full.pitch_inertia_kg_m2 - 0.5).abs() < 1e-15);
+        let empty = model.at(1.0);
+        assert!((empty.mass_kg - 2.0).abs() < 1e-15 && (empty.cg_station_m - 1.0).abs() < 1e-15);
+        // 0.5 - 2 (0.25)^2 - 1 (0.5)^2
+        assert!((empty.pitch_inertia_kg_m2 - 0.125).abs() < 1e-15);
+        let half = model.at(0.5);
+        assert!((half.cg_station_m - 2.125 / 2.5).abs() < 1e-15);
+        // 0.125 + 2 (0.15)^2 + 0.5 (0.6)^2
+        assert!((half.pitch_inertia_kg_m2 - 0.35).abs() < 1e-15);
+        let slope = (model.at(0.5001).pitch_inertia_kg_m2 - model.at(0.4999).pitch_inertia_kg_m2) / 2e-4;
+        assert!((half.pitch_inertia_slope_m2 - slope).abs() < 1e-6);
+    }
+}

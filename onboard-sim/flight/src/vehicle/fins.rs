@@ -1,0 +1,331 @@
+//! The four fins of the landing paper: drag, lift and moments as functions of the opening angle (section 2, Eq. 1-17).
+//!
+//! Each fin is a quarter of the fuselage's skin, with its hinge near the nose; `kappa` is its opening angle, 0 closed
+//! against the body and pi/2 fully open. (Eq. 1 prints `pi - X_b . Y_f`, which is no angle.) Body axes are those of
+//! [`crate::vehicle::rigid`]: x to the nose, moments about x roll, y pitch, z yaw. Seen along the body, fin `i` is at
+//!
+//! ```text
+//! (y, z) = r (-YAW[i] cos 30 deg, PITCH[i] sin 30 deg),   r = (D + L_f sin kappa) / 2
+//! ```
+//!
+//! At this place a drag towards the nose has the moments of Eq. 16 and 17.
+//!
+//! Errors of the printed equations, and their corrections:
+//! * Eq. 3 and Eq. 13-14 each have a sine of kappa; it is one and the same, and the force goes as `sin kappa`.
+//! * Eq. 16 and 17 multiply the bracket by one force, but each fin has its own force, so the sum is taken fin by fin.
+//! * Eq. 15 sums four lift moments of one sign: four equal openings would spin the vehicle. The text's "chosen
+//!   symmetries" need neighbours that mirror each other, so the signs alternate ([`ROLL`]). The patterns of roll,
+//!   pitch, yaw and drag are then orthogonal, which is the decoupling that section 2.1 claims.
+
+use core::f64::consts::FRAC_PI_6;
+
+/// Signs of the fins' roll moments. The hinges are on the side where the side force of the lift acts with the drag in
+/// yaw, and against it, but more strongly, in pitch. With hinges on the other side the two would almost cancel in yaw.
+pub const ROLL: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
+/// Signs of the fins' pitch moments (Eq. 16).
+pub const PITCH: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
+/// Signs of the fins' yaw moments (Eq. 17).
+pub const YAW: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
+
+/// sin(pi/6).
+pub const SIN_30: f64 = 0.5;
+/// cos(pi/6).
+pub const COS_30: f64 = 0.866_025_403_784_438_6;
+
+/// Coefficients and size of the fins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FinModel {
+    /// Reference area of the coefficients (the paper's S_b), m^2.
+    pub reference_area_m2: f64,
+    /// Drag coefficient of an open fin (C_xf).
+    pub drag_coefficient: f64,
+    /// Lift coefficient of an open fin (C_zf).
+    pub lift_coefficient: f64,
+    /// Length of a fin (L_f), m.
+    pub length_m: f64,
+    /// Diameter of the body (D), m.
+    pub body_diameter_m: f64,
+}
+
+/// Moments about the body axes, N m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moments {
+    /// About x.
+    pub roll_n_m: f64,
+    /// About y.
+    pub pitch_n_m: f64,
+    /// About z.
+    pub yaw_n_m: f64,
+}
+
+/// The air's state at the fins: dynamic pressure, angle of attack and sideslip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flow {
+    /// `1/2 rho V^2`, Pa.
+    pub dynamic_pressure_pa: f64,
+    /// Angle of attack, rad.
+    pub alpha_rad: f64,
+    /// Sideslip, rad.
+    pub beta_rad: f64,
+}
+
+/// Angle of attack and sideslip seen by each fin, rad: Eq. 9-12.
+pub fn fin_incidence_rad(alpha_rad: f64, beta_rad: f64) -> [(f64, f64); 4] {
+    let (sin, cos) = libm::sincos(FRAC_PI_6);
+    [
+        (cos * alpha_rad - sin * beta_rad, sin * alpha_rad + cos * beta_rad),
+        (cos * alpha_rad + sin * beta_rad, -sin * alpha_rad + cos * beta_rad),
+        (-cos * alpha_rad + sin * beta_rad, -sin * alpha_rad - cos * beta_rad),
+        (-cos * alpha_rad - sin * beta_rad, sin * alpha_rad - cos * beta_rad),
+    ]
+}
+
+impl FinModel {
+    /// Drag of each fin, N: Eq. 13.
+    pub fn drag_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+        self.force_n(self.drag_coefficient, flow, kappa_rad)
+    }
+
+    /// Magnitude of the lift of each fin, N: Eq. 14.
+    pub fn lift_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+        self.force_n(self.lift_coefficient, flow, kappa_rad)
+    }
+
+    fn force_n(&self, coefficient: f64, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+        let incidence = fin_incidence_rad(flow.alpha_rad, flow.beta_rad);
+        let open_n = flow.dynamic_pressure_pa * self.reference_area_m2 * coefficient;
+        core::array::from_fn(|i| {
+            let (alpha, beta) = incidence[i];
+            open_n * libm::sin(kappa_rad[i]) * libm::cos(alpha) * libm::cos(beta)
+        })
+    }
+
+    /// Distance of a fin's force from the axis, m, from the sine of its opening angle.
+    pub fn radius_m(&self, sin_kappa: f64) -> f64 {
+        0.5 * (self.body_diameter_m + self.length_m * sin_kappa)
+    }
+
+    /// Moments of the drags and lifts about the axis: Eq. 15 with alternating signs, Eq. 16 and 17 fin by fin.
+    pub fn moments(&self, flow: &Flow, kappa_rad: [f64; 4]) -> Moments {
+        let (drag_n, lift_n) = (self.drag_n(flow, kappa_rad), self.lift_n(flow, kappa_rad));
+        let mut moments = Moments::default();
+        for i in 0..4 {
+            let radius_m = self.radius_m(libm::sin(kappa_rad[i]));
+            moments.roll_n_m += ROLL[i] * radius_m * lift_n[i];
+            moments.pitch_n_m += PITCH[i] * radius_m * SIN_30 * drag_n[i];
+            moments.yaw_n_m += YAW[i] * radius_m * COS_30 * drag_n[i];
+        }
+        moments
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::FRAC_PI_2;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+
+    /// The paper's fins: section 2.1 and Eq. 2.
+    fn model() -> FinModel {
+        FinModel {
+            reference_area_m2: 0.0043,
+            drag_coefficient: 1.55,
+            lift_coefficient: 1.28,
+            length_m: 0.10,
+            body_diameter_m: 0.074,
+        }
+    }
+
+    fn allocation() -> Allocation {
+        let range = OpeningRange { min_rad: 20.0_f64.to_radians(), max_rad: FRAC_PI_2 };
+        Allocation { model: model(), arm_m: 0.23, range }
+    }
+
+    fn along_the_axis(dynamic_pressure_pa: f64) -> Flow {
+        Flow { dynamic_pressure_pa, alpha_rad: 0.0, beta_rad: 0.0 }
+    }
+
+    fn close(found: f64, expected: f64, what: &str) {
+        assert!(
+            (found - expected).abs() <= 1e-9 * expected.abs().max(1.0),
+            "{what}: {found}, expected {expected}"
+        );
+    }
+
+    /// Eq. 9-12 for alpha 0.2, beta 0.1, worked by hand: 0.2 cos 30 = 0.1732051, 0.1 sin 30 = 0.05, and so on.
+    #[test]
+    fn val_hand_fin_incidence() {
+        let expected = [
+            (0.123_205_080_756_887_7, 0.186_602_540_378_443_9),
+            (0.223_205_080_756_887_7, -0.013_397_459_621_556_1),
+            (-0.123_205_080_756_887_7, -0.186_602_540_378_443_9),
+            (-0.223_205_080_756_887_7, 0.013_397_459_621_556_1),
+        ];
+        for (found, expected) in fin_incidence_rad(0.2, 0.1).into_iter().zip(expected) {
+            assert!(
+                (found.0 - expected.0).abs() < 1e-15 && (found.1 - expected.1).abs() < 1e-15,
+                "{found:?}"
+            );
+        }
+    }
+
+    /// At 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and 5.504 N of lift; half of each at 30 degrees.
+    #[test]
+    fn val_hand_drag_and_lift() {
+        let flow = along_the_axis(1000.0);
+        let kappa_rad = [FRAC_PI_2, core::f64::consts::FRAC_PI_6, 0.0, FRAC_PI_2];
+        for (found, expected) in model().drag_n(&flow, kappa_rad).into_iter().zip([6.665, 3.3325, 0.0, 6.665])
+        {
+            close(found, expected, "drag");
+        }
+        for (found, expected) in model().lift_n(&flow, kappa_rad).into_iter().zip([5.504, 2.752, 0.0, 5.504])
+        {
+            close(found, expected, "lift");
+        }
+        // cos(60 deg) of incidence on fin 1 halves it: alpha cos 30 - beta sin 30 = pi/3, and the other is zero.
+        let alpha_rad = core::f64::consts::FRAC_PI_3 * COS_30;
+        let beta_rad = -core::f64::consts::FRAC_PI_3 * SIN_30;
+        let oblique = Flow { alpha_rad, beta_rad, dynamic_pressure_pa: 1000.0 };
+        close(model().drag_n(&oblique, kappa_rad)[0], 3.3325, "oblique drag");
+    }
+
+    /// One open fin at 1,000 Pa, radius (0.074 + 0.1)/2 = 0.087 m: roll 0.087 x 5.504, pitch 0.087 x 0.5 x 6.665, yaw
+    /// 0.087 x 0.8660254 x 6.665.
+    #[test]
+    fn val_hand_moments_of_one_fin() {
+        let flow = along_the_axis(1000.0);
+        for i in 0..4 {
+            let mut kappa_rad = [0.0; 4];
+            kappa_rad[i] = FRAC_PI_2;
+            let moments = model().moments(&flow, kappa_rad);
+            close(moments.roll_n_m, ROLL[i] * 0.478_848, "roll");
+            close(moments.pitch_n_m, PITCH[i] * 0.289_927_5, "pitch");
+            close(moments.yaw_n_m, YAW[i] * 0.502_169_160_532, "yaw");
+        }
+    }
+
+    /// The paper's decoupling: equal openings give no moment, and each pattern gives a moment about its own axis.
+    #[test]
+    fn patterns_are_decoupled() {
+        let flow = along_the_axis(800.0);
+        let at = |amplitude: f64, signs: [f64; 4]| {
+            let kappa_rad = signs.map(|sign| libm::asin(0.6 + sign * amplitude));
+            (model().moments(&flow, kappa_rad), allocation().moments(800.0, kappa_rad))
+        };
+        for (signs, axis) in [(ROLL, 0), (PITCH, 1), (YAW, 2)] {
+            for moments in [at(0.2, signs).0, at(0.2, signs).1] {
+                let found = [moments.roll_n_m, moments.pitch_n_m, moments.yaw_n_m];
+                for (other, value) in found.into_iter().enumerate() {
+                    assert_eq!(value.abs() > 1e-3, other == axis, "pattern {axis}: {found:?}");
+                }
+            }
+            for moments in [at(0.0, signs).0, at(0.0, signs).1] {
+                assert!(moments.roll_n_m.abs() + moments.pitch_n_m.abs() + moments.yaw_n_m.abs() < 1e-12);
+            }
+        }
+    }
+
+    /// Without an arm the side forces give no moment, and the allocation's moments are those of Eq. 15-17.
+    #[test]
+    fn without_an_arm_the_allocation_matches_the_paper() {
+        let flow = along_the_axis(800.0);
+        let kappa_rad = [0.5, 0.9, 1.3, 0.7];
+        let printed = model().moments(&flow, kappa_rad);
+        let found = Allocation { arm_m: 0.0, ..allocation() }.moments(800.0, kappa_rad);
+        close(found.roll_n_m, printed.roll_n_m, "roll");
+        close(found.pitch_n_m, printed.pitch_n_m, "pitch");
+        close(found.yaw_n_m, printed.yaw_n_m, "yaw");
+    }
+
+    #[test]
+    fn without_air_or_with_a_bad_command_the_fins_open() {
+        let command = FinCommand { moments: Moments::default(), drag_area_m2: 0.01 };
+        let nonsense = FinCommand { drag_area_m2: f64::NAN, ..command };
+        for (command, pressure_pa) in
+            [(command, 0.0), (command, f64::NAN), (nonsense, 900.0), (command, -3.0)]
+        {
+            for kappa_rad in allocation().openings_rad(&command, pressure_pa) {
+                close(kappa_rad, FRAC_PI_2, "open");
+            }
+        }
+    }
+
+    #[test]
+    fn pitch_has_priority_over_roll_and_drag() {
+        let allocation = allocation();
+        let moments = Moments { roll_n_m: 5.0, pitch_n_m: 40.0, yaw_n_m: 0.0 };
+        let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2: 0.0 }, 900.0);
+        let closed_rad = 20.0_f64.to_radians();
+        for (found_rad, expected_rad) in
+            kappa_rad.into_iter().zip([closed_rad, FRAC_PI_2, FRAC_PI_2, closed_rad])
+        {
+            close(found_rad, expected_rad, "opening");
+        }
+    }
+
+    /// The moment of a tilt far beyond the fins' ability keeps its direction, within a degree.
+    #[test]
+    fn a_tilt_that_saturates_keeps_its_direction() {
+        let allocation = allocation();
+        for wanted_n_m in [1.0, 10.0, 1000.0] {
+            for step in 0..36 {
+                let (sin, cos) = libm::sincos(f64::from(step) * core::f64::consts::TAU / 36.0);
+                let moments =
+                    Moments { roll_n_m: 0.0, pitch_n_m: wanted_n_m * cos, yaw_n_m: wanted_n_m * sin };
+                for drag_area_m2 in [0.0, 0.015, 1.0] {
+                    let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2 }, 900.0);
+                    let Moments { pitch_n_m, yaw_n_m, .. } = allocation.moments(900.0, kappa_rad);
+                    let (along, across) = (cos * pitch_n_m + sin * yaw_n_m, cos * yaw_n_m - sin * pitch_n_m);
+                    assert!(
+                        along > 0.25 && across.abs() < 0.017 * along,
+                        "{moments:?}: {pitch_n_m}, {yaw_n_m}"
+                    );
+                }
+            }
+        }
+    }
+
+    proptest! {
+        /// For any command the fins stay between their stops.
+        #[test]
+        fn openings_stay_in_range(
+            roll_n_m in proptest::num::f64::ANY,
+            pitch_n_m in proptest::num::f64::ANY,
+            yaw_n_m in proptest::num::f64::ANY,
+            drag_area_m2 in proptest::num::f64::ANY,
+            dynamic_pressure_pa in proptest::num::f64::ANY,
+        ) {
+            let command = FinCommand { moments: Moments { roll_n_m, pitch_n_m, yaw_n_m }, drag_area_m2 };
+            let allocation = allocation();
+            for kappa_rad in allocation.openings_rad(&command, dynamic_pressure_pa) {
+                prop_assert!((allocation.range.min_rad..=allocation.range.max_rad).contains(&kappa_rad), "{kappa_rad}");
+            }
+        }
+
+        /// A command that fits between the stops is met exactly: the allocation is the inverse of the model.
+        #[test]
+        fn what_fits_is_given(
+            mean in 0.6..0.8_f64,
+            roll in -0.06..0.06_f64,
+            pitch in -0.06..0.06_f64,
+            yaw in -0.06..0.06_f64,
+            dynamic_pressure_pa in 100.0..1500.0_f64,
+        ) {
+            let allocation = allocation();
+            let kappa_rad: [f64; 4] = core::array::from_fn(|i| {
+                libm::asin(mean + roll * ROLL[i] + pitch * PITCH[i] + yaw * YAW[i])
+            });
+            let command = FinCommand {
+                moments: allocation.moments(dynamic_pressure_pa, kappa_rad),
+                drag_area_m2: allocation.drag_area_m2(kappa_rad),
+            };
+            let found_rad = allocation.openings_rad(&command, dynamic_pressure_pa);
+            for (found, expected) in found_rad.into_iter().zip(kappa_rad) {
+                prop_assert!((found - expected).abs() < 1e-6, "{found_rad:?}, wanted {kappa_rad:?}");
+            }
+        }
+    }
+}
