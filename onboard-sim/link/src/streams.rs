@@ -1,8 +1,10 @@
-//! The messages that are sent periodically, and their rates.
+//! The messages that are sent periodically, and their rates; and the values of a check on the pad, one after the other.
 
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+
+use flight::computer::pad_check::CheckState;
 use mavlink_core::MessageData;
 use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA,
@@ -16,6 +18,9 @@ use protocol::dialect::{
 use protocol::frame::SIGNATURE_LEN;
 use protocol::hub::line::SHARE;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
+
+use crate::telemetry;
+use crate::vehicle::Vehicle;
 
 /// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so
 /// that no second on the wire carries more.
@@ -461,4 +466,58 @@ impl Streams {
 /// Whether the message is vital: it never waits for other messages.
 fn is_vital(message_id: u32) -> bool {
     matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
+}
+
+// Tells the stations what the check on the pad finds: one value after the other, again and again.
+//
+// The values are requested messages, after all telemetry: on the pad there is room for them within a radio's budget.
+
+/// While a check runs, and until every value has been told twice after it, a value is told each so many seconds: 250 B/s
+/// when signed.
+const OFTEN_S: f64 = 0.2;
+/// Later: for a station that comes late.
+const SELDOM_S: f64 = 1.0;
+
+/// Whose turn it is.
+#[derive(Debug, Default)]
+pub(super) struct CheckTeller {
+    told: Option<(u16, CheckState)>,
+    place: usize,
+    /// How often every value has been told since the check changed.
+    rounds: u32,
+    due_s: f64,
+    /// How many values had been found when the last one was told.
+    found: usize,
+}
+
+impl CheckTeller {
+    /// The message to send now.
+    pub(super) fn due(&mut self, vehicle: &dyn Vehicle, now_s: f64) -> Option<MavMessage> {
+        let check = vehicle.computer().pad_check();
+        let mode = vehicle.mode();
+        let now = (check.run(), check.state());
+        if check.state() == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
+            return None;
+        }
+        let found = check.findings().len();
+        if self.told != Some(now) {
+            // At once: a new check, or its end.
+            (self.told, self.rounds, self.due_s) = (Some(now), 0, now_s);
+        }
+        if now_s < self.due_s {
+            return None;
+        }
+        // New values first.
+        if found > self.found {
+            self.place = self.found;
+        } else if self.place >= found {
+            (self.place, self.rounds) = (0, self.rounds.saturating_add(1));
+        }
+        let place = self.place;
+        self.place += 1;
+        self.found = if found > self.found { place + 1 } else { found };
+        let often = check.is_running() || self.rounds < 2;
+        self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
+        Some(telemetry::pad_check(check, place, vehicle.time_s()))
+    }
 }

@@ -1,10 +1,11 @@
-//! Everything of a flight but its flight computer: the world, the sensors that look at it, and the actuators that move it.
+//! Everything of a flight but its flight computer: the world and how it begins, the sensors that look at it, and the
+//! actuators that move it.
 
 use flight::computer::pilot::Sensed;
 use flight::computer::{Commands, FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
+use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
 use world::{Actuators, Battery, World};
@@ -12,7 +13,7 @@ use world::{Actuators, Battery, World};
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;
 use crate::outcome::{Ending, Outcome, judge};
-use crate::sortie::{LONGEST_S, SetUpError, errors, start};
+use crate::sortie::{LONGEST_S, SetUpError, known};
 
 /// The world of one flight, and what is between it and its flight computer.
 #[derive(Debug, Clone)]
@@ -35,7 +36,7 @@ impl Surroundings {
         dispersion: &Dispersion,
         drawn: &Draw,
     ) -> Result<(Self, RigidState), SetUpError> {
-        let world = start::world(mission, drawn)?;
+        let world = world(mission, drawn)?;
         let (sensors, believed) = if dispersion.sensors {
             let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
             let uncertainty = StartUncertainty::at_start(mission.start.at);
@@ -43,7 +44,7 @@ impl Surroundings {
         } else {
             (None, *world.state())
         };
-        let actuators = start::at_rest(mission);
+        let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
         Ok((Self { world, sensors, faults, actuators, battery, measured: None, finite: true }, believed))
@@ -52,13 +53,13 @@ impl Surroundings {
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
     /// would have found any error.
     pub(crate) fn begin(&mut self, mission: &Mission, dispersion: &Dispersion, drawn: &Draw) {
-        if let Ok(world) = start::world(mission, drawn) {
+        if let Ok(world) = world(mission, drawn) {
             self.world = world;
         }
         if dispersion.sensors {
             self.sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0).ok();
         }
-        self.actuators = start::at_rest(mission);
+        self.actuators = at_rest(mission);
     }
 
     /// The world moves for one frame, and the sensors measure it.
@@ -74,7 +75,7 @@ impl Surroundings {
             [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
         self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
         self.measured = measured;
-        measured.map_or_else(|| Sensed::Known(errors::known(&self.world)), Sensed::Measured)
+        measured.map_or_else(|| Sensed::Known(known(&self.world)), Sensed::Measured)
     }
 
     /// What feedback and switches say after the frame; `released`: contact counts.
@@ -144,4 +145,45 @@ pub(crate) struct Feedback {
 pub(crate) fn surfaces_rad(world: &World) -> [f64; 6] {
     let ([pitch, yaw], [one, two, three, four]) = (world.gimbal_feedback_rad(), world.fins_feedback_rad());
     [pitch, yaw, one, two, three, four]
+}
+
+// The world in which a flight begins.
+
+/// Frames that a hanging vehicle falls until its computer knows.
+const UNNOTICED_FRAMES: usize = 20;
+
+/// The world at the start of the flight.
+pub(crate) fn world(mission: &Mission, drawn: &Draw) -> Result<World, SetUpError> {
+    let world = world_at(mission, drawn, &drawn.apogee)?;
+    Ok(match (mission.start.at, &mission.launch) {
+        (StartPoint::Pad, Some(launch)) => world.on_rail(launch, &drawn.ascent),
+        _ => world,
+    })
+}
+
+/// A world with the vehicle in a state.
+pub(crate) fn world_at(mission: &Mission, drawn: &Draw, state: &RigidState) -> Result<World, SetUpError> {
+    let Draw { truth, flight_seed, .. } = drawn;
+    Ok(World::new(&mission.airframe, &mission.motor_curve, truth, state, *flight_seed)?)
+}
+
+/// The draw with the state in which the fall begins.
+pub(crate) fn falling_as(mission: &Mission, drawn: &Draw) -> Result<Draw, SetUpError> {
+    Ok(Draw { apogee: falling(mission, drawn)?, ..*drawn })
+}
+
+/// The state in which the fall begins.
+fn falling(mission: &Mission, drawn: &Draw) -> Result<RigidState, SetUpError> {
+    let (StartPoint::Drone, Some(hanging)) = (mission.start.at, &drawn.hanging) else {
+        return Ok(drawn.apogee);
+    };
+    let (let_go, _) = hanging.at(0.0);
+    let mut world = world_at(mission, drawn, &let_go)?;
+    world.advance(&at_rest(mission), UNNOTICED_FRAMES * FRAME_MS as usize);
+    Ok(*world.state())
+}
+
+/// Every fin closed, and no current.
+pub(crate) fn at_rest(mission: &Mission) -> Actuators {
+    Actuators { fins_rad: [mission.airframe.fins.closed_rad(); 4], ..Actuators::NONE }
 }

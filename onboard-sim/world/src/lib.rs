@@ -5,41 +5,37 @@
 //! [`flight::vehicle::rigid`].
 //!
 //! * [`world`]: all parts together, one millisecond at a time.
-//! * `body`, `aero`, `motor`, `servo`, `linkage`, `parachute`, [`ground`]: the parts, one model each.
+//! * `body`, `aero`, `motor`, `servo`, [`ground`]: the parts, one model each; the parachute is in `aero`.
 //! * `battery`: its voltage under what the vehicle draws.
-//! * `stack`: the vehicle on its booster, on the way up; [`hanging`]: below a drone.
+//! * [`hanging`]: the vehicle below a drone; on its booster it is a part of [`world`].
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`vertical`]: the true vehicle's forces in a vertical fall through still air, for bounds on what is possible.
 //! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
-//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data.
-//! * [`fault`]: what can break in flight.
+//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data, and what can break.
 
 mod aero;
 pub mod balance;
 mod battery;
 mod body;
-pub mod fault;
 pub mod ground;
 pub mod hanging;
-mod linkage;
 mod motor;
-mod parachute;
 pub mod sensors;
 mod servo;
-mod stack;
 pub mod truth;
 pub mod vertical;
 pub mod wind;
 pub mod world;
 
 pub use battery::Battery;
-pub use fault::Fault;
 pub use ground::{Rest, RestOutcome, Touchdown};
 pub use hanging::Hanging;
 pub use motor::TrueBurn;
 pub use truth::{AscentTruth, Truth};
 pub use world::{Actuators, World};
+
+pub use crate::truth::Fault;
 
 /// Length of one step, s.
 pub const STEP_S: f64 = 1e-3;

@@ -6,8 +6,7 @@ use core::f64::consts::PI;
 
 use flight::vehicle::thrust_curve::ThrustCurve;
 
-use crate::fault::Fault;
-use crate::truth::{SHAPE_TERMS, Truth};
+use crate::truth::{Fault, SHAPE_TERMS, Truth};
 
 /// The true burn over the time since the thrust began.
 #[derive(Debug, Clone)]

@@ -3,22 +3,16 @@
 //! In every second each link carries at most its budget, whatever is requested. Vital messages go first, then answers
 //! and texts within their own shares, then telemetry, then requested messages.
 
-mod budget;
-mod files;
 mod lane;
-mod lists;
 pub mod meant;
-mod pad_check;
 mod questions;
-mod refusals;
 mod requests;
 
 use alloc::borrow::ToOwned as _;
 use alloc::collections::BTreeSet;
-use alloc::format;
 use alloc::string::String;
-use alloc::vec;
 use alloc::vec::Vec;
+use alloc::{format, vec};
 
 use flight::computer::crew::Asked;
 use flight::computer::news::Severity;
@@ -39,19 +33,17 @@ use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
 
-use self::files::FileService;
-pub use self::files::gives_out_its_log;
 use self::lane::{Answer, Lane};
-use self::pad_check::CheckTeller;
-use self::refusals::{Refusals, Warnings};
+use self::questions::FileService;
+pub use self::questions::gives_out_its_log;
 pub use self::requests::Heard;
-use self::requests::Waiting;
-use crate::commands::{self, Command};
+use self::requests::{Refusals, Waiting, Warnings};
+use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
-use crate::streams::Streams;
-use crate::telemetry;
+use crate::streams::{CheckTeller, Streams};
 use crate::vehicle::Vehicle;
+use crate::{commands, telemetry};
 
 /// Most requested messages that may wait; more are refused for the moment.
 const MAX_REQUESTED: usize = 32;

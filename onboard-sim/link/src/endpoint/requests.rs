@@ -1,7 +1,12 @@
 //! Keeps the stations' requests until the vehicle has decided. A command is acknowledged by the frame that carried it
-//! out.
+//! out. Refusals are explained, but not without end.
 
+use alloc::borrow::ToOwned as _;
+use alloc::collections::BTreeMap;
+use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
+
 use flight::computer::Commander;
 use flight::computer::crew::{Answer, Asked, Ending, People, Request};
 use flight::rules::arming::Uplink;
@@ -10,6 +15,7 @@ use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::MavResult;
+use protocol::identity::Address;
 
 use super::VehicleEndpoint;
 use crate::commands;
@@ -136,5 +142,175 @@ impl VehicleEndpoint {
             by,
         });
         (self.stations.best_uplink(time_s), commander)
+    }
+}
+
+// Limits how often refusals are explained: the reason is sent once and then counted, so that a flood of refused
+// requests fills neither the radio nor the crew's screen.
+
+/// Number of refused commands of one station that are answered at once. No known client sends more before it waits.
+const AT_ONCE: f64 = 8.0;
+/// After those, answers per second to one station's refused commands: each repetition waits 0.5 s.
+const PER_S: f64 = 2.0;
+/// A command that the vehicle does not know costs this much of an answer: clients try out many in a row, and wait for each.
+/// It has no text. Twenty at ten a second are all answered, and five a second for as long as they like.
+const COST_OF_UNSUPPORTED: f64 = 0.4;
+/// Number of stations tracked separately. A flood of forged addresses shares the last entry.
+const MAX_STATIONS: usize = 16;
+
+/// How often each station's refused commands are answered.
+#[derive(Debug, Default)]
+pub(super) struct Refusals {
+    stations: BTreeMap<Address, Left>,
+}
+
+/// Answers left.
+#[derive(Debug, Clone, Copy)]
+struct Left {
+    answers: f64,
+    at_s: f64,
+}
+
+impl Refusals {
+    /// Whether to answer one more refused command of a station.
+    pub(super) fn may_answer(&mut self, station: Address, is_supported: bool, now_s: f64) -> bool {
+        let cost = if is_supported { 1.0 } else { COST_OF_UNSUPPORTED };
+        let known = self.stations.contains_key(&station) || self.stations.len() < MAX_STATIONS - 1;
+        let place = if known { station } else { Address { system_id: 0, component_id: 0 } };
+        let left = self.stations.entry(place).or_insert(Left { answers: AT_ONCE, at_s: now_s });
+        left.answers = (left.answers + PER_S * (now_s - left.at_s).max(0.0)).min(AT_ONCE);
+        left.at_s = now_s;
+        let may = left.answers >= cost;
+        if may {
+            left.answers -= cost;
+        }
+        may
+    }
+}
+
+/// Shortest time before the same warning is sent again, s, with the number of times it was held back.
+const SAID_FOR_S: f64 = 5.0;
+/// Most different warnings in that time; only the number of further ones is sent.
+const MAX_DIFFERENT: usize = 8;
+
+/// Recently sent warnings.
+#[derive(Debug, Default)]
+pub(super) struct Warnings {
+    said: Vec<Said>,
+    others: u32,
+    others_since_s: f64,
+}
+
+#[derive(Debug)]
+struct Said {
+    words: String,
+    at_s: f64,
+    more: u32,
+}
+
+impl Warnings {
+    /// Whether to send a warning now. Texts that differ only in their digits are the same warning, because a newly
+    /// measured value is no news.
+    pub(super) fn is_news(&mut self, words: &str, now_s: f64) -> bool {
+        if let Some(said) = self.said.iter_mut().find(|said| same_but_for_figures(&said.words, words)) {
+            said.more += 1;
+            words.clone_into(&mut said.words);
+            return false;
+        }
+        if self.said.len() >= MAX_DIFFERENT {
+            if self.others == 0 {
+                self.others_since_s = now_s;
+            }
+            self.others += 1;
+            return false;
+        }
+        self.said.push(Said { words: words.to_owned(), at_s: now_s, more: 0 });
+        true
+    }
+
+    /// Texts with the counts that are due.
+    pub(super) fn counted(&mut self, now_s: f64) -> Vec<String> {
+        let mut words = Vec::new();
+        self.said.retain_mut(|said| {
+            if now_s - said.at_s < SAID_FOR_S {
+                return true;
+            }
+            let more = core::mem::take(&mut said.more);
+            if more > 0 {
+                said.at_s = now_s;
+                words.push(format!("{} ({more} more)", said.words));
+            }
+            more > 0
+        });
+        if self.others > 0 && now_s - self.others_since_s >= SAID_FOR_S {
+            words.push(format!("{} other warnings", core::mem::take(&mut self.others)));
+        }
+        words
+    }
+}
+
+fn same_but_for_figures(one: &str, other: &str) -> bool {
+    let without = |words| {
+        str::chars(words).filter(|character| !(character.is_ascii_digit() || ".-".contains(*character)))
+    };
+    without(one).eq(without(other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::identity::GROUND;
+
+    #[test]
+    fn a_station_that_repeats_is_answered_at_once_first_and_then_twice_a_second() {
+        let mut refusals = Refusals::default();
+        let answered = |refusals: &mut Refusals, from_s: f64| {
+            (0..200).filter(|n| refusals.may_answer(GROUND, true, from_s + 0.05 * f64::from(*n))).count()
+        };
+        // 10 s at 20 Hz.
+        assert!((26..=28).contains(&answered(&mut refusals, 0.0)));
+        assert!((18..=20).contains(&answered(&mut refusals, 10.0)));
+        // Another station does not have to wait because of this one.
+        assert!(refusals.may_answer(Address { system_id: 254, component_id: 190 }, true, 20.0));
+    }
+
+    #[test]
+    fn forged_addresses_share_one_place() {
+        let mut refusals = Refusals::default();
+        let stations = (1..=255).map(|system_id| Address { system_id, component_id: 1 });
+        let answered = stations.clone().filter(|station| refusals.may_answer(*station, true, 0.0)).count();
+        assert_eq!(answered, MAX_STATIONS - 1 + AT_ONCE as usize);
+        assert_eq!(refusals.stations.len(), MAX_STATIONS);
+    }
+
+    #[test]
+    fn a_warning_is_sent_once_and_then_counted() {
+        let mut warnings = Warnings::default();
+        assert!(warnings.is_news("arm refused: tilt: found 5.21 deg, required at most 5 deg", 0.0));
+        for n in 1..=40 {
+            assert!(
+                !warnings
+                    .is_news("arm refused: tilt: found 5.4 deg, required at most 5 deg", 0.1 * f64::from(n))
+            );
+        }
+        assert!(warnings.counted(4.9).is_empty());
+        let words = warnings.counted(5.0);
+        assert_eq!(words, ["arm refused: tilt: found 5.4 deg, required at most 5 deg (40 more)"]);
+        assert!(!warnings.is_news("arm refused: tilt: found 5.4 deg, required at most 5 deg", 6.0));
+        assert!(warnings.is_news("arm refused: pin: found in, required out", 6.0), "another reason");
+        assert_eq!(warnings.counted(11.0).len(), 1);
+        assert!(warnings.counted(17.0).is_empty());
+        assert!(
+            warnings.is_news("arm refused: pin: found in, required out", 17.0),
+            "after a pause it is news again"
+        );
+    }
+
+    #[test]
+    fn only_the_number_of_many_different_warnings_is_sent() {
+        let mut warnings = Warnings::default();
+        let mut words = (0..26u8).map(|n| format!("no {}", char::from(b'a' + n)));
+        assert_eq!(words.by_ref().filter(|words| warnings.is_news(words, 0.0)).count(), MAX_DIFFERENT);
+        assert_eq!(warnings.counted(5.0), ["18 other warnings"]);
     }
 }

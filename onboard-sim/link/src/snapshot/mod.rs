@@ -1,7 +1,8 @@
 //! A vehicle's state at one instant, for telemetry: what its flight computer believes.
 
-mod crew;
 mod space;
+
+use alloc::vec::Vec;
 
 use flight::computer::crew::People;
 use flight::computer::pilot::ApogeeAhead;
@@ -9,6 +10,7 @@ use flight::computer::{AbortEffect, Commander, Computer, LogState};
 use flight::guidance::powered::ControlLevel;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
+use flight::rules::two_person::{Act, Station};
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::rigid::RigidState;
@@ -16,7 +18,6 @@ use flight::vehicle::site::Site;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use nmpc::SolveStatus;
 
-pub use self::crew::CrewFacts;
 pub use self::space::InSpace;
 use crate::vehicle::MissionName;
 
@@ -395,4 +396,37 @@ pub fn violations(verdict: &LandingVerdict) -> u16 {
 /// Flags as bits, the first in bit 0.
 fn bits(flags: impl Iterator<Item = bool>) -> u16 {
     flags.take(16).enumerate().fold(0, |bits, (place, set)| bits | (u16::from(set) << place))
+}
+
+// Who commands, what is asked and what is waited for, for telemetry.
+
+/// What the crew is told of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrewFacts {
+    pub people: People,
+    pub operators: Vec<Operator>,
+    /// What waits for a confirmation: the act, its number, who asks, and the time left, s.
+    pub ask: Option<(Act, u16, Operator, f64)>,
+    /// Who has to tap, and the time left, s.
+    pub tap: Option<(Operator, f64)>,
+    /// The station that armed the vehicle or has taken command, and its operator.
+    pub commander: Option<(Station, Option<Operator>)>,
+    /// Who held the last countdown, or whose silence did.
+    pub held_by: Option<Operator>,
+}
+
+impl Known<'_> {
+    fn crew_facts(&self) -> Option<CrewFacts> {
+        let (memory, time_s) = (self.computer.crew(), self.time_s);
+        let ask = memory.two_person.waiting(time_s);
+        let tap = memory.two_person.tapping();
+        Some(CrewFacts {
+            people: self.people?,
+            operators: self.operators.to_vec(),
+            ask: ask.map(|ask| (ask.act, ask.number, ask.by, ask.left_s(time_s))),
+            tap: tap.map(|tapping| (tapping.by, tapping.left_s(time_s))),
+            commander: self.commander.map(|commander| (commander.station, commander.by)),
+            held_by: memory.held_by,
+        })
+    }
 }

@@ -7,12 +7,8 @@
 //!
 //! [`Motion`]: crate::snapshot::Motion
 
-mod crew;
-mod global;
+mod motion;
 mod ours;
-mod pad_check;
-mod power;
-mod space;
 
 use alloc::vec::Vec;
 
@@ -23,18 +19,20 @@ use mavlink_core::types::CharArray;
 use protocol::dialect::PROTOCOL_VERSION_DATA;
 use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA,
-    CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot,
-    MavLandedState, MavMessage, MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode,
-    MavState, MavSysStatusSensor, MavSysStatusSensorExtended, MavType, MavVtolState, SYS_STATUS_DATA,
-    TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
+    BATTERY_STATUS_DATA, CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
+    MavAutopilot, MavBatteryFault, MavLandedState, MavMessage, MavModeFlag, MavModeProperty,
+    MavProtocolCapability, MavStandardMode, MavState, MavSysStatusSensor, MavSysStatusSensorExtended,
+    MavType, MavVtolState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA, StorageStatus, StorageType,
+    StorageUsageFlag, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
+    TdCheck, VFR_HUD_DATA,
 };
-
-pub use self::ours::td_phase;
-pub(crate) use self::pad_check::pad_check;
-use crate::snapshot::Snapshot;
 use protocol::identity::GIT_COMMIT;
 use protocol::mission::MissionHash;
+
+pub(crate) use self::ours::pad_check;
+pub use self::ours::td_phase;
+use crate::snapshot::Snapshot;
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
@@ -60,10 +58,10 @@ pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option
         TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
-        _ => crew::message(message_id, snapshot)
-            .or_else(|| space::message(message_id, snapshot))
-            .or_else(|| power::message(message_id, snapshot))
-            .or_else(|| global::message(message_id, snapshot)),
+        _ => ours::crew(message_id, snapshot)
+            .or_else(|| motion::descent_and_sensors(message_id, snapshot))
+            .or_else(|| power(message_id, snapshot))
+            .or_else(|| motion::message(message_id, snapshot)),
     }
 }
 
@@ -106,22 +104,22 @@ fn heartbeat(snapshot: &Snapshot) -> MavMessage {
 }
 
 fn sys_status(snapshot: &Snapshot) -> MavMessage {
-    let (sensors, silent) = space::sensors(snapshot);
+    let (sensors, silent) = motion::sensors(snapshot);
     let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | sensors
-        | power::present(snapshot);
-    let mut healthy = present - silent - power::failing(snapshot);
+        | present(snapshot);
+    let mut healthy = present - silent - failing(snapshot);
     healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
         onboard_control_sensors_health: healthy,
         load: (1000.0 * snapshot.solve_time_s / snapshot.deadline_s).clamp(0.0, 1000.0) as u16,
-        voltage_battery: power::millivolts(snapshot),
-        current_battery: power::centiamperes(snapshot),
-        battery_remaining: power::percent(snapshot),
+        voltage_battery: millivolts(snapshot),
+        current_battery: centiamperes(snapshot),
+        battery_remaining: percent(snapshot),
         // Explicitly empty: the generated default of a set of flags is its first flag.
         onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
         onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),
@@ -186,7 +184,7 @@ fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
         // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the pad.
         alt: (snapshot.pad_altitude_m - motion.position_m[2]) as f32,
         climb: -down_m_s as f32,
-        heading: libm::round(global::heading_deg(&motion.ned_from_body)) as i16 % 360,
+        heading: libm::round(motion::heading_deg(&motion.ned_from_body)) as i16 % 360,
         throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
     })
 }
@@ -271,4 +269,87 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
         *place = byte;
     }
     CharArray::new(bytes)
+}
+
+// Battery and storage.
+
+fn power(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
+    match message_id {
+        BATTERY_STATUS_DATA::ID => Some(battery(snapshot)),
+        STORAGE_INFORMATION_DATA::ID => storage(snapshot),
+        _ => None,
+    }
+}
+
+/// What SYS_STATUS says to be there.
+fn present(snapshot: &Snapshot) -> MavSysStatusSensor {
+    let mut present = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
+    present.set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, snapshot.battery.is_some());
+    present
+}
+
+/// What of it fails: a log that does not run, and on the pad a battery below its limit.
+fn failing(snapshot: &Snapshot) -> MavSysStatusSensor {
+    let mut failing = MavSysStatusSensor::empty();
+    failing.set(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING, !snapshot.log.running);
+    let checks = TdCheck::from_bits_truncate(snapshot.checks_failed);
+    failing
+        .set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, checks.contains(TdCheck::TD_CHECK_BATTERY));
+    failing
+}
+
+/// mV; `UINT16_MAX`: not known.
+fn millivolts(snapshot: &Snapshot) -> u16 {
+    snapshot.battery.map_or(u16::MAX, |battery| libm::round(1000.0 * battery.volts) as u16)
+}
+
+/// cA; -1: not known.
+fn centiamperes(snapshot: &Snapshot) -> i16 {
+    let current_a = snapshot.battery.and_then(|battery| battery.current_a);
+    current_a.map_or(-1, |current_a| libm::round(100.0 * current_a) as i16)
+}
+
+/// Percent; -1: not known.
+fn percent(snapshot: &Snapshot) -> i8 {
+    let left = snapshot.battery.and_then(|battery| battery.left);
+    left.map_or(-1, |left| libm::round(100.0 * left) as i8)
+}
+
+fn battery(snapshot: &Snapshot) -> MavMessage {
+    let mut voltages = [u16::MAX; 10];
+    voltages[0] = millivolts(snapshot);
+    MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
+        temperature: i16::MAX,
+        voltages,
+        current_battery: centiamperes(snapshot),
+        current_consumed: -1,
+        energy_consumed: -1,
+        battery_remaining: percent(snapshot),
+        // The generated default is the first flag.
+        fault_bitmask: MavBatteryFault::empty(),
+        ..BATTERY_STATUS_DATA::default()
+    })
+}
+
+/// `None` if the operator chose to fly without a log. How large the storage is, and how fast, is not known: 0.
+fn storage(snapshot: &Snapshot) -> Option<MavMessage> {
+    let log = snapshot.log;
+    let has_storage = log.space_bytes != u64::MAX;
+    has_storage.then(|| {
+        MavMessage::STORAGE_INFORMATION(STORAGE_INFORMATION_DATA {
+            time_boot_ms: boot_ms(snapshot.time_s),
+            available_capacity: (log.space_bytes >> 10) as f32 / 1024.0,
+            storage_id: 1,
+            storage_count: 1,
+            status: if log.running {
+                StorageStatus::STORAGE_STATUS_READY
+            } else {
+                StorageStatus::STORAGE_STATUS_NOT_SUPPORTED
+            },
+            mavtype: StorageType::STORAGE_TYPE_UNKNOWN,
+            storage_usage: StorageUsageFlag::empty(),
+            name: CharArray::new([0; 32]),
+            ..STORAGE_INFORMATION_DATA::default()
+        })
+    })
 }

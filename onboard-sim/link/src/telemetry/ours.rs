@@ -1,17 +1,24 @@
-//! The messages of our dialect that every vehicle sends.
+//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew and check on the pad.
 
+use flight::computer::AbortEffect;
+use flight::computer::crew::People;
+use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
+use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
+use flight::rules::two_person::Act;
+use mavlink_core::MessageData as _;
+use mavlink_core::types::CharArray;
+use num_traits::FromPrimitive as _;
 use protocol::dialect::{
-    MavMessage, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdAbortEffect, TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
-    TdSolverStatus, TdVehicleFlag,
+    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct, TdCheck, TdControlLevel,
+    TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict,
+    TdPhase, TdRole, TdSolverStatus, TdVehicleFlag,
 };
 
-use super::{boot_ms, centidegrees, centimetres};
-use flight::computer::AbortEffect;
-
-use crate::snapshot::{PATH_POINTS, Snapshot};
+use super::{boot_ms, centidegrees, centimetres, characters};
+use crate::snapshot::{CrewFacts, PATH_POINTS, Snapshot};
 
 pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
@@ -228,6 +235,107 @@ pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
         q_rad_s: limits.pitch_rate_rad_s as f32,
         gimbal_limit_rad: snapshot.gimbal_limit_rad as f32,
     })
+}
+
+// Who commands, what is asked, and which mission flies.
+
+pub(super) fn crew(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
+    match message_id {
+        TD_CREW_DATA::ID => snapshot.crew.as_ref().map(|crew| state(crew, snapshot.time_s)),
+        TD_OPERATOR_DATA::ID => snapshot.crew.as_ref().and_then(|crew| operator(crew, snapshot.time_s)),
+        // It matters before the flight only, and there it costs no position.
+        TD_MISSION_DATA::ID => snapshot.phase.on_pad().then(|| mission(snapshot)),
+        _ => None,
+    }
+}
+
+fn mission(snapshot: &Snapshot) -> MavMessage {
+    let name = characters(&snapshot.mission.name);
+    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name })
+}
+
+fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
+    let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
+    let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
+    let commander = crew.commander.map(|(station, _)| station);
+    MavMessage::TD_CREW(TD_CREW_DATA {
+        time_boot_ms: boot_ms(time_s),
+        ask_number: crew.ask.map_or(0, |(_, number, ..)| number),
+        ask_left_ms: crew.ask.map_or(0, |(.., left_s)| ms(left_s)),
+        tap_left_ms: crew.tap.map_or(0, |(_, left_s)| ms(left_s)),
+        people: match crew.people {
+            People::One => 1,
+            People::Two { .. } => 2,
+        },
+        act: match crew.ask.map(|(act, ..)| act) {
+            None => TdAct::TD_ACT_NONE,
+            Some(Act::Arm) => TdAct::TD_ACT_ARM,
+            Some(Act::Start) => TdAct::TD_ACT_START,
+        },
+        asked_by: number(crew.ask.map(|(_, _, by, _)| by)),
+        tapped_by: number(crew.tap.map(|(by, _)| by)),
+        commanded_by: number(crew.commander.and_then(|(_, by)| by)),
+        commanding_system: commander.map_or(0, |station| station.system),
+        commanding_component: commander.map_or(0, |station| station.component),
+        held_by: number(crew.held_by),
+    })
+}
+
+/// Operators per second.
+const TURNS_PER_S: f64 = 0.5;
+
+/// Each operator in turn.
+fn operator(crew: &CrewFacts, time_s: f64) -> Option<MavMessage> {
+    let count = crew.operators.len().max(1);
+    let operator = crew.operators.get((TURNS_PER_S * time_s) as usize % count)?;
+    let role = match operator.role {
+        Role::Observer => TdRole::TD_ROLE_OBSERVER,
+        Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,
+        Role::Flight => TdRole::TD_ROLE_FLIGHT,
+        Role::Pad => TdRole::TD_ROLE_PAD,
+    };
+    Some(MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        number: operator.number,
+        role,
+        name: CharArray::new(*operator.name.bytes()),
+    }))
+}
+
+// The last check of the vehicle on its pad, value by value.
+
+/// The value at this place, or how the check stands while nothing has been found.
+pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64) -> MavMessage {
+    let findings = check.findings();
+    let mut data = TD_PAD_CHECK_DATA {
+        time_boot_ms: boot_ms(time_s),
+        value: f32::NAN,
+        least: f32::NAN,
+        most: f32::NAN,
+        run: check.run(),
+        state: match check.state() {
+            CheckState::NotRun => TdPadCheckState::TD_PAD_CHECK_STATE_NOT_RUN,
+            CheckState::Running => TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING,
+            CheckState::Passed => TdPadCheckState::TD_PAD_CHECK_STATE_PASSED,
+            CheckState::Failed => TdPadCheckState::TD_PAD_CHECK_STATE_FAILED,
+            CheckState::Stopped => TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED,
+        },
+        progress: check.progress_percent(),
+        found: u8::try_from(findings.len()).unwrap_or(u8::MAX),
+        asked_by: check.by().map_or(0, |by| by.number),
+        ..TD_PAD_CHECK_DATA::default()
+    };
+    if let Some(Finding { item, value, least, most, verdict }) = findings.get(place).copied()
+        && let Some(item) = TdPadCheckItem::from_u8(item.number())
+    {
+        (data.value, data.least, data.most) = (value as f32, least as f32, most as f32);
+        (data.item, data.place) = (item, u8::try_from(place).unwrap_or(u8::MAX));
+        data.verdict = match verdict {
+            Verdict::NotJudged => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED,
+            Verdict::Ok => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_OK,
+            Verdict::NotOk => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_OK,
+        };
+    }
+    MavMessage::TD_PAD_CHECK(data)
 }
 
 #[cfg(test)]

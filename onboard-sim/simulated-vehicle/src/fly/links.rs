@@ -1,11 +1,15 @@
-//! The open links: removes copies, checks and adds signatures if a key is set, and records the frames.
+//! The open links: removes copies, checks and adds signatures if a key is set, and records the frames. Here are the
+//! people who may command over them, too, and a radio that is broken.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
+use flight::computer::crew::People;
+use flight::rules::operator::{Name, Operator, Role};
 use mavlink_core::MessageData as _;
 use protocol::command::CommandRequest;
-use protocol::crew_file::CrewFile;
-use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA};
+use protocol::crew_file::{CrewFile, Mode};
+use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA, TdRole};
 use protocol::frame::Frame;
 use protocol::hub::{Hub, HubLink, News};
 use protocol::identity::Address;
@@ -14,6 +18,7 @@ use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
 use protocol::signing::{Anchor, Rejection};
 use protocol::transport::{LinkAddress, Transport, TransportSender};
+use sim::sortie::Radio;
 
 use super::FlyError;
 use super::recording::{note, record_raw};
@@ -261,5 +266,93 @@ impl Stamps {
 
     fn now(&self) -> u64 {
         self.anchor.stamp(self.started.elapsed())
+    }
+}
+
+// The people who may command, from a crew file into the vehicle's own types.
+
+/// The operators with keys, in the order of the file.
+pub(super) fn operators_of(crew: &CrewFile) -> Vec<Operator> {
+    let operator = |member: &protocol::crew_file::Member| {
+        let (number, _) = member.key.as_ref()?;
+        let role = match member.role {
+            TdRole::TD_ROLE_OBSERVER => Role::Observer,
+            TdRole::TD_ROLE_RANGE_SAFETY => Role::RangeSafety,
+            TdRole::TD_ROLE_FLIGHT => Role::Flight,
+            TdRole::TD_ROLE_PAD => Role::Pad,
+        };
+        Some(Operator { number: *number, role, name: Name::new(&member.name) })
+    };
+    crew.members.iter().filter_map(operator).collect()
+}
+
+/// How many people an arming and a start take. The numbers of the asks begin elsewhere at each boot.
+pub(super) fn people_of(crew: &CrewFile, boot_number: u32) -> People {
+    match crew.mode {
+        Mode::OnePerson => People::One,
+        Mode::TwoPerson => People::Two { first_ask: boot_number as u16 },
+    }
+}
+
+// Simulates a broken radio, by simulated time: frames are lost or arrive late.
+
+/// One direction of the radio.
+pub(crate) struct Delayed<T> {
+    /// Frames on their way with their arrival times, s, in the order they were sent.
+    on_its_way: VecDeque<(f64, T)>,
+}
+
+impl<T> Default for Delayed<T> {
+    fn default() -> Self {
+        Self { on_its_way: VecDeque::new() }
+    }
+}
+
+impl<T> Delayed<T> {
+    /// The frames that arrive at a time; takes the frames sent at that time.
+    pub(crate) fn pass(&mut self, sent: Vec<T>, time_s: f64, radio: Radio) -> Vec<T> {
+        if radio.silent {
+            self.on_its_way.clear();
+            return Vec::new();
+        }
+        self.on_its_way.extend(sent.into_iter().map(|sent| (time_s + radio.delay_s, sent)));
+        let arrived = self.on_its_way.iter().take_while(|(at_s, _)| *at_s <= time_s).count();
+        self.on_its_way.drain(..arrived).map(|(_, sent)| sent).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHOLE: Radio = Radio { silent: false, delay_s: 0.0 };
+
+    #[test]
+    fn a_working_radio_delays_nothing() {
+        let mut radio = Delayed::default();
+        assert_eq!(radio.pass(vec![1, 2], 0.0, WHOLE), [1, 2]);
+        assert!(radio.pass(Vec::new(), 0.1, WHOLE).is_empty());
+    }
+
+    #[test]
+    fn late_frames_arrive_in_order_and_none_is_lost() {
+        let late = Radio { delay_s: 0.5, ..WHOLE };
+        let mut radio = Delayed::default();
+        assert!(radio.pass(vec!['a'], 0.0, late).is_empty());
+        assert!(radio.pass(vec!['b'], 0.25, late).is_empty());
+        assert_eq!(radio.pass(Vec::new(), 0.5, late), ['a']);
+        // The radio works again: frames sent earlier still arrive first.
+        assert!(radio.pass(vec!['c'], 0.625, WHOLE).is_empty());
+        assert_eq!(radio.pass(Vec::new(), 0.75, WHOLE), ['b', 'c']);
+    }
+
+    #[test]
+    fn a_silent_radio_also_loses_frames_on_their_way() {
+        let late = Radio { delay_s: 0.5, ..WHOLE };
+        let silent = Radio { silent: true, ..late };
+        let mut radio = Delayed::default();
+        radio.pass(vec!['a'], 0.0, late);
+        assert!(radio.pass(vec!['b'], 0.1, silent).is_empty());
+        assert!(radio.pass(Vec::new(), 1.0, late).is_empty());
     }
 }

@@ -1,14 +1,9 @@
 //! The run loop: a vehicle, its clock, its links and its log.
 
 mod board;
-mod boot;
-mod crew;
 mod links;
 mod load;
-mod offered;
-mod own_start;
 mod pace;
-mod radio;
 mod recording;
 
 use std::path::{Path, PathBuf};
@@ -16,7 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use ::board::stream::OnTheAir;
+use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
+pub use flight::vehicle::mission::StartPoint;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
@@ -25,22 +22,18 @@ use protocol::transport::LinkAddress;
 use sim::recipe::RecipeError;
 use tokio::sync::watch;
 
-pub use self::board::BoardError;
 use self::board::OnBoard;
-pub use self::boot::OnTheWire;
-use self::links::{Heard, Links};
+pub use self::board::{BoardError, OnTheWire};
+pub(crate) use self::links::Delayed;
+use self::links::{Heard, Links, operators_of, people_of};
+use self::load::OwnStart;
 pub use self::load::load_flight;
-use self::offered::Offer;
-use self::own_start::OwnStart;
 pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
-pub(crate) use self::radio::Delayed;
-use self::recording::{log_state, nanoseconds, note, record};
+use self::recording::{Offer, log_state, nanoseconds, note, record};
 use crate::endpoint::{self, VehicleEndpoint};
 use crate::solve_times::SolveTimes;
 use crate::vehicle::{Judged, RocketFlight, Vehicle, VehicleEvent};
-use flight::computer::FRAME_S;
-pub use flight::vehicle::mission::StartPoint;
 
 /// How fast simulated time runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -231,8 +224,8 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
         if options.auto_start && crew.mode == Mode::TwoPerson {
             return Err(FlyError::CrewWithoutHands);
         }
-        let people = crew::people_of(crew, options.on_the_wire.boot_number.get());
-        vehicle = vehicle.with_crew(people, crew::operators_of(crew));
+        let people = people_of(crew, options.on_the_wire.boot_number.get());
+        vehicle = vehicle.with_crew(people, operators_of(crew));
     }
     // The crew pulls the pin by hand; the simulation does it when the program starts.
     vehicle.set_pin_out(true);

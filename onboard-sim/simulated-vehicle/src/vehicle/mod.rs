@@ -1,33 +1,28 @@
 //! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
 //!
-//! This module has the interface that the run loop uses; the radio takes a [`Snapshot`], and the log takes records
-//! ([`log`](self::log)).
+//! This module has the interface that the run loop uses; the radio takes a [`Snapshot`], and the log takes records.
 //!
 //! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
 
-mod events;
 mod ground;
-mod log;
-#[cfg(test)]
-mod tests;
 
 use std::time::Duration;
 
 use flight::computer::crew::{Answer, People, Request};
-use flight::computer::news::Severity;
+use flight::computer::news::{News, Severity};
 use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
+use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::{StartPoint, StateWeights};
-use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::record::Record;
+use protocol::log::v1;
 use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
-
-pub use self::events::VehicleEvent;
-use self::ground::Ground;
 use vehicle_link::sensed::SensorWatch;
 pub use vehicle_link::snapshot::{
     AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
@@ -35,6 +30,8 @@ pub use vehicle_link::snapshot::{
 };
 use vehicle_link::snapshot::{InSpace, Known};
 pub use vehicle_link::vehicle::MissionName;
+
+use self::ground::Ground;
 
 /// A flight, by recipe and number.
 #[derive(Debug, Clone)]
@@ -341,3 +338,81 @@ impl vehicle_link::vehicle::Vehicle for Vehicle {
         Self::snapshot(self)
     }
 }
+
+// The events that a vehicle reports.
+
+/// An event that a vehicle reports.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VehicleEvent {
+    /// A message to the crew.
+    Text {
+        severity: Severity,
+        text: String,
+    },
+    PhaseChanged {
+        from: Phase,
+        to: Phase,
+    },
+    /// The pilot planned in this frame.
+    Planned {
+        /// The frame's number, from the release.
+        frame: u64,
+        /// Its time since the release, s.
+        time_s: f64,
+        /// Measured, s.
+        took_s: f64,
+        /// Allowed, s.
+        deadline_s: f64,
+    },
+    /// The vehicle touched down and its landing was judged.
+    Verdict {
+        /// The contact that was judged.
+        impact: Impact,
+        /// The verdict, limit by limit.
+        verdict: Box<LandingVerdict>,
+    },
+}
+
+impl From<News> for VehicleEvent {
+    fn from(news: News) -> Self {
+        match news {
+            News::Said { severity, words } => Self::Text { severity, text: words },
+            News::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
+        }
+    }
+}
+
+// What of a flight goes into its log beside its events.
+
+impl Vehicle {
+    /// What the flight computer was given and decided in the last frame; they come before all others, so that a flight begins
+    /// with the power-up of its computer.
+    pub fn computer_records(&self) -> Vec<Record> {
+        let Some(frame) = &self.computer_frame else { return Vec::new() };
+        let start = (self.frames_decided == 1).then(|| {
+            let start = ComputerStart { start: tick_log::sortie::pilot_start(&self.sortie) };
+            Record::ComputerStart(Box::new(start))
+        });
+        start.into_iter().chain([Record::ComputerFrame(frame.clone())]).collect()
+    }
+
+    /// The other records of the last frame. `changed`: the phase has just changed.
+    pub fn records(&self, changed: bool) -> Vec<Record> {
+        if self.flown {
+            return tick_log::sortie::frame(&self.sortie);
+        }
+        // Let go in this frame: the first frame of the flight is the next one.
+        let just_released =
+            self.computer().released_at_s().map(f64::to_bits) == Some(self.time_s().to_bits());
+        if changed && just_released { vec![tick_log::sortie::start(&self.sortie)] } else { Vec::new() }
+    }
+
+    /// The landing as a log's record, once it is judged. Its time counts from the release, as that of the frames.
+    pub fn verdict_record(&self) -> Option<v1::LandingVerdict> {
+        self.judged()?;
+        tick_log::sortie::verdict(&self.sortie)
+    }
+}
+
+#[cfg(test)]
+mod tests;

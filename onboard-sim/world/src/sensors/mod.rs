@@ -4,24 +4,19 @@
 //! one frame of the flight computer. Each sensor has its own stream of random numbers and keeps drawing while it is
 //! out, so a fault in one sensor does not change the noise of another.
 
-mod flaws;
 mod noise;
 mod params;
-mod start;
-#[cfg(test)]
-mod tests;
 
 use flight::computer::{FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, ImuSample, Measurements};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
-use self::flaws::{EJECTION_LASTS_S, Fate, Flaws};
-use self::noise::{Normal, Wander};
+pub use self::noise::believed_start;
+use self::noise::{EJECTION_LASTS_S, Fate, Flaws, Normal, Wander};
 pub use self::params::{
     BarometerParams, GnssParams, ImuParams, LidarParams, SensorParamError, SensorParams, SwitchParams,
 };
-pub use self::start::believed_start;
 use crate::world::World;
 
 const MS_S: f64 = 1e-3;
@@ -372,3 +367,6 @@ impl Sensors {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

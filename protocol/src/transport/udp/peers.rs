@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use super::queue::Standing;
+use super::Standing;
 
 /// This many proven senders are answered at the same time; each one costs the vehicle's whole telemetry, 2,000 bytes
 /// a second. Without a key anybody's frame is valid, so there must be more places than strangers usually take.

@@ -524,7 +524,7 @@ fn the_log_is_for_operators() {
     use protocol::identity::VEHICLE;
 
     let mut launch = Launch::two();
-    launch.endpoint.offer(Box::new(super::files::log(1000)));
+    launch.endpoint.offer(Box::new(super::questions::log(1000)));
     let fetches = |launch: &mut Launch, station: usize, packet: &Packet| {
         let frame = launch.signed(station, &packet.message(VEHICLE));
         launch.sent.clear();

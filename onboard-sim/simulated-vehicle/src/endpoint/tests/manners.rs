@@ -1,10 +1,13 @@
-//! Tests the questions that other ground stations ask every vehicle.
+//! Tests what other ground stations ask every vehicle, what they get without asking, and what stations tell the vehicle.
 
 use protocol::dialect::{
-    ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HOME_POSITION_DATA,
-    LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMissionResult, MavParamError,
-    MavProtocolCapability, ParamAck, SYSTEM_TIME_DATA, VFR_HUD_DATA,
+    ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_RAW_INT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA,
+    MISSION_COUNT_DATA, MavMissionResult, MavParamError, MavProtocolCapability, ParamAck, SYS_STATUS_DATA,
+    SYSTEM_TIME_DATA, TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA, VFR_HUD_DATA,
 };
+use protocol::identity::NETWORK_BUDGET_BYTES_S;
+use protocol::mission::MissionHash;
 
 use super::*;
 
@@ -267,4 +270,203 @@ fn there_are_no_extended_parameters_and_every_question_is_answered() {
     assert_eq!(result, ParamAck::PARAM_ACK_FAILED);
     assert_eq!(id.to_str(), Ok("NAME"));
     assert!(texts(&wire.run(1.0)).is_empty(), "no words about it");
+}
+
+// Tests what a standard ground station gets without asking.
+
+const OF_EVERY_VEHICLE: [u32; 7] = [
+    ATTITUDE_DATA::ID,
+    GLOBAL_POSITION_INT_DATA::ID,
+    GPS_RAW_INT_DATA::ID,
+    HOME_POSITION_DATA::ID,
+    SYS_STATUS_DATA::ID,
+    VFR_HUD_DATA::ID,
+    CURRENT_MODE_DATA::ID,
+];
+
+#[test]
+fn over_a_network_a_standard_station_sees_attitude_position_battery_and_mode_every_second() {
+    let mut wire =
+        Wire { endpoint: VehicleEndpoint::new().over_links(&[NETWORK_BUDGET_BYTES_S]), ..Wire::new() };
+    let sent = wire.run(10.0);
+    for message_id in OF_EVERY_VEHICLE {
+        let found = count(&sent, message_id);
+        assert!(found >= 9, "{found} of message {message_id} in 10 s");
+    }
+    // More than asked for may be asked for.
+    let attitude = ATTITUDE_DATA::ID as f32;
+    assert_eq!(wire.ask(511, attitude, 20_000.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);
+}
+
+#[test]
+fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_give_way() {
+    for (endpoint, signature_len) in
+        [(VehicleEndpoint::new(), 0), (VehicleEndpoint::sending_signed(), SIGNATURE_LEN)]
+    {
+        let mut wire = Wire { endpoint, ..Wire::new() };
+        let before = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
+        for message_id in OF_EVERY_VEHICLE {
+            let result = wire.ask(511, message_id as f32, 1e6).0;
+            assert_eq!(result, MavResult::MAV_RESULT_ACCEPTED as u8, "message {message_id}");
+        }
+        wire.run(2.0);
+        let sent = wire.run(10.0);
+        for message_id in OF_EVERY_VEHICLE {
+            assert!((9..=11).contains(&count(&sent, message_id)), "message {message_id} at 1 Hz");
+        }
+        let attitudes = count(&sent, ATTITUDE_QUATERNION_DATA::ID);
+        assert!((29..before).contains(&attitudes), "{attitudes} attitudes in 10 s after {before}");
+        let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + signature_len).sum();
+        assert!(bytes <= 10 * RADIO_BUDGET_BYTES_S as usize, "{bytes} B in 10 s");
+        for message_id in OF_EVERY_VEHICLE {
+            assert_eq!(wire.ask(511, message_id as f32, 0.0).0, 0);
+        }
+        let again = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
+        assert!(again.abs_diff(before) <= 1, "{again} again, {before} before");
+    }
+}
+
+#[test]
+fn the_rates_of_every_kind_of_link_fit_it() {
+    for kind in [Streams::new, Streams::signed, Streams::with_crew] {
+        for capacity_bytes_s in [384, 768, 1_536, RADIO_BUDGET_BYTES_S, 4_608, NETWORK_BUDGET_BYTES_S] {
+            let mut streams = kind();
+            streams.set_capacity(capacity_bytes_s);
+            let words = format!("{:.0} of {capacity_bytes_s} B/s", streams.bytes_s());
+            assert!(streams.fit(), "{words}");
+            let rate = |message_id| streams.rate_hz(message_id);
+            let position = rate(LOCAL_POSITION_NED_DATA::ID);
+            assert!(rate(HEARTBEAT_DATA::ID) >= 1.0 && rate(TD_FLIGHT_STATUS_DATA::ID) >= 1.0, "{words}");
+            assert!(position >= 0.45, "{words}: {position} Hz");
+            if capacity_bytes_s >= NETWORK_BUDGET_BYTES_S {
+                assert!(OF_EVERY_VEHICLE.iter().all(|id| rate(*id) >= 1.0), "{words}");
+                assert!(rate(BATTERY_STATUS_DATA::ID) >= 1.0);
+            }
+        }
+    }
+}
+
+// What stations tell the vehicle about themselves: the end of their book, and the mission that they expect.
+
+const ARM: u16 = 400;
+
+fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
+    let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+    let sent = wire.run(0.5);
+    let kept = sent.iter().filter_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_BOOK_KEPT(kept)) => Some(kept),
+        _ => None,
+    });
+    kept.collect()
+}
+
+#[test]
+fn the_end_of_a_book_is_confirmed_to_the_station_that_sent_it() {
+    let mut wire = Wire::new();
+    let head = TD_BOOK_HEAD_DATA {
+        book: 77,
+        entries: 5,
+        target_system: 1,
+        target_component: 1,
+        ..TD_BOOK_HEAD_DATA::default()
+    };
+    let kept = tell(&mut wire, head.clone());
+    let [kept] = &kept[..] else { panic!("{kept:?}") };
+    assert_eq!((kept.book, kept.entries), (77, 5));
+    assert_eq!((kept.target_system, kept.target_component), (GROUND.system_id, GROUND.component_id));
+    assert!(
+        tell(&mut wire, TD_BOOK_HEAD_DATA { target_system: 2, ..head }).is_empty(),
+        "for another vehicle"
+    );
+}
+
+/// A flood of ends takes no more of the link than any other requests.
+#[test]
+fn a_flood_of_ends_is_answered_within_the_budget() {
+    let mut wire = Wire::new();
+    for entries in 0..2_000 {
+        let head = TD_BOOK_HEAD_DATA {
+            entries,
+            target_system: 1,
+            target_component: 1,
+            ..TD_BOOK_HEAD_DATA::default()
+        };
+        let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+    }
+    let sent = wire.run(1.0);
+    let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
+    assert!(bytes <= 2 * RADIO_BUDGET_BYTES_S as usize, "{bytes} B");
+    assert!(count(&sent, HEARTBEAT_DATA::ID) >= 1);
+}
+
+fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
+    wire.beats = true;
+    wire.beat();
+    wire.run(0.5);
+    let [param4, param5, param6] = params;
+    let arm = COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        param1: 1.0,
+        param4,
+        param5,
+        param6,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    };
+    let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(arm));
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+    let sent = wire.run(0.5);
+    let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+    assert_eq!((answers.len(), answers[0].command), (1, ARM));
+    (answers[0].result, texts(&sent).join("; "))
+}
+
+#[test]
+fn another_mission_is_not_armed_whatever_the_station_shows() {
+    let fresh = || {
+        let mut wire = Wire::new();
+        wire.vehicle = rocket().of_mission("mk2", "the right one");
+        wire
+    };
+    let ours = MissionHash::of("the right one");
+    let other = MissionHash::of("another one");
+    let mut wire = fresh();
+    let (result, words) = arm_for(&mut wire, other.to_params());
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
+    assert!(words.contains(&format!("this vehicle flies mk2 {ours}, not {other}")), "{words}");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    let (result, words) = arm_for(&mut wire, [1.0, 0.0, 0.0]);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    for params in [ours.to_params(), [0.0; 3], [f32::NAN; 3]] {
+        let mut wire = fresh();
+        let (result, words) = arm_for(&mut wire, params);
+        assert_eq!(result, MavResult::MAV_RESULT_ACCEPTED as u8, "{words}");
+    }
+}
+
+proptest! {
+    /// Whatever a station writes there, it arms no vehicle of another mission.
+    #[test]
+    fn no_parameters_but_the_own_hash_or_none_arm(params in prop::array::uniform3(any::<u32>())) {
+        let params = params.map(f32::from_bits);
+        let arms = match protocol::mission::Expected::of_params(params) {
+            protocol::mission::Expected::Any => true,
+            protocol::mission::Expected::Hash(hash) => hash == MissionHash::of("the right one"),
+            protocol::mission::Expected::Unreadable => false,
+        };
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: ARM,
+            params: [1.0, 0.0, 0.0, params[0], params[1], params[2], 0.0],
+            confirmation: 0,
+        };
+        let vehicle = rocket().of_mission("mk2", "the right one");
+        let why = vehicle_link::endpoint::meant::why_other_mission(&request, &vehicle);
+        prop_assert_eq!(why.is_none(), arms);
+    }
 }

@@ -409,15 +409,11 @@ fn the_dialect_names_the_arming_checks_in_their_order() {
     }
 }
 
-mod book;
 mod budget;
 mod crew;
-mod files;
-mod links;
 mod manners;
 mod meant;
 mod questions;
 mod rocket;
 mod slow_line;
-mod standard_clients;
 mod uplink;

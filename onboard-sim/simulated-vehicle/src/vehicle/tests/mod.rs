@@ -1,8 +1,6 @@
 //! The vehicles as their crew meets them: arming, countdown, landing, and an abort in every phase they pass.
 
-mod aborts;
 mod check;
-mod motor;
 mod pad;
 mod space;
 

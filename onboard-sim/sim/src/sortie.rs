@@ -2,25 +2,20 @@
 //! apogee that it is put to.
 //!
 //! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
-
-mod breakage;
-pub(crate) mod errors;
-mod rehearsal;
-pub(crate) mod start;
+//! On the pad the same flight is rehearsed with nominal data.
 
 use std::time::Duration;
 
-pub use self::errors::EstimatorErrors;
-use self::rehearsal::Rehearsal;
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
-use flight::estimation::estimator::Measurements;
+use flight::estimation::estimator::{Estimate, Measurements};
 use flight::guidance::baseline::Law;
-use flight::guidance::powered::PoweredReport;
+use flight::guidance::powered::{ControlLevel, PoweredReport};
+use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
-use flight::vehicle::mission::StartPoint;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 use world::sensors::SensorParamError;
@@ -29,11 +24,12 @@ use world::{Battery, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw};
-use crate::fault::Injector;
+use crate::fault::{Breakage, Injector};
+use crate::limits::Limits;
 use crate::outcome::Outcome;
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
-use crate::surroundings::{Feedback, Surroundings};
+use crate::surroundings::{Feedback, Surroundings, falling_as, world_at};
 
 /// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
 pub(crate) const LONGEST_S: f64 = 150.0;
@@ -118,7 +114,7 @@ impl Sortie {
         let world = match (mission.start.at, drawn.hanging) {
             (StartPoint::Pad, _) => started.surroundings.world.clone(),
             (StartPoint::Drone, Some(hanging)) => started.surroundings.world.clone().hanging(hanging),
-            _ => start::world_at(&mission, &drawn, &standing)?,
+            _ => world_at(&mission, &drawn, &standing)?,
         };
         let mut surroundings = started.surroundings.clone();
         surroundings.world = world;
@@ -138,7 +134,7 @@ impl Sortie {
 
     /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
-        let drawn = start::falling_as(mission, drawn)?;
+        let drawn = falling_as(mission, drawn)?;
         let (surroundings, believed) = Surroundings::at_start(mission, dispersion, &drawn)?;
         Ok(Self {
             computer: Computer::at_power_up(mission, law, &believed),
@@ -396,4 +392,171 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
     mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
     (mission, law, drawn)
+}
+
+// Applies a fault to a flight.
+
+impl Sortie {
+    fn break_down(&mut self, breakage: &Breakage) {
+        let every = Vector3::from_element(1.0);
+        let sensors = &mut self.surroundings.faults;
+        match *breakage {
+            Breakage::Vehicle(fault) => self.surroundings.world.inject(&fault),
+            Breakage::GnssOut => sensors.gnss_out = true,
+            Breakage::BarometerOut => sensors.barometer_out = true,
+            Breakage::LidarOut => sensors.lidar_out = true,
+            Breakage::GyroBiasStep(deg_s) => sensors.gyro_bias_step_rad_s += every * deg_s.to_radians(),
+            Breakage::AccelerometerBiasStep(mg) => {
+                sensors.accelerometer_bias_step_m_s2 += every * (1e-3 * mg * STANDARD_GRAVITY_M_S2);
+            }
+            Breakage::AccelerometerDead => sensors.accelerometer_dead = true,
+            Breakage::BarometerStep(step_m) => sensors.barometer_step_m += step_m,
+            Breakage::LinkLoss => self.radio.silent = true,
+            Breakage::LinkDelay(delay_s) => self.radio.delay_s = delay_s,
+            Breakage::Reboot(down_s) => self.reboot(down_s),
+            Breakage::Abort => self.abort(),
+        }
+    }
+}
+
+// The estimate against the truth.
+
+/// Errors of the estimate against the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EstimatorErrors {
+    /// Vertical velocity, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal velocity, m/s.
+    pub lateral_m_s: f64,
+    pub height_m: f64,
+    /// Angle between the estimated and the true nose, rad.
+    pub nose_rad: f64,
+}
+
+impl EstimatorErrors {
+    /// The larger value of each error.
+    fn or_larger(self, other: &Self) -> Self {
+        Self {
+            vertical_m_s: self.vertical_m_s.max(other.vertical_m_s),
+            lateral_m_s: self.lateral_m_s.max(other.lateral_m_s),
+            height_m: self.height_m.max(other.height_m),
+            nose_rad: self.nose_rad.max(other.nose_rad),
+        }
+    }
+}
+
+impl Sortie {
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` if the pilot gets the
+    /// truth instead of an estimate, and while its computer is dead.
+    ///
+    /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
+    pub fn nees_of_motion(&self) -> Option<f64> {
+        self.measured().filter(|_| !self.dead)?;
+        self.pilot().estimator().nees_of_motion(&self.over_the_ground())
+    }
+
+    /// The true state with its height above the ground below it, which is what a landing needs and what the lidar shows.
+    fn over_the_ground(&self) -> RigidState {
+        let mut state = *self.world().state();
+        state.position_m.z -= self.world().truth().ground_m(state.position_m.x, state.position_m.y);
+        state
+    }
+
+    /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
+    /// `None` if the pilot gets the truth instead of an estimate, and before the motor has lit. The accelerometer cannot
+    /// tell more impulse from less mass.
+    ///
+    /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
+    pub fn nees_of_motor(&self) -> Option<f64> {
+        self.measured().filter(|_| !self.dead)?;
+        let motor = self.pilot().motor();
+        motor.ignition_s()?;
+        let truth = self.world().truth();
+        motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
+    }
+
+    /// Errors of the estimate at this moment.
+    pub fn errors(&self) -> EstimatorErrors {
+        let Some(estimate) = self.pilot().estimate() else { return EstimatorErrors::default() };
+        let truth = self.over_the_ground();
+        let velocity = estimate.state.velocity_m_s - truth.velocity_m_s;
+        EstimatorErrors {
+            vertical_m_s: velocity.z.abs(),
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            height_m: (estimate.state.position_m.z - truth.position_m.z).abs(),
+            nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
+        }
+    }
+}
+
+/// The truth, in the form of an estimate.
+pub(crate) fn known(world: &World) -> Estimate {
+    Estimate::exact(world.time_s(), *world.state(), *world.specific_force_m_s2(), world.wind_m_s().xy())
+}
+
+// The rehearsal on the pad: one flight of the mission with its nominal data, faster than real time.
+//
+// It shows whether the flight computer's solver works, and whether a landing is possible with this vehicle, motor and
+// mission. It knows neither the wind of the day nor the scatter of the real motor.
+
+/// Frames rehearsed in each frame on the pad: the whole flight takes a second or two.
+const FRAMES_AT_ONCE: u32 = 20;
+
+/// A rehearsal, running or finished.
+#[derive(Debug, Clone)]
+enum Rehearsal {
+    Flying {
+        flight: Box<Sortie>,
+        /// How many plans there were so far, and how many of them converged.
+        plans: [u64; 2],
+    },
+    Over(Box<(Rehearsed, PoweredReport)>),
+}
+
+impl Rehearsal {
+    fn new(recipe: &Recipe) -> Result<Self, SetUpError> {
+        let as_data_stand =
+            Recipe { dispersion: Dispersion::default(), faults: Vec::new(), ..recipe.clone() };
+        Ok(Self::Flying { flight: Box::new(Sortie::new(&as_data_stand, 0)?), plans: [0; 2] })
+    }
+
+    /// Flies some frames of the rehearsal.
+    fn step(&mut self) {
+        let Self::Flying { flight, plans } = self else { return };
+        for _ in 0..FRAMES_AT_ONCE {
+            let flown = flight.step();
+            let level = flight.computer().piloted().map(|(_, output)| output.level);
+            let powered = flight.computer().mode().phase == Phase::Powered;
+            if flown.planned() && powered && flight.world().touchdown().is_none() {
+                plans[0] += 1;
+                plans[1] += u64::from(level == Some(ControlLevel::Converged));
+            }
+            if !flight.goes_on() {
+                break;
+            }
+        }
+        if flight.goes_on() {
+            return;
+        }
+        let [plans, converged] = *plans;
+        let outcome = flight.outcome();
+        let how = outcome.failure.map_or("landed", |failure| failure.name());
+        let limits = Limits::of(flight.mission());
+        let landing =
+            outcome.touchdown.map(|touchdown| PredictedLanding::from(&limits.by_legs(&touchdown).1));
+        let rehearsed = Rehearsed {
+            warm: outcome.legs && converged > 0,
+            found: format!("{how}, {converged} of {plans} plans converged"),
+            landing,
+        };
+        let report = *flight.pilot().report();
+        *self = Self::Over(Box::new((rehearsed, report)));
+    }
+
+    fn over(&self) -> Option<&(Rehearsed, PoweredReport)> {
+        match self {
+            Self::Flying { .. } => None,
+            Self::Over(over) => Some(over),
+        }
+    }
 }

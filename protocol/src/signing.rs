@@ -6,24 +6,18 @@
 //!
 //! Keys are copied as files, never sent by radio: SETUP_SIGNING is ignored.
 
-mod lockout;
-mod memory;
-mod timestamp;
-
+use alloc::borrow::ToOwned as _;
 use alloc::collections::BTreeMap;
+use alloc::format;
 use alloc::string::String;
+use alloc::vec::Vec;
 use core::fmt;
+use core::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 
 use crate::frame::{Frame, SIGNATURE_LEN};
-
-use memory::{LEAD, MAX_STREAMS};
-use timestamp::{MAX_STAMP, STAMPS_PER_S};
-
-pub use lockout::Lockouts;
-pub use memory::{Memory, MemoryError};
-pub use timestamp::{Anchor, stamp_of};
+use crate::identity::Address;
 
 /// A new stream may begin at most this far behind our own time: one minute.
 const NEW_STREAM_LAG: u64 = 60 * STAMPS_PER_S;
@@ -310,5 +304,214 @@ impl Signing {
     pub fn memory(&self) -> Memory {
         let ours = (self.memory.ours + LEAD).min(MAX_STAMP);
         Memory { ours, ..self.memory.clone() }
+    }
+}
+
+// The timestamps of MAVLink signatures, which count 10 us units since 2015-01-01 UTC.
+
+/// 2015-01-01 00:00 UTC after the Unix epoch: 16,436 days.
+const EPOCH: Duration = Duration::from_hours(24 * 16_436);
+const STAMPS_PER_S: u64 = 100_000;
+/// The largest timestamp: timestamps have 48 bits.
+const MAX_STAMP: u64 = (1 << 48) - 1;
+
+/// Converts a time since the Unix epoch into a timestamp.
+pub fn stamp_of(since_unix_epoch: Duration) -> u64 {
+    let since = since_unix_epoch.saturating_sub(EPOCH);
+    u64::try_from(since.as_micros() / 10).unwrap_or(MAX_STAMP).min(MAX_STAMP)
+}
+
+/// The time of day at one instant, from which on only elapsed time counts. So the stamps of a run do not follow a clock
+/// that is set while it runs, forward or back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Anchor(Duration);
+
+impl Anchor {
+    /// Starts at this time since the Unix epoch.
+    pub fn at(since_unix_epoch: Duration) -> Self {
+        Self(since_unix_epoch)
+    }
+
+    /// Returns the timestamp this long after the start.
+    pub fn stamp(self, since_start: Duration) -> u64 {
+        stamp_of(self.0 + since_start)
+    }
+}
+
+// The timestamps that must survive a restart, as lines of text to which further lines may be appended.
+
+/// Stored timestamps are this far ahead of the ones in use, so that no timestamp is used twice after a restart.
+const LEAD: u64 = 5 * STAMPS_PER_S;
+/// At most this many streams of one key are remembered. Only holders of the key can begin one.
+const MAX_STREAMS: usize = 64;
+/// The shared key and fifteen operators'.
+const MAX_KEYS: usize = 16;
+
+/// Why remembered timestamps cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MemoryError {
+    /// A line cannot be parsed.
+    #[error("`{0}` is neither `ours STAMP`, `clock STAMP` nor `heard SYSTEM COMPONENT LINK STAMP`")]
+    Line(String),
+    /// The timestamp of the last frame that was sent is missing.
+    #[error("the line `ours STAMP` is missing, so recorded frames could be replayed")]
+    NoOwnStamp,
+}
+
+/// The timestamps that must survive a restart: our own, our clock's, and those of each stream that was heard.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// The last timestamp that was used for signing, plus a margin: see [`Signing::memory`].
+    ours: u64,
+    /// The latest time that our own clock has shown.
+    clock: u64,
+    streams: BTreeMap<(Address, u8), u64>,
+}
+
+impl Memory {
+    pub fn to_text(&self) -> String {
+        [self.own_lines()].into_iter().chain(self.streams.iter().map(heard)).collect()
+    }
+
+    /// Returns the lines that update `other`, an older memory, to this one. While the margin of the own timestamps is
+    /// at least half left, they are not written again.
+    pub fn lines_since(&self, other: &Self) -> String {
+        let news = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
+        let own = (self.ours > other.ours + LEAD / 2).then(|| self.own_lines());
+        news.map(heard).chain(own).collect()
+    }
+
+    fn own_lines(&self) -> String {
+        format!("ours {}\nclock {}\n", self.ours, self.clock)
+    }
+
+    /// Notes that what [`Memory::lines_since`] returned was written, so that it is not written again.
+    pub fn catch_up(&mut self, with: &Self) {
+        if with.ours > self.ours + LEAD / 2 {
+            (self.ours, self.clock) = (with.ours, with.clock);
+        }
+        self.streams.clone_from(&with.streams);
+    }
+
+    /// Parses the lines of a timestamp file; later lines override earlier ones. An incomplete last line was cut off
+    /// while it was written. Its frame was not acted on, so the line is ignored.
+    ///
+    /// # Errors
+    /// A line cannot be parsed, or the own timestamp is missing.
+    pub fn from_text(text: &str) -> Result<Self, MemoryError> {
+        let mut memory = Self::default();
+        let mut has_ours = false;
+        for line in text.split_inclusive('\n') {
+            match line.strip_suffix('\n') {
+                Some(line) => {
+                    memory.read_line(line).ok_or_else(|| MemoryError::Line(line.to_owned()))?;
+                    has_ours |= line.starts_with("ours ");
+                }
+                None if has_ours => {}
+                None => return Err(MemoryError::Line(line.to_owned())),
+            }
+        }
+        if has_ours { Ok(memory) } else { Err(MemoryError::NoOwnStamp) }
+    }
+
+    fn read_line(&mut self, line: &str) -> Option<()> {
+        let words: Vec<&str> = line.split(' ').collect();
+        let stamp = |word: &str| word.parse().ok().filter(|stamp| *stamp <= MAX_STAMP);
+        match words[..] {
+            ["ours", ours] => self.ours = stamp(ours)?,
+            ["clock", clock] => self.clock = stamp(clock)?,
+            ["heard", system, component, link, heard] => {
+                let [system_id, component_id, link_id] =
+                    [system.parse().ok()?, component.parse().ok()?, link.parse().ok()?];
+                let stream = (Address { system_id, component_id }, link_id);
+                if self.streams.len() >= MAX_KEYS * MAX_STREAMS && !self.streams.contains_key(&stream) {
+                    return None;
+                }
+                self.streams.insert(stream, stamp(heard)?);
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+fn heard((stream, stamp): (&(Address, u8), &u64)) -> String {
+    let (Address { system_id, component_id }, link_id) = stream;
+    format!("heard {system_id} {component_id} {link_id} {stamp}\n")
+}
+
+// Notices that every frame of a sender is refused for its time stamp although its key is right, and says what to do.
+
+/// A sender is locked out when for this long only such frames arrived.
+const AFTER: Duration = Duration::from_secs(2);
+/// It is said again after this time.
+const AGAIN_AFTER: Duration = Duration::from_secs(30);
+/// At most this many senders are watched. Only holders of the key come here.
+const MAX_SENDERS: usize = 16;
+
+#[derive(Debug, Clone, Copy)]
+struct Refused {
+    since: Duration,
+    said_at: Option<Duration>,
+}
+
+/// The senders of which nothing but refused time stamps has arrived for a while.
+#[derive(Debug, Default)]
+pub struct Lockouts(BTreeMap<Address, Refused>);
+
+impl Lockouts {
+    /// Notes a frame that was accepted: its sender is not locked out.
+    pub fn accepted(&mut self, frame: &Frame) {
+        if frame.is_signed() {
+            self.0.remove(&frame.source());
+        }
+    }
+
+    /// Notes a refused frame. Returns the words for the crew when they are due. `clock` is the time that the frame was judged
+    /// by, as a time stamp.
+    pub fn refused(&mut self, frame: &Frame, why: Rejection, now: Duration, clock: u64) -> Option<String> {
+        let stamp = frame.stamp()?;
+        if !matches!(why, Rejection::Replayed | Rejection::TooOld | Rejection::TooNew) {
+            return None;
+        }
+        let source = frame.source();
+        if self.0.len() >= MAX_SENDERS && !self.0.contains_key(&source) {
+            return None;
+        }
+        let refused = self.0.entry(source).or_insert(Refused { since: now, said_at: None });
+        let due = now.saturating_sub(refused.since) >= AFTER
+            && refused.said_at.is_none_or(|at| now.saturating_sub(at) >= AGAIN_AFTER);
+        if !due {
+            return None;
+        }
+        refused.said_at = Some(now);
+        let Address { system_id, component_id } = source;
+        let off = in_words(stamp.abs_diff(clock));
+        let side = if stamp > clock { "ahead of" } else { "behind" };
+        let what_to_do = match why {
+            Rejection::TooNew => {
+                "if this clock is right, set the vehicle's, remove its file KEY.vehicle.stamps and restart it"
+            }
+            Rejection::TooOld => "set the clock that is wrong, then restart that program",
+            _ => {
+                "either somebody plays a recording, or its clock or its file of stamps was set back: set its clock, remove \
+                 this station's file KEY.ground.stamps and restart the station"
+            }
+        };
+        Some(format!(
+            "LOCKED OUT: nothing of {system_id}/{component_id} is believed, its time stamps are {off} {side} this clock \
+             ({why}); {what_to_do}"
+        ))
+    }
+}
+
+/// A span of time stamps in the unit that fits.
+fn in_words(stamps: u64) -> String {
+    let seconds = stamps / STAMPS_PER_S;
+    match seconds {
+        0..120 => format!("{seconds} s"),
+        120..7_200 => format!("{} min", seconds / 60),
+        7_200..172_800 => format!("{} h", seconds / 3_600),
+        _ => format!("{:.1} days", seconds as f64 / 86_400.0),
     }
 }
