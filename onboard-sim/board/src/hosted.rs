@@ -119,9 +119,11 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
             None => board.take(&arrived[..read], &mut (), &mut (), &mut answers),
             Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answers),
         };
-        to_world.write_all(&answers)?;
-        // A world waits for it.
-        to_world.flush()?;
+        // A world waits for it. One that has ended its flight may have gone before an answer that it asked for again.
+        match to_world.write_all(&answers).and_then(|()| to_world.flush()) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
+            written => written?,
+        }
         answers.clear();
         flown?;
     }

@@ -1,6 +1,7 @@
 //! Tests that the whole flight computer is run again from power-up on: pin, arming, countdown, hold, abort, restart.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
 use flight::computer::crew::{Asked, People, Request};
@@ -151,7 +152,10 @@ impl Flown {
     }
 
     fn written(&self, records: impl Iterator<Item = (Record, u64)>) -> PathBuf {
-        let path = self.folder.path().join("flight.mcap");
+        // Tests at the same time write the same flight, each in its own way.
+        static WRITTEN: AtomicU32 = AtomicU32::new(0);
+        let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
+        let path = self.folder.path().join(format!("flight-{number}.mcap"));
         let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &self.header).unwrap();
         for (record, time_ns) in records {
             writer.write(&record, time_ns).unwrap();

@@ -107,7 +107,7 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
         // The fins take its room.
         ("RATE_POSITION", f32::INFINITY, 7.0, "must be"),
         ("RATE_HEARTBEAT", 0.0, 1.0, "vital messages"),
-        ("NMPC_W_U", 51.0, 50.0, "from the mission"),
+        ("NMPC_W_U", 51.0, 0.0, "from the mission"),
     ] {
         // Texts have a share of each second.
         wire.run(1.0);
