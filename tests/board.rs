@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::thread::{JoinHandle, spawn};
+use std::thread::{Builder, JoinHandle};
 
 use e2e::{
     Ended, Program, Random, Running, SerialLine, Signal, Terminal, auto_ground, expect_identical_replay,
@@ -134,7 +134,7 @@ fn worsened(
     mut to: impl Write + Send + 'static,
     seed: u64,
 ) -> JoinHandle<u64> {
-    spawn(move || {
+    let carries = move || {
         let (mut random, mut bytes, mut worse) = (Random(seed), [0; 4096], 0);
         while let Ok(read @ 1..) = from.read(&mut bytes) {
             let carried = bytes[..read].iter().filter_map(|byte| match random.next() % 10_000 {
@@ -143,11 +143,13 @@ fn worsened(
                 _ => Some(*byte),
             });
             let carried: Vec<u8> = carried.collect();
-            worse += bytes[..read].iter().zip(&carried).any(|(before, after)| before != after) as u64;
+            let differs = bytes[..read].iter().zip(&carried).any(|(before, after)| before != after);
+            worse += u64::from(differs);
             if to.write_all(&carried).is_err() {
                 break;
             }
         }
         worse
-    })
+    };
+    Builder::new().name("bad wire".to_owned()).spawn(carries).unwrap()
 }

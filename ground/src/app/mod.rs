@@ -89,9 +89,9 @@ pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
             (Some(Command::Download { name, to }), _) => {
                 download::run_download(cli, name.as_deref(), to).await
             }
-            (Some(Command::Daemon), _) => session(cli, config, false, operator).await,
+            (Some(Command::Daemon), _) => Box::pin(session(cli, config, false, operator)).await,
             (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
-            (_, None) => session(cli, config, interactive, operator).await,
+            (_, None) => Box::pin(session(cli, config, interactive, operator)).await,
         }
     })
 }

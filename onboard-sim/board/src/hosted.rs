@@ -137,7 +137,7 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
 fn answers_of(path: &Path) -> Result<Vec<Answer>> {
     let mut reader = Reader::default();
     reader.push(&fs::read(path).with_context(|| path.display().to_string())?);
-    let answers: Vec<Answer> = std::iter::from_fn(|| reader.next()).collect();
+    let answers: Vec<Answer> = std::iter::from_fn(|| reader.next_record()).collect();
     let whole = reader.broken() == 0 && reader.missing_its_end() == 0;
     ensure!(whole, "{}: a record is broken or cut off", path.display());
     Ok(answers)

@@ -93,7 +93,7 @@ impl Board {
         out: &mut Vec<u8>,
     ) -> Result<(), FlyError> {
         self.reader.push(bytes);
-        while let Some(mut frame) = self.reader.next::<Frame>() {
+        while let Some(mut frame) = self.reader.next_record::<Frame>() {
             let begin = frame.begin.take();
             if let Some(begin) = begin.filter(|begin| self.flight() != Some(begin.flight)) {
                 self.flying = Some(Flying::power_up(&begin, watch.saved()).map_err(FlyError::Begin)?);

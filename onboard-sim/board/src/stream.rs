@@ -150,7 +150,7 @@ impl Reader {
     }
 
     /// The next whole record; broken ones before it are counted.
-    pub fn next<R: Message + Default>(&mut self) -> Option<R> {
+    pub fn next_record<R: Message + Default>(&mut self) -> Option<R> {
         loop {
             let end = self.pending[self.looked_at..].iter().position(|byte| *byte == 0);
             let Some(end) = end.map(|end| self.looked_at + end) else {

@@ -30,7 +30,7 @@ fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
     }
     let mut reader = Reader::default();
     reader.push(&out);
-    let answers = std::iter::from_fn(|| reader.next()).collect();
+    let answers = std::iter::from_fn(|| reader.next_record()).collect();
     (board, answers, flown)
 }
 

@@ -1,5 +1,4 @@
-//! After a rehearsal neither a tick of the controller nor a search for the final time allocates.
-#![expect(clippy::expect_used, reason = "a missing built-in profile is a failed test")]
+//! A warm search for the final time does not allocate.
 
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
 

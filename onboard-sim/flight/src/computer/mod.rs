@@ -113,12 +113,11 @@ impl Computer {
         self.watch_the_taps();
         let abort = asked.iter().any(Option::is_none);
         let released_before = self.release;
-        let planned = match released_before {
-            Some(release) => self.fly(input, release, abort),
-            None => {
-                self.wait_on_the_pad(input);
-                false
-            }
+        let planned = if let Some(release) = released_before {
+            self.fly(input, release, abort)
+        } else {
+            self.wait_on_the_pad(input);
+            false
         };
         let mode = self.table.mode();
         self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;

@@ -15,7 +15,7 @@ use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::{Read as _, Write as _};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 use std::{io, thread};
 
@@ -81,7 +81,7 @@ impl OnBoard {
         // In the order in which the board opens them.
         let frames = opened("frames", OpenOptions::new().write(true))?;
         let mut from_board = opened("answers", OpenOptions::new().read(true))?;
-        let (sender, answers) = channel();
+        let (sender, answers) = sync_channel(16);
         let reading = thread::Builder::new().name("board".into()).spawn(move || {
             let (mut reader, mut arrived) = (Reader::default(), [0; 4096]);
             loop {
@@ -93,7 +93,7 @@ impl OnBoard {
                         return;
                     }
                 }
-                while let Some(answer) = reader.next() {
+                while let Some(answer) = reader.next_record() {
                     if sender.send(Ok(answer)).is_err() {
                         return;
                     }

@@ -165,7 +165,8 @@ fn frames(leaving: Vec<Outgoing>) -> Vec<Frame> {
 
 #[test]
 fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
-    for mut pad in [Pad::rocket(), Pad::hanging()] {
+    for pad in [Pad::rocket, Pad::hanging] {
+        let mut pad = pad();
         // Another station is heard, but not the one that asks.
         assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
         assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
@@ -190,7 +191,8 @@ fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not
 
 #[test]
 fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
-    for mut pad in [Pad::rocket(), Pad::hanging()] {
+    for pad in [Pad::rocket, Pad::hanging] {
+        let mut pad = pad();
         let countdown_s = pad.vehicle.computer().countdown_s();
         pad.count_down();
         pad.run(1.0);
@@ -290,7 +292,8 @@ fn a_latched_abort_has_its_reason_on_the_wire() {
 
 #[test]
 fn a_held_vehicle_disarms_after_a_minute() {
-    for mut pad in [Pad::rocket(), Pad::hanging()] {
+    for pad in [Pad::rocket, Pad::hanging] {
+        let mut pad = pad();
         pad.count_down();
         pad.speaking.clear();
         pad.run(UPLINK_SILENT_S + 0.2);
@@ -306,7 +309,8 @@ fn a_held_vehicle_disarms_after_a_minute() {
 
 #[test]
 fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
-    for mut pad in [Pad::rocket(), Pad::hanging()] {
+    for pad in [Pad::rocket, Pad::hanging] {
+        let mut pad = pad();
         assert_eq!(pad.ask(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
         pad.count_down();
         assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
