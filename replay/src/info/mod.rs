@@ -401,7 +401,7 @@ impl VerdictFacts {
 
 /// How a flight ended whose log, of an earlier release, does not say it.
 fn ending_of_earlier(verdict: &v1::LandingVerdict) -> String {
-    // The limits of a planar landing are Table 2; those of legs have other names.
+    // A verdict of before the legs was judged by Table 2, which has a limit of `u`.
     let in_plane = verdict.limits.iter().any(|limit| limit.name == "u");
     let broken = verdict.limits.iter().rev().find(|limit| !limit.passed);
     FlightEnding {

@@ -61,7 +61,7 @@ fn commands(recording: &Recording) -> (&'static str, usize, f64) {
 fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
     for log in LOGS.iter() {
         let read = said(READERS.python().arg(file("readers/read_mcap.py")).arg(log));
-        assert!(read.contains("/vehicle/truth"), "{read}");
+        assert!(read.contains("/vehicle/truth3d"), "{read}");
         said(READERS.program("pymcap-cli").arg("doctor").arg(log));
         let recording = Recording::open(log).unwrap();
         let (topic, count, command_rad) = commands(&recording);
@@ -131,7 +131,7 @@ fn grouped(count: u64) -> String {
 fn logs_pass_rerun_mcap_check() {
     for log in LOGS.iter() {
         let checked = said(RERUN.program("rerun").args(["mcap", "check"]).arg(log));
-        let accepted = |line: &str| line.starts_with("ok ") && line.contains("/vehicle/truth");
+        let accepted = |line: &str| line.starts_with("ok ") && line.contains("/vehicle/truth3d");
         assert!(checked.lines().any(accepted), "{checked}");
         assert!(!checked.lines().any(|line| line.starts_with("error")), "{checked}");
     }

@@ -25,9 +25,7 @@ pub struct GateInput {
     pub predicted_speed_m_s: f64,
     /// Disagreement of the two height sources, m.
     pub height_disagreement_m: f64,
-    /// The controller has a plan that lands from this state
-    /// ([`SolverReport::landing_feasible`](crate::guidance::controller::SolverReport::landing_feasible)): the height is
-    /// inside the feasible band.
+    /// The height at the onset of thrust is inside the feasible band.
     pub landing_feasible: bool,
     /// Horizontal distance of the predicted touchdown from the pad, m.
     pub predicted_touchdown_x_m: f64,
