@@ -11,7 +11,7 @@ import sys
 import mavsdk
 from mavsdk import System
 from mavsdk.action import ActionError
-from facts import check
+from facts import check, upright
 
 PATIENCE_S = 60
 
@@ -62,8 +62,8 @@ async def fly(drone):
     await within("connected", drone.connect())
     await within("found", first(drone.core.connection_state(), lambda state: state.is_connected))
     attitude = drone.telemetry.attitude_quaternion()
-    await within("the attitude is upright", first(attitude, lambda a: abs(a.y - 0.7071) < 0.01))
-    check("a parameter is read", await drone.param.get_param_float("NMPC_W_THETA") == 150)
+    await within("the attitude is upright", first(attitude, upright))
+    check("a parameter is read", await drone.param.get_param_float("NMPC_W_THETA") == 100)
     everything = await within("all parameters", drone.param.get_all_params())
     check("all of them are floats", len(everything.float_params) > 20 and not everything.int_params)
     check("a takeoff is refused", await refused(drone.action.takeoff()))

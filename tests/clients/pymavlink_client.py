@@ -161,14 +161,14 @@ def parameters(ground):
     check(f"{len(values)} parameters, all REAL32", len(values) > 20 and "RATE_FLIGHT_STAT" in values)
     check("names have at most 16 bytes", max(map(len, values)) == 16)
     ground.link.mav.param_request_read_send(1, 1, b"NMPC_W_THETA", -1)
-    check("one by name", ground.message("PARAM_VALUE").param_value == 150)
+    check("one by name", ground.message("PARAM_VALUE").param_value == 100)
 
     def set_to(name, value, kind=mav.MAV_PARAM_TYPE_REAL32):
         ground.link.mav.param_set_send(1, 1, name.encode(), value, kind)
         return ground.message("PARAM_VALUE", lambda m: m.param_id == name).param_value
 
     check("a rate is set", set_to("RATE_FINS", 1) == 1)
-    check("a weight is not, and answered", set_to("NMPC_W_U", 1) == 50)
+    check("a weight is not, and answered", set_to("NMPC_W_U", 1) == 0)
     check("an INT32 is not, and answered", set_to("RATE_FINS", 2, mav.MAV_PARAM_TYPE_INT32) == 1)
     check("back again", set_to("RATE_FINS", 2) == 2)
 
