@@ -5,13 +5,14 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, Output};
 
-use flight::computer::{Computer, Input};
+use flight::computer::Computer;
 use flight::guidance::baseline::Law;
 use prost::Message as _;
-use protocol::log::flight_v1::{PilotStart, PilotTick};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::{ATTACHMENT_PROFILE, TOPIC_PILOT_START, TOPIC_PILOT_TICK};
-use tick_log::pilot::{input_from_log, output_to_log, state_from_log};
+use protocol::log::record::{ATTACHMENT_PROFILE, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
+use tick_log::estimate::state_from_log;
+use tick_log::frame::{input_from_log, output_to_log};
 
 fn campaign(directory: &Path, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_onboard-sim");
@@ -68,7 +69,7 @@ fn a_logged_flight_flies_again_bit_for_bit() {
     assert!(matches!(flown.status.code(), Some(0 | 3)), "{}", stderr(&flown));
 
     let mut reader = LogReader::new(File::open(directory.path().join("k.mcap")).unwrap());
-    let (mut toml, mut start, mut ticks) = (None, None, Vec::new());
+    let (mut toml, mut start, mut frames) = (None, None, Vec::new());
     while let Some(item) = reader.next_item().unwrap() {
         match item {
             LogItem::Attachment { name, data } if name == ATTACHMENT_PROFILE => {
@@ -76,34 +77,34 @@ fn a_logged_flight_flies_again_bit_for_bit() {
             }
             LogItem::Message { channel_id, data, .. } => {
                 let topic = &reader.channel(channel_id).unwrap().topic;
-                if topic == TOPIC_PILOT_START {
-                    start = Some(PilotStart::decode(data.as_slice()).unwrap());
-                } else if topic == TOPIC_PILOT_TICK {
-                    ticks.push(PilotTick::decode(data.as_slice()).unwrap());
+                if topic == TOPIC_COMPUTER_START {
+                    start = Some(ComputerStart::decode(data.as_slice()).unwrap());
+                } else if topic == TOPIC_COMPUTER_FRAME {
+                    frames.push(ComputerFrame::decode(data.as_slice()).unwrap());
                 }
             }
             _ => {}
         }
     }
     assert_eq!(reader.damage(), None);
-    assert!(ticks.len() > 2000, "{} frames", ticks.len());
+    assert!(frames.len() > 2000, "{} frames", frames.len());
 
     let (mission, start) = (vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
     let believed = state_from_log(&start.believed);
-    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released();
+    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
     let (mut expected_frame, mut restarts) = (1, 0);
-    for tick in &ticks {
-        let input = input_from_log(&tick.input).unwrap();
-        if input.frame > expected_frame {
+    for frame in &frames {
+        let number = frame.input.frame;
+        if number > expected_frame {
             // The computer was dead and came back at the end of the frame before this one.
-            computer.restart((input.frame - 1) as f64 * 5.0 * 1e-3);
+            computer.restart((number - 1) as f64 * 5.0 * 1e-3);
             restarts += 1;
         }
-        computer.step(&Input::in_the_air(&input));
-        let (_, output) = computer.piloted().unwrap();
-        assert_eq!(output_to_log(output), tick.output, "frame {}", input.frame);
-        assert_eq!(computer.flight_digest(), tick.state_digest, "frame {}", input.frame);
-        expected_frame = input.frame + 1;
+        let input = input_from_log(&frame.input).unwrap();
+        let output = computer.step(&input.input());
+        assert_eq!(output_to_log(&output, &computer), frame.output, "frame {number}");
+        assert_eq!(computer.digest(), frame.state_digest, "frame {number}");
+        expected_frame = number + 1;
     }
     assert_eq!(restarts, 1);
 }

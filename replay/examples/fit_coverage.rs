@@ -21,10 +21,9 @@ fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {
         flight.step();
         let reported_rad = flight.world().gimbal_feedback_rad();
         let reported = (std::env::var("REPORTED").is_ok()).then_some(reported_rad);
-        if let (Some((input, output)), Some(believed)) =
-            (flight.computer().piloted(), flight.pilot().estimate())
-        {
-            trace.push(input, output, believed, reported);
+        let computer = flight.computer();
+        if let (Some(input), Some(believed)) = (computer.flown(), flight.pilot().estimate()) {
+            trace.push(input, computer.commands(), computer.mode().phase, believed, reported);
         }
         if !flight.goes_on() {
             return Ok((trace, flight));

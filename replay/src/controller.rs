@@ -1,62 +1,23 @@
 //! The flight computer that a log's frames came from, run again on their inputs.
-//!
-//! Two records of a frame are read: [`LoggedComputer`] runs every frame from power-up on, and [`LoggedPilot`] the frames
-//! from the release on, some of which plan a landing. Verification is written for any [`Replayed`].
 
 use std::collections::BTreeMap;
 
-use flight::computer::pilot::{Pilot, PilotInput, PilotOutput};
-use flight::computer::{Computer, Input, flight_time_s};
-use flight::guidance::baseline::{Controller, Law, UnknownController};
-use flight::guidance::powered::ControlLevel;
-use flight::guidance::powered::{LandingSolved, Plane};
+use flight::computer::Output;
+use flight::computer::pilot::Pilot;
+use flight::guidance::baseline::{Controller, Law};
+use flight::guidance::powered::{ControlLevel, LandingSolved, Plane};
+use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 use nalgebra::Vector3;
 use nmpc::SolveStatus;
-use prost::Message;
-use prost_reflect::MessageDescriptor;
-use protocol::log::{computer_v1, flight_v1};
+use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
 pub use tick_log::again::FrameError;
 use tick_log::again::RecordedComputer;
-use tick_log::pilot::{input_from_log, state_from_log, tick_to_log, vector_from_log};
+use tick_log::frame::{LoggedInput, level_of, phase_of};
 
-use crate::log::{computer_descriptor, pilot_descriptor};
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
-
-/// A flight computer that can be run on the frames of a log; frames must come in order, from the first one on.
-pub trait Replayed {
-    /// The record of a frame in a log.
-    type Tick: Message;
-    /// Why a frame cannot be run again.
-    type Error: std::error::Error + 'static;
-
-    /// Describes the record's fields.
-    fn descriptor() -> Option<MessageDescriptor>;
-
-    /// The frame that a record belongs to.
-    fn moment(tick: &Self::Tick) -> Moment;
-
-    /// The gimbal commands of a record, rad.
-    fn gimbal_rad(tick: &Self::Tick) -> &[f64];
-
-    /// Runs a recorded frame again: the result has the recorded input and the new decision.
-    ///
-    /// # Errors
-    /// The recorded input cannot be given to this build's flight computer.
-    fn run_again(&mut self, tick: &Self::Tick) -> Result<Self::Tick, Self::Error>;
-}
-
-/// A frame, its vehicle time and its phase.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moment {
-    /// Its number.
-    pub tick: u64,
-    /// Vehicle time, s.
-    pub time_s: f64,
-    pub phase: &'static str,
-}
 
 /// Summary of a frame's decision.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -76,96 +37,26 @@ pub struct Decided {
     pub plan_lands: Option<bool>,
 }
 
-fn phase_name(number: u32) -> &'static str {
-    let phase = u8::try_from(number).ok().and_then(flight::rules::phase::Phase::from_index);
-    phase.map_or("unknown", flight::rules::phase::Phase::name)
-}
-
-/// Why a flight computer cannot be built as it was at power-up.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    #[error("controller {0}")]
-    Controller(#[from] UnknownController),
-}
-
-/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order.
-#[derive(Debug, Clone)]
-pub struct LoggedComputer(RecordedComputer);
-
-impl LoggedComputer {
-    /// The flight computer that a log's frames came from, before its first frame. It is built from the text of the
-    /// mission and from the law that the run facts name.
-    ///
-    /// # Errors
-    /// This build cannot use the text, or a name is unknown.
-    pub fn recorded(
-        toml: &str,
-        start: &computer_v1::ComputerStart,
-        run: &BTreeMap<String, String>,
-    ) -> Result<Self, StartError> {
-        let start = &start.start;
-        let schedule = LoggedPilot::schedule(toml, start, &[])?;
-        let controller = run.get("controller").map(|name| name.parse::<Controller>()).transpose()?;
-        Ok(Self(RecordedComputer::at_power_up(schedule.base(), start, controller.unwrap_or_default())))
-    }
-
-    /// The pilot's part of the last frame, as a log has it; `None` on the pad.
-    pub fn pilot_tick(&self) -> Option<flight_v1::PilotTick> {
-        let computer = self.0.computer();
-        let (input, output) = computer.piloted()?;
-        Some(tick_to_log(input, output, computer.flight_digest()))
-    }
-}
-
-impl Replayed for LoggedComputer {
-    type Tick = computer_v1::ComputerFrame;
-    type Error = FrameError;
-
-    fn descriptor() -> Option<MessageDescriptor> {
-        computer_descriptor()
-    }
-
-    fn moment(frame: &computer_v1::ComputerFrame) -> Moment {
-        let input = &frame.input;
-        Moment { tick: input.frame, time_s: input.time_s, phase: phase_name(frame.output.phase) }
-    }
-
-    fn gimbal_rad(frame: &computer_v1::ComputerFrame) -> &[f64] {
-        &frame.output.gimbal_rad
-    }
-
-    fn run_again(
-        &mut self,
-        frame: &computer_v1::ComputerFrame,
-    ) -> Result<computer_v1::ComputerFrame, FrameError> {
-        let read = self.0.read(&frame.input)?;
-        let output = self.0.step(&read);
-        Ok(self.0.record(&read, &output))
-    }
+pub(crate) fn phase_name(output: &ComputerOutput) -> &'static str {
+    phase_of(output).map_or("unknown", Phase::name)
 }
 
 /// Run fact of a re-flown flight's log: the settings that changed in flight, one on each line.
 pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
-/// The number of the first frame.
-const FIRST_FRAME: u64 = 1;
-
 /// Run facts of a re-flown flight's log: the law of the landing burn, and the first frame that it flew.
 pub(crate) const REFLOWN_BY: &str = "reflown_by";
 pub(crate) const REFLOWN_AT: &str = "reflown_at_tick";
 
-/// A pilot that is run on the frames of a log; frames must come in order. Missing frames mean that the computer was
-/// restarted: it is restarted here, too.
+/// A flight computer that is run on the frames of a log, from its power-up or its release on; frames must come in order.
+/// Missing frames mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
-pub struct LoggedPilot {
-    computer: Computer,
+pub struct LoggedComputer {
+    computer: RecordedComputer,
     schedule: Schedule<Mission>,
     /// The frame in which a re-flown flight changed to another law, and that law.
     other_law: Option<(u64, Controller)>,
-    next: u64,
-    /// If false, the recorded digests are copied: digests of another schema cover other fields.
+    /// If false, the recorded digests are copied.
     compares_digests: bool,
 }
 
@@ -177,15 +68,15 @@ pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>
     run.get(SETTINGS_IN_FLIGHT).map_or_else(|| Ok(Vec::new()), |text| text.lines().map(str::parse).collect())
 }
 
-impl LoggedPilot {
-    /// The pilot that a log's frames came from, before its first frame. It is built from the mission, from the laws and
-    /// changes of settings that the run facts name, and from the `other` settings, which apply last.
+impl LoggedComputer {
+    /// The flight computer that a log's frames came from, before its first frame. It is built from the mission, from the laws
+    /// and changes of settings that the run facts name, and from the `other` settings, which apply last.
     ///
     /// # Errors
     /// This build cannot use the text as a mission, or a name is unknown.
     pub fn recorded(
         mission_toml: &str,
-        start: &flight_v1::PilotStart,
+        start: &ComputerStart,
         run: &BTreeMap<String, String>,
         other: &[Setting],
     ) -> Result<Self, SettingError> {
@@ -196,18 +87,12 @@ impl LoggedPilot {
         let controller = law_of("controller")?.unwrap_or_default();
         let at_frame = run.get(REFLOWN_AT).and_then(|frame| frame.parse().ok());
         let other_law = at_frame.zip(law_of(REFLOWN_BY)?);
-        let law = Law::of(controller, schedule.base());
-        let believed = state_from_log(&start.believed);
-        let computer = Computer::at_power_up(schedule.base(), law, &believed);
-        let computer = match &start.gyro_bias_rad_s {
-            Some(bias) => computer.standing(&believed, vector_from_log(bias)),
-            None => computer,
-        }
-        .released();
-        Ok(Self { computer, schedule, other_law, next: FIRST_FRAME, compares_digests: true })
+        let computer = RecordedComputer::started(schedule.base(), start, controller);
+        Ok(Self { computer, schedule, other_law, compares_digests: true })
     }
 
-    /// The same pilot for a log of another schema, whose digests cover other fields and are not compared.
+    /// The same computer where digests are not compared: in a log of another schema they cover other fields, and a computer
+    /// that did not wait on the pad remembers less.
     #[must_use]
     pub fn without_digests(self) -> Self {
         Self { compares_digests: false, ..self }
@@ -216,7 +101,7 @@ impl LoggedPilot {
     /// The missions over time: first the mission as at the release, then with the settings.
     pub(crate) fn schedule(
         mission_toml: &str,
-        start: &flight_v1::PilotStart,
+        start: &ComputerStart,
         settings: &[Setting],
     ) -> Result<Schedule<Mission>, SettingError> {
         Schedule::of(settings, |so_far| {
@@ -234,104 +119,75 @@ impl LoggedPilot {
 
     /// The pilot in the flight computer.
     pub fn pilot(&self) -> &Pilot {
-        self.computer.pilot()
+        self.computer.computer().pilot()
     }
 
-    /// Runs one frame.
+    /// Runs a recorded frame again: the result has the recorded input and the new decision.
     ///
     /// # Errors
-    /// The frame is out of order.
-    pub fn step(&mut self, input: &PilotInput) -> Result<PilotOutput, FrameError> {
-        self.make_ready(input)?;
-        self.computer.step(&Input::in_the_air(input));
-        Ok(self.decided_now())
+    /// The recorded input cannot be given to this build's flight computer, or the frame is out of order.
+    pub fn run_again(&mut self, frame: &ComputerFrame) -> Result<ComputerFrame, FrameError> {
+        let read = self.read(frame)?;
+        let output = self.computer.step(&read);
+        Ok(self.record(frame, &read, &output))
     }
 
-    /// Runs one frame, and solves the landing that it plans separately; see [`Computer::step_inspected`].
+    /// Runs a recorded frame again, and solves the landing that it plans separately; see [`Computer::step_inspected`].
     ///
     /// # Errors
-    /// As [`step`](Self::step).
-    pub fn step_inspected(
+    /// As [`run_again`](Self::run_again).
+    ///
+    /// [`Computer::step_inspected`]: flight::computer::Computer::step_inspected
+    pub fn run_inspected(
         &mut self,
-        input: &PilotInput,
-    ) -> Result<(PilotOutput, Option<LandingSolved>), FrameError> {
-        self.make_ready(input)?;
-        let (_, solved) = self.computer.step_inspected(&Input::in_the_air(input));
-        Ok((self.decided_now(), solved))
+        frame: &ComputerFrame,
+    ) -> Result<(ComputerFrame, Option<LandingSolved>), FrameError> {
+        let read = self.read(frame)?;
+        let (output, solved) = self.computer.step_inspected(&read);
+        Ok((self.record(frame, &read, &output), solved))
     }
 
-    fn decided_now(&self) -> PilotOutput {
-        let piloted = self.computer.piloted();
-        piloted.map_or_else(|| unreachable!("a frame was flown"), |(_, output)| *output)
-    }
-
-    /// The digest of the pilot's memory.
-    pub fn digest(&self) -> u64 {
-        self.computer.flight_digest()
-    }
-
-    /// Applies the restarts and the changes of settings that come before a frame.
-    fn make_ready(&mut self, input: &PilotInput) -> Result<(), FrameError> {
-        let frame = input.frame;
-        if frame < self.next {
-            return Err(FrameError::Order { frame, after: self.next - 1 });
+    fn record(&mut self, frame: &ComputerFrame, read: &LoggedInput, output: &Output) -> ComputerFrame {
+        let again = self.computer.record(read, output);
+        if self.compares_digests {
+            again
+        } else {
+            ComputerFrame { state_digest: frame.state_digest, ..again }
         }
-        if frame > self.next {
-            // It was dead in the missing frames and restarted at the end of the frame before this one.
-            self.computer.restart(flight_time_s(frame - 1));
-            if self.computer.released_at_s().is_none() {
-                return Err(FrameError::Gap { frame, missing: frame - self.next });
-            }
+    }
+
+    /// Reads an input, and applies the restarts and the changes of settings that come before its frame.
+    fn read(&mut self, frame: &ComputerFrame) -> Result<LoggedInput, FrameError> {
+        let (number, next) = (frame.input.frame, self.computer.next());
+        let flew = self.computer.computer().released_at_s().is_some();
+        let read = self.computer.read(&frame.input)?;
+        let released_at_s = self.computer.computer().released_at_s();
+        if let Some(next) = next.filter(|_| flew && released_at_s.is_none()) {
+            return Err(FrameError::Gap { frame: number, missing: number.saturating_sub(next) });
         }
-        self.next = frame.saturating_add(1);
-        if let Some(mission) = self.schedule.due(input.time_s) {
-            self.computer.reconfigure(mission);
+        let computer = self.computer.computer_mut();
+        if let Some(released_at_s) = released_at_s
+            && let Some(mission) = self.schedule.due(frame.input.time_s - released_at_s)
+        {
+            computer.reconfigure(mission);
         }
-        if let Some((_, controller)) = self.other_law.take_if(|(at_frame, _)| *at_frame <= frame) {
-            let law = Law::of(controller, self.pilot().mission());
-            self.computer.set_law(law);
+        if let Some((_, controller)) = self.other_law.take_if(|(at_frame, _)| *at_frame <= number) {
+            let law = Law::of(controller, computer.pilot().mission());
+            computer.set_law(law);
         }
-        Ok(())
-    }
-}
-
-impl Replayed for LoggedPilot {
-    type Tick = flight_v1::PilotTick;
-    type Error = FrameError;
-
-    fn descriptor() -> Option<MessageDescriptor> {
-        pilot_descriptor()
+        Ok(read)
     }
 
-    fn moment(tick: &flight_v1::PilotTick) -> Moment {
-        let input = &tick.input;
-        Moment { tick: input.frame, time_s: input.time_s, phase: phase_name(tick.output.phase) }
-    }
-
-    fn gimbal_rad(tick: &flight_v1::PilotTick) -> &[f64] {
-        &tick.output.gimbal_rad
-    }
-
-    fn run_again(&mut self, tick: &flight_v1::PilotTick) -> Result<flight_v1::PilotTick, FrameError> {
-        let input = input_from_log(&tick.input)?;
-        let output = self.step(&input)?;
-        let digest = if self.compares_digests { self.digest() } else { tick.state_digest };
-        Ok(tick_to_log(&input, &output, digest))
-    }
-}
-
-impl LoggedPilot {
-    /// A summary of a frame's decision; the pilot has just run that frame.
-    pub fn decided(&self, tick: &flight_v1::PilotTick) -> Decided {
-        let output = &tick.output;
+    /// A summary of a frame's decision; the computer has just run that frame.
+    pub fn decided(&self, frame: &ComputerFrame) -> Decided {
+        let output = &frame.output;
         let report = self.pilot().report();
-        let level = u8::try_from(output.level).ok().and_then(ControlLevel::from_index);
         let planned = report.status != SolveStatus::NotRun;
         Decided {
             gimbal_rad: output.gimbal_rad.clone(),
             fins_rad: output.fins_rad.clone(),
-            phase: phase_name(output.phase),
-            level: level.map_or("unknown", ControlLevel::name),
+            phase: phase_name(output),
+            level: level_of(output).map_or("unknown", ControlLevel::name),
             cost: report.cost,
             iterations: u32::try_from(report.iterations).unwrap_or(u32::MAX),
             plan_lands: planned.then(|| report.level == ControlLevel::Converged),

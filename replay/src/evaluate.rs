@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::cli::{Answer, answer, warn_of_what_is_missing};
 pub use crate::controller::Decided;
-use crate::controller::{FrameError, LoggedPilot, Replayed as _};
+use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
 use crate::print::{print_json, shown};
 use crate::settings::{Setting, SettingArguments, SettingError};
@@ -145,21 +145,20 @@ fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated
     let (start, frames) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let run = &recording.head.run;
-    let mut then = LoggedPilot::recorded(toml, start, run, &[])?;
+    let mut then = LoggedComputer::recorded(toml, start, run, &[])?;
     refuse(settings, then.pilot().mission().estimator.frame_s)?;
-    let mut now = LoggedPilot::recorded(toml, start, run, settings)?;
+    let mut now = LoggedComputer::recorded(toml, start, run, settings)?;
     let mut evaluated = Vec::with_capacity(frames.len());
     let mut unchanged_different = 0;
     for frame in frames {
         let unchanged = then.run_again(frame)?;
         let again = now.run_again(frame)?;
-        let moment = LoggedPilot::moment(frame);
         let recorded = then.decided(frame);
         unchanged_different += usize::from(then.decided(&unchanged) != recorded);
         evaluated.push(EvaluatedTick {
-            tick: moment.tick,
-            time_s: moment.time_s,
-            phase: moment.phase,
+            tick: frame.input.frame,
+            time_s: frame.input.time_s,
+            phase: phase_name(&frame.output),
             recorded,
             evaluated: now.decided(&again),
         });

@@ -44,7 +44,7 @@ pub fn expect_landing(vehicle: Running, ground: Running) -> (Ended, Ended) {
 pub fn expect_identical_replay(folder: &Path, log: &str) {
     let verified = Running::to_end(program(Program::Replay).args(["verify", log]).current_dir(folder));
     assert_eq!(verified.code, Some(0), "{}", verified.output);
-    assert!(verified.output.contains("ticks identical"), "{}", verified.output);
+    assert!(verified.output.contains("frames identical"), "{}", verified.output);
 }
 
 /// The time at the end of a vehicle's output, s.

@@ -15,6 +15,7 @@ use board::recorded::Board;
 use board::stream::{Answer, Reader};
 use clap::{Parser, Subcommand};
 use flight::rules::phase::Phase;
+use tick_log::frame::phase_of;
 
 /// The flight computer as a program for a board.
 #[derive(Parser)]
@@ -210,11 +211,5 @@ fn costs(folders: &[PathBuf]) -> Result<()> {
 }
 
 fn plans_a_landing(answer: &Answer) -> bool {
-    let phase = match (&answer.from_power_up, &answer.in_the_air) {
-        (Some(output), _) => output.phase,
-        (_, Some(output)) => output.phase,
-        _ => return false,
-    };
-    let phase = u8::try_from(phase).ok().and_then(Phase::from_index);
-    phase.is_some_and(|phase| phase == Phase::LandArmed || phase.in_landing_burn())
+    phase_of(&answer.output).is_some_and(|phase| phase == Phase::LandArmed || phase.in_landing_burn())
 }

@@ -11,7 +11,7 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StateWeights;
 use protocol::frame::Framer;
 use protocol::mission::MissionHash;
-use tick_log::computer::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
+use tick_log::frame::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
 use vehicle_link::endpoint::{Heard, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
 use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};

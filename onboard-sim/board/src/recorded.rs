@@ -6,10 +6,9 @@ use alloc::vec::Vec;
 use flight::computer::Output;
 use flight::computer::saved::Saved;
 use flight::guidance::baseline::Controller;
-use log_records::computer_v1::ComputerStart;
+use log_records::computer_v1::ComputerInput;
 use tick_log::again::{FrameError, RecordedComputer, mission_flown};
-use tick_log::computer::output_to_log;
-use tick_log::pilot;
+use tick_log::frame::output_to_log;
 
 use crate::radio::{Crewed, Radio};
 use crate::stream::{Answer, Begin, Frame, Reader, put};
@@ -44,8 +43,6 @@ pub enum FlyError {
     /// No computer can be built from the first record.
     #[error("the first record: {0}")]
     Begin(String),
-    #[error("the record after {after} frames must have one input, of a flight from power-up or in the air")]
-    TwoInputs { after: u64 },
     #[error(transparent)]
     Frame(#[from] FrameError),
 }
@@ -100,7 +97,7 @@ impl Board {
                 watch.is_set_up();
             }
             let flying = self.flying.as_mut().ok_or(FlyError::Empty)?;
-            self.frames += u64::from(flying.fly(&frame, self.frames, radio, watch, out)?);
+            self.frames += u64::from(flying.fly(&frame.input, radio, watch, out)?);
         }
         Ok(())
     }
@@ -114,13 +111,12 @@ impl Flying {
     /// Returns whether the frame was flown now.
     fn fly(
         &mut self,
-        frame: &Frame,
-        after: u64,
+        input: &ComputerInput,
         radio: &mut impl Radio,
         watch: &mut impl Watch,
         out: &mut Vec<u8>,
     ) -> Result<bool, FlyError> {
-        let number = frame.number().ok_or(FlyError::TwoInputs { after })?;
+        let number = input.frame;
         if let Some((_, answer)) = self.answered.as_ref().filter(|(answered, _)| *answered == number) {
             out.extend(answer);
             return Ok(false);
@@ -133,41 +129,21 @@ impl Flying {
             None => {}
         }
         let computer = &mut self.computer;
-        let answer = match (&frame.from_power_up, &frame.in_the_air) {
-            (Some(input), None) => {
-                let read = computer.read(input)?;
-                let read = match &self.crewed {
-                    Some(crewed) => crewed.hear(read),
-                    None => read,
-                };
-                watch.begins();
-                let output = computer.step(&read);
-                watch.ended(number, &output);
-                let computer = computer.computer();
-                let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
-                Answer {
-                    frame: number,
-                    from_power_up: Some(output_to_log(&output, computer)),
-                    in_the_air: None,
-                    state_digest: computer.digest(),
-                    heard: self.crewed.as_mut().map(speak),
-                }
-            }
-            (None, Some(input)) => {
-                let read = computer.read_in_the_air(input)?;
-                watch.begins();
-                let output = computer.step_in_the_air(&read);
-                watch.ended(number, &output);
-                let computer = computer.computer();
-                Answer {
-                    frame: number,
-                    from_power_up: None,
-                    in_the_air: computer.piloted().map(|(_, output)| pilot::output_to_log(output)),
-                    state_digest: computer.flight_digest(),
-                    heard: None,
-                }
-            }
-            _ => return Err(FlyError::TwoInputs { after }),
+        let read = computer.read(input)?;
+        let read = match &self.crewed {
+            Some(crewed) => crewed.hear(read),
+            None => read,
+        };
+        watch.begins();
+        let output = computer.step(&read);
+        watch.ended(number, &output);
+        let computer = computer.computer();
+        let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
+        let answer = Answer {
+            frame: number,
+            output: output_to_log(&output, computer),
+            state_digest: computer.digest(),
+            heard: self.crewed.as_mut().map(speak),
         };
         watch.save(&self.computer.computer().saved());
         let mut bytes = Vec::new();
@@ -180,21 +156,10 @@ impl Flying {
     /// The flight computer before its first frame, and the crew's end of it; or why there is none.
     fn power_up(begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
         let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
-        let mission = |start| {
-            let mission = vehicles::mission::from_toml(&begin.toml, "mission");
-            mission.map_err(|error| error.to_string()).map(|mission| mission_flown(mission, start))
-        };
-        let (computer, crewed) = match (&begin.at_power_up, &begin.in_the_air, &begin.on_the_air) {
-            (Some(ComputerStart { start }), None, on_the_air) => {
-                let mission = mission(start)?;
-                let computer = RecordedComputer::at_power_up(&mission, start, controller);
-                (computer, on_the_air.as_ref().map(|air| Crewed::new(air, mission, &begin.toml)))
-            }
-            (None, Some(start), None) => {
-                (RecordedComputer::in_the_air(&mission(start)?, start, controller), None)
-            }
-            _ => return Err("must name one start, with a radio only from power-up on".into()),
-        };
+        let mission = vehicles::mission::from_toml(&begin.toml, "mission");
+        let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start);
+        let computer = RecordedComputer::started(&mission, &begin.start, controller);
+        let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(air, mission, &begin.toml));
         Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })
     }
 }

@@ -8,20 +8,18 @@
 //! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander and requests in a frame, and
 //! its answer has them for the next one, so that a world that flies the same computer beside it can compare.
 //!
-//! Inputs and answers are the records of the flight log, byte for byte. There are two kinds of flights in logs: from
-//! power-up on, and, as in a campaign, released at once in the air.
+//! Inputs and answers are the records of the flight log, byte for byte.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use log_records::computer_v1::{Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink};
-use log_records::flight_v1::{PilotInput, PilotOutput, PilotStart};
 use prost::Message;
 
 /// Longest accepted record, bytes: several times a mission with its motors' files (20 KB), the longest there is.
 pub const LONGEST_BYTES: usize = 128 * 1024;
 
-/// What a computer is built from at power-up.
+/// What a computer is built from.
 #[derive(Clone, PartialEq, Message)]
 pub struct Begin {
     /// The mission's text, from the log.
@@ -30,17 +28,14 @@ pub struct Begin {
     /// The law of the landing burn, by its name.
     #[prost(string, required, tag = "2")]
     pub controller: String,
-    /// The start of a flight from power-up on.
-    #[prost(message, optional, tag = "3")]
-    pub at_power_up: Option<ComputerStart>,
-    /// The start of a flight that was released at once.
-    #[prost(message, optional, tag = "4")]
-    pub in_the_air: Option<PilotStart>,
+    /// The start in the log: at power-up, or at the release.
+    #[prost(message, required, tag = "3")]
+    pub start: ComputerStart,
     /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are in the frames.
-    #[prost(message, optional, tag = "5")]
+    #[prost(message, optional, tag = "4")]
     pub on_the_air: Option<OnTheAir>,
     /// Another one for each flight: a board that flies this one already does not begin it again.
-    #[prost(uint32, required, tag = "6")]
+    #[prost(uint32, required, tag = "5")]
     pub flight: u32,
 }
 
@@ -75,42 +70,30 @@ pub struct Heard {
     pub requests: Vec<Request>,
 }
 
-/// The input of a frame, of the one kind or the other.
+/// The input of a frame.
 #[derive(Clone, PartialEq, Message)]
 pub struct Frame {
-    #[prost(message, optional, tag = "1")]
-    pub from_power_up: Option<ComputerInput>,
-    #[prost(message, optional, tag = "2")]
-    pub in_the_air: Option<PilotInput>,
+    #[prost(message, required, tag = "1")]
+    pub input: ComputerInput,
     /// In a flight's first frame, in the first one behind a reset, and in one that is asked again.
-    #[prost(message, optional, tag = "3")]
+    #[prost(message, optional, tag = "2")]
     pub begin: Option<Begin>,
-}
-
-impl Frame {
-    /// The frame's number, counted from power-up or from the release.
-    pub fn number(&self) -> Option<u64> {
-        let number = self.from_power_up.as_ref().map(|input| input.frame);
-        number.or_else(|| self.in_the_air.as_ref().map(|input| input.frame))
-    }
 }
 
 /// What a frame decided, as its record in the log has it.
 #[derive(Clone, PartialEq, Message)]
 pub struct Answer {
-    #[prost(message, optional, tag = "1")]
-    pub from_power_up: Option<ComputerOutput>,
-    #[prost(message, optional, tag = "2")]
-    pub in_the_air: Option<PilotOutput>,
-    /// The digest of the memory after the frame: the computer's, or that of its pilot in the air.
+    /// The number of the frame.
+    #[prost(uint64, required, tag = "1")]
+    pub frame: u64,
+    #[prost(message, required, tag = "2")]
+    pub output: ComputerOutput,
+    /// The digest of the memory after the frame.
     #[prost(fixed64, required, tag = "3")]
     pub state_digest: u64,
     /// What the next frame is told and asked, of a board with a radio.
     #[prost(message, optional, tag = "4")]
     pub heard: Option<Heard>,
-    /// The number of the frame.
-    #[prost(uint64, required, tag = "5")]
-    pub frame: u64,
 }
 
 impl Answer {

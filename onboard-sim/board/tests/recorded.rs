@@ -1,19 +1,18 @@
 //! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a stream is said.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use board::port::{self, Readings};
+use board::port;
 use board::recorded::{Board, FlyError};
 use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Reader, put};
+use flight::computer::Commands;
 use flight::computer::news::News;
-use flight::computer::pilot::{PilotInput, Sensed};
-use flight::computer::{Commands, Computer, Input};
-use flight::guidance::baseline::Law;
-use log_records::computer_v1::{ComputerFrame, ComputerInput};
-use log_records::flight_v1::PilotInput as PilotRecord;
+use log_records::computer_v1::ComputerFrame;
+use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use tick_log::again::RecordedComputer;
-use tick_log::pilot::{input_to_log, output_to_log};
+use tick_log::frame::{LoggedInput, input_from_log};
+use tick_log::sortie::LastFrame;
 
 /// More than the messages of a frame need, bytes, with the parts that they are put together from: 1,073 at ignition, when the
 /// gate says every number that it has looked at.
@@ -42,33 +41,33 @@ fn begin(sortie: &Sortie) -> Begin {
     Begin {
         toml: recipe().mission_toml,
         controller: recipe().controller.name().to_owned(),
-        at_power_up: None,
-        in_the_air: Some(tick_log::sortie::pilot_start(sortie)),
+        start: tick_log::sortie::start(sortie),
         on_the_air: None,
         flight: 7,
     }
 }
 
-/// A flight's input and expected answer in each frame.
-fn flown(sortie: &mut Sortie) -> Vec<(PilotInput, Answer)> {
-    let mut frames = Vec::new();
+/// A flight's frames.
+fn flown(sortie: &mut Sortie) -> Vec<ComputerFrame> {
+    let (mut frames, mut last) = (Vec::new(), LastFrame::default());
     while sortie.goes_on() {
-        sortie.step();
-        let (input, output) = sortie.computer().piloted().unwrap();
-        let answer = Answer {
-            frame: input.frame,
-            from_power_up: None,
-            in_the_air: Some(output_to_log(output)),
-            state_digest: sortie.computer().flight_digest(),
-            heard: None,
-        };
-        frames.push((*input, answer));
+        sortie.step_with(&Outside::NOBODY, &mut last);
+        frames.push(*last.take().unwrap());
     }
     frames
 }
 
-fn in_the_air(input: &PilotInput, begin: Option<Begin>) -> Frame {
-    Frame { in_the_air: Some(input_to_log(input)), begin, ..Frame::default() }
+fn answer_to(frame: &ComputerFrame) -> Answer {
+    Answer {
+        frame: frame.input.frame,
+        output: frame.output.clone(),
+        state_digest: frame.state_digest,
+        heard: None,
+    }
+}
+
+fn asked(frame: &ComputerFrame, begin: Option<Begin>) -> Frame {
+    Frame { input: frame.input.clone(), begin }
 }
 
 fn bytes_of(frames: impl IntoIterator<Item = Frame>) -> Vec<u8> {
@@ -84,13 +83,13 @@ fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
     let mut begin = Some(begin(&sortie));
     let frames = flown(&mut sortie);
-    let bytes = bytes_of(frames.iter().map(|(input, _)| in_the_air(input, begin.take())));
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
     let (board, answers, flown) = fly(&bytes);
     flown.unwrap();
     assert_eq!((board.frames(), board.reader().broken()), (frames.len() as u64, 0));
     assert_eq!(answers.len(), frames.len());
-    for (answer, (_, expected)) in answers.iter().zip(&frames) {
-        assert_eq!(prost::Message::encode_to_vec(answer), prost::Message::encode_to_vec(expected));
+    for (answer, frame) in answers.iter().zip(&frames) {
+        assert_eq!(prost::Message::encode_to_vec(answer), prost::Message::encode_to_vec(&answer_to(frame)));
     }
 }
 
@@ -102,8 +101,8 @@ fn a_bad_wire_changes_no_answer() {
     let frames: Vec<_> = flown(&mut sortie).into_iter().take(300).collect();
     let mut bytes = b"noise before the first frame".to_vec();
     bytes.push(0);
-    for (input, _) in &frames {
-        let whole = bytes_of([in_the_air(input, Some(begin.clone()))]);
+    for frame in &frames {
+        let whole = bytes_of([asked(frame, Some(begin.clone()))]);
         for place in [3, whole.len() / 2] {
             let mut flipped = whole.clone();
             flipped[place] ^= if flipped[place] == 0x10 { 0x20 } else { 0x10 };
@@ -117,13 +116,14 @@ fn a_bad_wire_changes_no_answer() {
     flown.unwrap();
     assert_eq!(board.frames(), 300);
     assert_eq!(board.reader().broken(), 1 + 4 * 300);
-    let expected: Vec<&Answer> = frames.iter().flat_map(|(_, answer)| [answer, answer]).collect();
-    assert_eq!(answers.iter().collect::<Vec<_>>(), expected);
+    let expected: Vec<Answer> =
+        frames.iter().flat_map(|frame| [answer_to(frame), answer_to(frame)]).collect();
+    assert_eq!(answers, expected);
 }
 
 /// A board that senses what was recorded, and notes its commands.
 struct Recorded<'f> {
-    frames: std::slice::Iter<'f, (PilotInput, Answer)>,
+    frames: std::slice::Iter<'f, ComputerFrame>,
     commanded: Vec<Commands>,
     kept: u64,
 }
@@ -131,27 +131,8 @@ struct Recorded<'f> {
 impl port::Board for Recorded<'_> {
     type Error = core::convert::Infallible;
 
-    fn sense(&mut self) -> Result<Option<Readings>, Self::Error> {
-        Ok(self.frames.next().map(|(input, _)| {
-            let Sensed::Measured(measured) = input.sensed else { panic!("sensors fly") };
-            let flown = Input::in_the_air(input);
-            Readings {
-                measured,
-                gimbal_rad: flown.gimbal_rad,
-                fins_rad: flown.fins_rad,
-                contact: flown.contact,
-                igniter_continuity: flown.igniter_continuity,
-                booster_attached: flown.booster_attached,
-                pin_out: flown.pin_out,
-                battery_v: flown.battery_v,
-                log: flown.log,
-                uplink: flown.uplink,
-                commander: flown.commander,
-                people: flown.people,
-                requests: flown.requests.to_vec(),
-                rehearsed: None,
-            }
-        }))
+    fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error> {
+        Ok(self.frames.next().map(|frame| input_from_log(&frame.input).unwrap()))
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error> {
@@ -167,38 +148,38 @@ impl port::Board for Recorded<'_> {
     }
 }
 
+fn started(sortie: &Sortie) -> RecordedComputer {
+    RecordedComputer::started(&recipe().mission, &tick_log::sortie::start(sortie), recipe().controller)
+}
+
 #[test]
 fn a_board_that_senses_the_same_commands_the_same() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
-    let start = tick_log::sortie::pilot_start(&sortie);
+    let mut computer = started(&sortie).computer().clone();
     let frames = flown(&mut sortie);
-    let believed = tick_log::pilot::state_from_log(&start.believed);
-    let mut computer = Computer::at_power_up(&recipe().mission, Law::Nmpc, &believed).released();
     let mut board = Recorded { frames: frames.iter(), commanded: Vec::new(), kept: 0 };
     port::fly(&mut computer, &mut board).unwrap();
     assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()));
-    for ((input, answer), commands) in frames.iter().zip(&board.commanded) {
-        let recorded = answer.in_the_air.as_ref().unwrap();
+    for (frame, commands) in frames.iter().zip(&board.commanded) {
+        let (recorded, number) = (&frame.output, frame.input.frame);
         let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&commands.gimbal_rad), bits(&recorded.gimbal_rad), "frame {}", input.frame);
-        assert_eq!(bits(&commands.fins_rad), bits(&recorded.fins_rad), "frame {}", input.frame);
+        assert_eq!(bits(&commands.gimbal_rad), bits(&recorded.gimbal_rad), "frame {number}");
+        assert_eq!(bits(&commands.fins_rad), bits(&recorded.fins_rad), "frame {number}");
         assert_eq!((commands.ignite, commands.parachute), (recorded.ignite, recorded.parachute));
     }
-    assert_eq!(computer.flight_digest(), frames.last().unwrap().1.state_digest);
+    assert_eq!(computer.digest(), frames.last().unwrap().state_digest);
 }
 
 /// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame.
 #[test]
 fn in_flight_only_news_allocate() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
-    let start = tick_log::sortie::pilot_start(&sortie);
-    let frames = flown(&mut sortie);
-    let mut computer = RecordedComputer::in_the_air(&recipe().mission, &start, recipe().controller);
+    let mut computer = started(&sortie);
     let mut frames_with_news = 0;
-    for (input, _) in &frames {
-        let mut news = 0;
-        let allocated = allocation_counter::measure(|| news = computer.step_in_the_air(input).news.len());
-        let frame = input.frame;
+    for recorded in &flown(&mut sortie) {
+        let (mut news, frame) = (0, recorded.input.frame);
+        let read = computer.read(&recorded.input).unwrap();
+        let allocated = allocation_counter::measure(|| news = computer.step(&read).news.len());
         if news == 0 {
             assert_eq!(allocated.count_total, 0, "frame {frame}: {allocated:?}");
         } else {
@@ -215,26 +196,14 @@ fn what_is_wrong_with_a_stream_is_said() {
     let sortie = Sortie::new(&recipe(), 0).unwrap();
     let begin = begin(&sortie);
     let said = |frame: Frame| fly(&bytes_of([frame])).2.unwrap_err().to_string();
-    let first = |begin: Begin| Frame {
-        in_the_air: Some(PilotRecord::default()),
-        begin: Some(begin),
-        ..Frame::default()
-    };
+    let first = |begin: Begin| Frame { begin: Some(begin), ..Frame::default() };
 
     assert_eq!(said(Frame { begin: None, ..first(begin.clone()) }), "the first record must say what to fly");
-    let nothing = Begin { in_the_air: None, ..begin.clone() };
-    assert_eq!(
-        said(first(nothing)),
-        "the first record: must name one start, with a radio only from power-up on"
-    );
     let unknown = Begin { controller: "luck".to_owned(), ..begin.clone() };
     assert_eq!(
         said(first(unknown)),
         "the first record: no controller is named `luck`; there are nmpc, open-loop and oscillating"
     );
-    let two = Frame { from_power_up: Some(ComputerInput::default()), ..first(begin.clone()) };
-    let one = "the record after 0 frames must have one input, of a flight from power-up or in the air";
-    assert_eq!(said(two), one);
     assert!(said(first(begin.clone())).starts_with("frame 0: needs measurements"));
 
     let mut cut = bytes_of([first(begin)]);

@@ -9,6 +9,7 @@ use flight::vehicle::mission::Mission;
 use nmpc::SolveStatus;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
+use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 use world::{RestOutcome, Touchdown};
@@ -83,7 +84,12 @@ impl Tally {
 
     /// Flies one frame. Returns `false` when the flight is over.
     pub fn step(&mut self) -> bool {
-        self.flight.step();
+        self.step_watched(&mut Unwatched)
+    }
+
+    /// Flies one frame, which somebody watches.
+    pub fn step_watched(&mut self, watch: &mut dyn Watch) -> bool {
+        self.flight.step_with(&Outside::NOBODY, watch);
         self.count();
         self.flight.goes_on()
     }
@@ -110,17 +116,18 @@ impl Tally {
                 self.nees_of_motor = flight.nees_of_motor();
             }
         }
-        let piloted = flight.computer().piloted().filter(|_| !flight.computer_is_dead());
-        let Some((_, output)) = piloted else { return };
-        if output.phase != Phase::Powered || world.touchdown().is_some() {
+        let computer = flight.computer();
+        let powered = computer.mode().phase == Phase::Powered && !flight.computer_is_dead();
+        if !powered || world.touchdown().is_some() {
             return;
         }
         self.burning_frames += 1;
         let stop_rad = AT_STOP_SHARE * self.gimbal_limit_rad;
-        self.saturated_frames += u64::from(output.gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
+        self.saturated_frames +=
+            u64::from(computer.commands().gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
         if flight.frame().is_multiple_of(FRAMES_PER_PLAN) {
             let report = pilot.report();
-            self.plans[usize::from(output.level.index())] += 1;
+            self.plans[usize::from(computer.level().index())] += 1;
             self.solver_iterations += report.iterations as u64;
             let solved = matches!(report.status, SolveStatus::Converged | SolveStatus::NotRun);
             self.solver_failures += u64::from(!solved);

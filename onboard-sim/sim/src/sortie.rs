@@ -155,7 +155,7 @@ impl Sortie {
     }
 
     fn released(self) -> Self {
-        Self { computer: self.computer.released(), ..self }
+        Self { computer: self.computer.released(0), ..self }
     }
 
     /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
@@ -525,11 +525,10 @@ impl Rehearsal {
         let Self::Flying { flight, plans } = self else { return };
         for _ in 0..FRAMES_AT_ONCE {
             let flown = flight.step();
-            let level = flight.computer().piloted().map(|(_, output)| output.level);
             let powered = flight.computer().mode().phase == Phase::Powered;
             if flown.planned() && powered && flight.world().touchdown().is_none() {
                 plans[0] += 1;
-                plans[1] += u64::from(level == Some(ControlLevel::Converged));
+                plans[1] += u64::from(flight.computer().level() == ControlLevel::Converged);
             }
             if !flight.goes_on() {
                 break;

@@ -11,7 +11,7 @@ use campaign::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
 use sim::recipe::Recipe;
-use tick_log::sortie;
+use tick_log::sortie::{self, LastFrame};
 
 /// Flies it and prints its row, one column on each line.
 ///
@@ -57,13 +57,14 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
 
 fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<()> {
     let recorder = Recorder::create(path, &sortie::campaign_header(recipe, number))?;
-    recorder.record(sortie::start(tally.flight()), 0);
+    recorder.record(Record::ComputerStart(Box::new(sortie::start(tally.flight()))), 0);
+    let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     loop {
-        let goes_on = tally.step();
+        let goes_on = tally.step_watched(&mut last);
         let flight = tally.flight();
         let time_ns = sortie::time_ns(flight);
-        for record in sortie::frame_and_phase(flight, phase) {
+        for record in sortie::frame_and_phase(flight, &mut last, phase) {
             recorder.record(record, time_ns);
         }
         phase = flight.computer().mode().phase;

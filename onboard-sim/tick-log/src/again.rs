@@ -1,23 +1,22 @@
-//! The flight computer of a log, run again on its recorded frames, from power-up on. A replay and a board use the same
+//! The flight computer of a log, run again on its recorded frames. A replay and a board use the same
 //! code.
 
-use flight::computer::pilot::PilotInput;
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
-use flight::computer::{Computer, Input, Output, flight_time_s};
+use flight::computer::{Computer, Output, flight_time_s};
 use flight::guidance::baseline::{Controller, Law};
+use flight::guidance::powered::LandingSolved;
 use flight::vehicle::mission::Mission;
-use log_records::computer_v1::{ComputerFrame, ComputerInput};
-use log_records::flight_v1::{self, PilotStart};
+use log_records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
 
-use crate::computer::{LoggedInput, frame_to_log, input_from_log};
-use crate::pilot::{self, PilotLogError, state_from_log, vector_from_log};
+use crate::estimate::{RecordError, state_from_log, vector_from_log};
+use crate::frame::{LoggedInput, frame_to_log, input_from_log};
 
 /// Why a frame was not run again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// This build does not know some value of its input.
     #[error(transparent)]
-    Input(#[from] PilotLogError),
+    Input(#[from] RecordError),
     /// It is a repetition, or it is out of order.
     #[error("frame {frame} comes after frame {after}: nothing behind it was compared")]
     Order {
@@ -37,7 +36,7 @@ pub enum FrameError {
     },
 }
 
-/// A flight computer that is run on the frames of a log, from power-up on. Frames must come in order. Missing frames
+/// A flight computer that is run on the frames of a log, from its start record on. Frames must come in order. Missing frames
 /// mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct RecordedComputer {
@@ -48,34 +47,27 @@ pub struct RecordedComputer {
 }
 
 /// The mission as it was flown: the start record may change two of its values.
-pub fn mission_flown(mission: Mission, start: &PilotStart) -> Mission {
+pub fn mission_flown(mission: Mission, start: &ComputerStart) -> Mission {
     let mut mission = Mission { steered: start.steered, ..mission };
     mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
     mission
 }
 
 impl RecordedComputer {
-    /// The computer at power-up. `mission` is the mission [as flown](mission_flown).
-    pub fn at_power_up(mission: &Mission, start: &PilotStart, controller: Controller) -> Self {
-        let law = Law::of(controller, mission);
-        Self::of(Computer::at_power_up(mission, law, &state_from_log(&start.believed)))
-    }
-
-    /// The computer of a flight that was released at once, without a pad. Its frames are
-    /// [in the air](Self::step_in_the_air).
-    pub fn in_the_air(mission: &Mission, start: &PilotStart, controller: Controller) -> Self {
+    /// The computer of a start record. `mission` is the mission [as flown](mission_flown).
+    pub fn started(mission: &Mission, start: &ComputerStart, controller: Controller) -> Self {
         let believed = state_from_log(&start.believed);
         let computer = Computer::at_power_up(mission, Law::of(controller, mission), &believed);
-        let computer = match &start.gyro_bias_rad_s {
-            Some(bias) => computer.standing(&believed, vector_from_log(bias)),
-            None => computer,
+        let (computer, next) = if start.released {
+            let standing = match &start.gyro_bias_rad_s {
+                Some(bias) => computer.standing(&believed, vector_from_log(bias)),
+                None => computer,
+            };
+            (standing.released(start.frame), Some(start.frame.saturating_add(1)))
+        } else {
+            (computer, None)
         };
-        // The first frame has the number 1.
-        Self { next: Some(1), ..Self::of(computer.released()) }
-    }
-
-    fn of(computer: Computer) -> Self {
-        Self { computer, next: None, rehearsed: false }
+        Self { computer, next, rehearsed: false }
     }
 
     /// Reads a recorded input, and restarts the computer if frames before it are missing.
@@ -93,19 +85,10 @@ impl RecordedComputer {
         self.computer.step(&read.input())
     }
 
-    /// Reads a recorded input of a flight that was released at once, as [`read`](Self::read) does.
-    ///
-    /// # Errors
-    /// This build cannot use the input, or its frame is out of order.
-    pub fn read_in_the_air(&mut self, input: &flight_v1::PilotInput) -> Result<PilotInput, FrameError> {
-        let read = pilot::input_from_log(input)?;
-        self.follow(input.frame)?;
-        Ok(read)
-    }
-
-    /// Flies the frame that was just [read](Self::read_in_the_air).
-    pub fn step_in_the_air(&mut self, read: &PilotInput) -> Output {
-        self.computer.step(&Input::in_the_air(read))
+    /// Flies the frame that was just [read](Self::read), and solves the landing that it plans separately; see
+    /// [`Computer::step_inspected`].
+    pub fn step_inspected(&mut self, read: &LoggedInput) -> (Output, Option<LandingSolved>) {
+        self.computer.step_inspected(&read.input())
     }
 
     /// Frame `number` is next: a computer that missed frames before it is restarted.
@@ -145,5 +128,15 @@ impl RecordedComputer {
 
     pub fn computer(&self) -> &Computer {
         &self.computer
+    }
+
+    /// The computer, for a replay that changes its settings.
+    pub fn computer_mut(&mut self) -> &mut Computer {
+        &mut self.computer
+    }
+
+    /// The number of the frame that must come next, if any must.
+    pub fn next(&self) -> Option<u64> {
+        self.next
     }
 }

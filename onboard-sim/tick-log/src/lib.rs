@@ -3,9 +3,9 @@
 //! The flight code does not know the log, and the log does not know the flight code. Programs that write or replay a
 //! log use this crate.
 //!
-//! * [`computer`]: the flight computer's frames from power-up on.
+//! * [`frame`]: the flight computer's frames.
 //! * [`again`]: the flight computer of a log, run again on these frames.
-//! * [`pilot`]: the pilot's frames from the release on.
+//! * [`estimate`]: what it measures and estimates.
 //! * [`sortie`]: a simulated flight as records, with the truth.
 //!
 //! Without the feature `simulated` (the last one) the crate needs no operating system.
@@ -14,7 +14,7 @@
 extern crate alloc;
 
 pub mod again;
-pub mod computer;
-pub mod pilot;
+pub mod estimate;
+pub mod frame;
 #[cfg(feature = "simulated")]
 pub mod sortie;

@@ -1,8 +1,10 @@
-//! A simulated flight as log records: the flight computer's input, estimate and output in every frame, and
-//! the truth. A replay runs the flight computer again from these records.
+//! A simulated flight as log records: the flight computer's frames, what it thought, and the truth. A replay runs the
+//! flight computer again from the frames.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
+use flight::computer::{Computer, Input, Output};
 use flight::guidance::baseline::Controller;
 use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
@@ -10,18 +12,21 @@ use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::StartPoint;
 use nalgebra::Vector3;
-use protocol::log::flight_v1::{Estimate, PilotStart, TruthSample};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::flight_v1::{Estimate, TruthSample};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::{Dispersion, DispersionError};
 use sim::limits::Limits;
 use sim::outcome::Failure;
+use sim::outside::Watch;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use world::Touchdown;
 
-use crate::pilot::{estimate_to_log, motor_to_log, state_to_log, tick_to_log, vector_to_log};
+use crate::estimate::{estimate_to_log, motor_to_log, state_to_log, vector_to_log};
+use crate::frame::frame_to_log;
 
 /// The header of the log of a simulated flight.
 pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
@@ -44,43 +49,65 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
     }
 }
 
-/// The record before the first frame. Times in the records count from the start of the flight.
-pub fn start(flight: &Sortie) -> Record {
-    Record::PilotStart(Box::new(pilot_start(flight)))
-}
-
-/// The flight computer's estimate before its first frame, and its settings that the text of its mission does not contain.
-pub fn pilot_start(flight: &Sortie) -> PilotStart {
+/// The computer of a flight as it is now: at power-up or at its release, before its first frame there.
+pub fn start(flight: &Sortie) -> ComputerStart {
     let mission = flight.mission();
+    let released = flight.computer().released_at_s().is_some();
     let estimate = flight.pilot().estimator().estimate();
-    let stood = mission.start.at == StartPoint::Pad;
-    PilotStart {
-        time_s: 0.0,
+    let stood = released && mission.start.at == StartPoint::Pad;
+    ComputerStart {
+        frame: if released { flight.computer().frame() } else { 0 },
         believed: state_to_log(&estimate.state),
         gyro_bias_rad_s: stood.then(|| vector_to_log(&estimate.gyro_bias_rad_s)),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
+        released,
     }
 }
 
-/// The records of the frame that was just flown; only the truth while the flight computer is dead.
-pub fn frame(flight: &Sortie) -> Vec<Record> {
-    let mut records = Vec::with_capacity(3);
-    if let Some((input, output)) = flight.computer().piloted().filter(|_| !flight.computer_is_dead()) {
-        let tick = tick_to_log(input, output, flight.computer().flight_digest());
-        records.push(Record::PilotTick(Box::new(tick)));
-        if let Some(estimate) = flight.pilot().estimate() {
-            let motor = motor_to_log(flight.pilot().motor());
-            records.push(Record::Estimate(Box::new(Estimate { motor, ..estimate_to_log(estimate) })));
-        }
+/// Keeps the flight computer's last frame as its record.
+#[derive(Debug, Clone, Default)]
+pub struct LastFrame {
+    /// `None` while the computer is dead.
+    frame: Option<Box<ComputerFrame>>,
+    /// The result of the rehearsal is already in a recorded frame.
+    rehearsed: bool,
+    /// The number of the next frame of a computer that lives.
+    next: u64,
+}
+
+impl LastFrame {
+    /// The frame, once.
+    pub fn take(&mut self) -> Option<Box<ComputerFrame>> {
+        self.frame.take()
     }
-    records.push(Record::TruthSample(Box::new(truth(flight))));
-    records
+}
+
+impl Watch for LastFrame {
+    fn now(&mut self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
+        // A computer that has restarted takes the rehearsal again.
+        let known = self.rehearsed && input.frame == self.next;
+        self.frame = Some(Box::new(frame_to_log(input, output, computer, known)));
+        (self.rehearsed, self.next) = (computer.rehearsed().is_some(), input.frame + 1);
+    }
+}
+
+/// What the flight computer thought in the frame that was just flown, and the truth.
+pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
+    let thought = flight.pilot().estimate().filter(|_| !flight.computer_is_dead()).map(|estimate| {
+        let motor = motor_to_log(flight.pilot().motor());
+        Record::Estimate(Box::new(Estimate { motor, ..estimate_to_log(estimate) }))
+    });
+    thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
 
 fn truth(flight: &Sortie) -> TruthSample {
     let world = flight.world();
-    let commanded = flight.computer().piloted().map(|(_, output)| output);
+    let commanded = flight.computer().commands();
     TruthSample {
         time_s: world.time_s(),
         state: state_to_log(world.state()),
@@ -88,9 +115,9 @@ fn truth(flight: &Sortie) -> TruthSample {
         thrust_n: world.thrust_n(),
         mass_kg: world.mass().mass_kg,
         wind_m_s: vector_to_log(&world.wind_m_s()),
-        gimbal_commanded_rad: commanded.map_or_else(Vec::new, |output| output.gimbal_rad.to_vec()),
+        gimbal_commanded_rad: commanded.gimbal_rad.to_vec(),
         gimbal_actual_rad: world.gimbal_rad().to_vec(),
-        fins_commanded_rad: commanded.map_or_else(Vec::new, |output| output.fins_rad.to_vec()),
+        fins_commanded_rad: commanded.fins_rad.to_vec(),
         fins_actual_rad: world.fins_rad().to_vec(),
         parachute_open_share: world.parachute_open_share(),
         in_contact: world.touchdown().is_some(),
@@ -126,8 +153,9 @@ pub fn time_ns(flight: &Sortie) -> u64 {
 }
 
 /// The last frame's records, and a change of phase since `phase`.
-pub fn frame_and_phase(flight: &Sortie, phase: Phase) -> Vec<Record> {
-    let mut records = frame(flight);
+pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> Vec<Record> {
+    let mut records: Vec<Record> = last.take().map(Record::ComputerFrame).into_iter().collect();
+    records.extend(thought_and_truth(flight));
     let now = flight.computer().mode().phase;
     if now != phase {
         records.push(Record::Event(Event {

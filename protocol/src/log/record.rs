@@ -65,10 +65,6 @@ pub enum Record {
     ComputerStart(Box<computer_v1::ComputerStart>),
     /// `/computer/frame`.
     ComputerFrame(Box<computer_v1::ComputerFrame>),
-    /// `/pilot/start`.
-    PilotStart(Box<flight_v1::PilotStart>),
-    /// `/pilot/tick`.
-    PilotTick(Box<flight_v1::PilotTick>),
     /// `/pilot/timing`.
     PilotTiming(flight_v1::PilotTiming),
     /// `/pilot/estimate`.
@@ -92,14 +88,10 @@ pub const TOPIC_RAW_RX: &str = "/mavlink/rx/raw";
 /// Topic of raw frames sent.
 pub const TOPIC_RAW_TX: &str = "/mavlink/tx/raw";
 pub const TOPIC_EVENTS: &str = "/events";
-/// Topic of the data from which the flight computer is built at power-up.
+/// Topic of the data from which the flight computer is built, at power-up and at its release.
 pub const TOPIC_COMPUTER_START: &str = "/computer/start";
-/// Topic of the flight computer's frames from power-up on.
-pub const TOPIC_COMPUTER_FRAME: &str = "/computer/frame";
-/// Topic of the state that the flight computer started from.
-pub const TOPIC_PILOT_START: &str = "/pilot/start";
 /// Topic of the flight computer's frames.
-pub const TOPIC_PILOT_TICK: &str = "/pilot/tick";
+pub const TOPIC_COMPUTER_FRAME: &str = "/computer/frame";
 /// Topic of the computing times of the flight computer's frames with a plan.
 pub const TOPIC_PILOT_TIMING: &str = "/pilot/timing";
 pub const TOPIC_ESTIMATE: &str = "/pilot/estimate";
@@ -111,9 +103,8 @@ pub const ENCODING_MAVLINK: &str = "mavlink2";
 
 /// Name of the metadata record that identifies the build which wrote the log.
 pub const METADATA_BUILD: &str = "build";
-/// The version of a log's contents. Version 1 (such logs do not state it) has the ticks of the landing controller and
-/// the flight computer's frames from its release on. Version 2 also has the flight computer's frames from power-up on.
-pub const SCHEMA_VERSION: u32 = 2;
+/// The version of a log's contents.
+pub const SCHEMA_VERSION: u32 = 1;
 /// Name of the metadata record with [`SCHEMA_VERSION`].
 pub const METADATA_SCHEMA: &str = "schema";
 /// The entry with the version.

@@ -12,8 +12,8 @@ use super::record::{
     ATTACHMENT_DIALECT, ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, Direction, ENCODING_MAVLINK, METADATA_BUILD,
     METADATA_RUN, METADATA_SCHEMA, RawFrame, Record, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY, TOPIC_BOOK,
     TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_EVENTS,
-    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX,
-    TOPIC_TELEMETRY, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
+    TOPIC_OPERATOR, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRANSFORM,
+    TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT, log_message, transform,
 };
 use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
 use crate::dialect::DIALECT_XML;
@@ -150,12 +150,6 @@ impl<W: Write + Seek> LogWriter<W> {
                 frame.as_ref(),
                 log_time,
             ),
-            Record::PilotStart(start) => {
-                self.write_message(TOPIC_PILOT_START, (FLIGHT, "PilotStart"), start.as_ref(), log_time)
-            }
-            Record::PilotTick(tick) => {
-                self.write_message(TOPIC_PILOT_TICK, (FLIGHT, "PilotTick"), tick.as_ref(), log_time)
-            }
             Record::PilotTiming(timing) => {
                 self.write_message(TOPIC_PILOT_TIMING, (FLIGHT, "PilotTiming"), timing, log_time)
             }

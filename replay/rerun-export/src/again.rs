@@ -1,8 +1,8 @@
 //! Runs the flight computer of the log again on its recorded inputs and compares it with the record.
 
 use prost::Message as _;
-use protocol::log::flight_v1::{PilotStart, PilotTick};
-use replay::controller::{LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use replay::controller::{LoggedComputer, NewPlans, path_in_world_m};
 use replay::log::{FrameOrder, Gap};
 
 use crate::survey::Survey;
@@ -21,44 +21,48 @@ pub(crate) struct Again {
 }
 
 struct Running {
-    pilot: Box<LoggedPilot>,
+    computer: Box<LoggedComputer>,
     plans: NewPlans,
     order: FrameOrder,
 }
 
 /// A frame of a flight computer, run again.
 pub(crate) struct FrameAgain {
-    pub(crate) tick: PilotTick,
+    pub(crate) tick: ComputerFrame,
     /// A plan made in this frame: its path, m, and the iterations it took.
     pub(crate) plan: Option<(Vec<[f32; 3]>, usize)>,
 }
 
 impl Again {
     /// Starts the flight computer.
-    pub(crate) fn let_go(&mut self, survey: &Survey, start: &PilotStart) {
+    pub(crate) fn start(&mut self, survey: &Survey, start: &ComputerStart) {
+        // A computer from power-up needs no other start.
+        if start.released && self.running.is_some() {
+            return;
+        }
         let Some(mission_toml) = &survey.profile_toml else {
             return self.give_up("the log has no mission to build the flight computer from".to_owned());
         };
-        match LoggedPilot::recorded(mission_toml, start, &survey.run, &[]) {
-            Ok(pilot) => {
+        match LoggedComputer::recorded(mission_toml, start, &survey.run, &[]) {
+            Ok(computer) => {
                 let (plans, order) = (NewPlans::default(), FrameOrder::default());
-                self.running = Some(Running { pilot: Box::new(pilot), plans, order });
+                self.running = Some(Running { computer: Box::new(computer), plans, order });
             }
             Err(error) => self.give_up(error.to_string()),
         }
     }
 
     /// Runs a frame of a flight computer again; `record` is the sequence number of its record in the channel.
-    pub(crate) fn frame(&mut self, recorded: &PilotTick, record: u32) -> Option<FrameAgain> {
-        let Running { pilot, plans, order } = self.running.as_mut()?;
+    pub(crate) fn frame(&mut self, recorded: &ComputerFrame, record: u32) -> Option<FrameAgain> {
+        let Running { computer, plans, order } = self.running.as_mut()?;
         let number = recorded.input.frame;
         if let Some(Gap { after, before }) = order.note(number, record) {
             self.give_up(format!("the frames between {after} and {before} are lost"));
             return None;
         }
-        match pilot.run_again(recorded) {
+        match computer.run_again(recorded) {
             Ok(tick) => {
-                let flying = pilot.pilot();
+                let flying = computer.pilot();
                 let plan = plans.made(flying, tick.output.level).map(|(states, step_s)| {
                     let path_m = path_in_world_m(flying, states, step_s);
                     let narrowed = path_m.into_iter().map(|place| place.map(|value| value as f32)).collect();

@@ -4,8 +4,9 @@ use std::collections::VecDeque;
 use std::io::{Read, Write};
 
 use flight::guidance::powered::ControlLevel;
-use protocol::log::flight_v1::{PilotTick, TruthSample};
+use protocol::log::flight_v1::TruthSample;
 use protocol::log::v1::{LandingVerdict as RecordedVerdict, Telemetry};
+use replay::log::LoggedFrame;
 use replay::log::{Entry, FlightLog, StampedEntry};
 use rerun::{RecordingStream, RecordingStreamResult};
 
@@ -189,8 +190,8 @@ impl<'a> Export<'a> {
                     self.done.unreadable += 1;
                     self.done.first_unreadable.get_or_insert(reason);
                 }
-                Entry::PilotStart(start) => self.again.let_go(self.survey, &start),
-                Entry::PilotTick(tick) => self.frame(&tick, sequence, log_time_ns)?,
+                Entry::ComputerStart(start) => self.again.start(self.survey, &start),
+                Entry::ComputerFrame(frame) => self.frame(&frame, sequence, log_time_ns)?,
                 Entry::PilotTiming(timing) => {
                     self.times.learn(timing.time_s, log_time_ns);
                     self.times.at_vehicle_time(self.recording, timing.time_s);
@@ -200,13 +201,7 @@ impl<'a> Export<'a> {
                 Entry::Event(event) if self.pace == Pace::Live => {
                     self.waiting.push_back(StampedEvent::of(&event, log_time_ns));
                 }
-                Entry::ComputerStart(_)
-                | Entry::ComputerFrame(_)
-                | Entry::Estimate(_)
-                | Entry::RawFrame
-                | Entry::Operator
-                | Entry::Event(_)
-                | Entry::Other => {}
+                Entry::Estimate(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
             }
         }
         self.events_until(u64::MAX)?;
@@ -227,17 +222,16 @@ impl<'a> Export<'a> {
     }
 
     /// A frame of the flight computer; its values are plotted with the truth.
-    fn frame(&mut self, tick: &PilotTick, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
-        self.times.learn(tick.input.time_s, log_time_ns);
-        self.times.tick(tick.input.frame);
-        self.times.at_vehicle_time(self.recording, tick.input.time_s);
+    fn frame(&mut self, frame: &LoggedFrame, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
+        let flown = self.run_again(|again| again.frame(&frame.record, record))?;
+        let Some((tick, time_s)) = frame.tick.zip(frame.flight_time_s()) else { return Ok(()) };
+        self.times.learn(time_s, log_time_ns);
+        self.times.tick(tick);
+        self.times.at_vehicle_time(self.recording, time_s);
         self.done.ticks += 1;
-        self.phase(tick.output.phase)?;
-        self.plots.level(tick.output.level)?;
-        let Some(FrameAgain { tick: again, plan }) = self.run_again(|again| again.frame(tick, record))?
-        else {
-            return Ok(());
-        };
+        self.phase(frame.record.output.phase)?;
+        self.plots.level(frame.record.output.level)?;
+        let Some(FrameAgain { tick: again, plan }) = flown else { return Ok(()) };
         self.plots.frame_again(&again, plan.as_ref().map(|(_, iterations)| *iterations))?;
         let planning = again.output.level != u32::from(ControlLevel::Idle.index());
         match plan {

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use protocol::log::flight_v1::{PilotTick, PilotTiming, TruthSample};
+use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::flight_v1::{PilotTiming, TruthSample};
 use protocol::log::v1::Telemetry;
 use rerun::archetypes::{Scalars, SeriesLines, StateChange};
 use rerun::components::InterpolationMode;
 use rerun::datatypes::Rgba32;
 use rerun::{RecordingStream, RecordingStreamResult};
-use tick_log::pilot::state_from_log;
+use tick_log::estimate::state_from_log;
 
 use crate::entity;
 use crate::plot_list::{GIMBAL_IN_SPACE, Plot, PlotLimit};
@@ -186,7 +187,7 @@ impl<'a> Plots<'a> {
     /// Records the decision of a re-run frame of a flight computer, and the iterations of its plan.
     pub(crate) fn frame_again(
         &mut self,
-        again: &PilotTick,
+        again: &ComputerFrame,
         iterations: Option<usize>,
     ) -> RecordingStreamResult<()> {
         let output = &again.output;

@@ -10,7 +10,7 @@ use foxglove::messages::log::Level;
 use prost::Message as _;
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{
-    ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_EVENTS, TOPIC_PILOT_TICK,
+    ATTACHMENT_PROFILE, EventLevel, METADATA_BUILD, METADATA_RUN, TOPIC_COMPUTER_FRAME, TOPIC_EVENTS,
     TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
 };
 use protocol::text::printable;
@@ -143,7 +143,7 @@ impl Survey {
 
     fn take_message(&mut self, topic: &str, schema_name: &str, log_time_ns: u64, data: &[u8]) {
         let ours = schema_name.starts_with("touchdown.");
-        self.of_vehicle |= ours && matches!(topic, TOPIC_PILOT_TICK | TOPIC_TRUTH_SAMPLE);
+        self.of_vehicle |= ours && matches!(topic, TOPIC_COMPUTER_FRAME | TOPIC_TRUTH_SAMPLE);
         let source = match topic {
             TOPIC_TRUTH_SAMPLE if ours => PoseSource::Truth,
             TOPIC_TELEMETRY if ours => PoseSource::Telemetry,

@@ -1,6 +1,6 @@
 //! Compares two flights signal by signal.
 //!
-//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`pilot_tick.output.…`). The
+//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`computer_frame.output.…`). The
 //! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
 //! one flight has are counted separately, because interpolation would hide a lost record.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::CompareError;
 use crate::info::VerdictFacts;
 use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts, heard_message};
-use crate::table::{Cell, Kind, TableReader, TableShape};
+use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
@@ -20,7 +20,8 @@ const MESSAGES: &str = "mavlink_";
 const TIME_BOOT_MS: &str = "time_boot_ms";
 
 /// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
-const NO_SIGNALS: [&str; 10] = [
+const NO_SIGNALS: [&str; 11] = [
+    FLIGHT_TIME_S,
     TIME_BOOT_MS,
     "frame_sequence",
     "log_time_ns",
@@ -33,9 +34,12 @@ const NO_SIGNALS: [&str; 10] = [
     "state_digest",
 ];
 
-/// Tables without signals. The ticks hold the same decisions, and logs of earlier releases, of campaigns and of
-/// re-flown flights have only the ticks.
-const NO_SIGNAL_TABLES: [&str; 2] = ["computer_start", "computer_frame"];
+/// Beginnings of columns that are not signals: the crew and the log, which are others in every flight.
+const NO_SIGNALS_OF: [&str; 6] =
+    ["input.log_", "input.uplink", "input.commander", "input.people", "input.rehearsed", "output.answers"];
+
+/// A table without signals.
+const NO_SIGNAL_TABLE: &str = "computer_start";
 
 /// One signal.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -108,7 +112,7 @@ impl Flown {
             let message = heard_message(log.channel(stamped.channel_id), &stamped);
             verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);
-            has_ticks |= matches!(stamped.entry, Entry::PilotTick(_));
+            has_ticks |= matches!(stamped.entry, Entry::ComputerFrame(_));
         }
         let verdict = verdicts.found().as_ref().map(VerdictFacts::found);
         let name = log.name().to_owned();
@@ -125,7 +129,7 @@ impl Flown {
         let mut reader = TableReader::new();
         reader
             .read::<_, Stopped>(&mut FlightLog::open(path)?, |shape, row| {
-                if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) {
+                if shape.name == NO_SIGNAL_TABLE {
                     return Ok(());
                 }
                 let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
@@ -133,14 +137,15 @@ impl Flown {
                 let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
                     let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
                     (&mut over_the_air, boot_s)
+                } else if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
+                    // Outside the flight a frame has no time in it.
+                    let Some(time_s) = row.cells.get(place).and_then(Cell::number) else { return Ok(()) };
+                    (&mut signals, time_s)
                 } else {
                     (&mut signals, time_of(shape, &row.cells).unwrap_or(since_s))
                 };
                 for (column, cell) in shape.columns.iter().zip(&row.cells) {
-                    let Some(value) = cell.number().filter(|_| !NO_SIGNALS.contains(&column.name.as_str()))
-                    else {
-                        continue;
-                    };
+                    let Some(value) = cell.number().filter(|_| is_signal(&column.name)) else { continue };
                     let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
                     // A signal needs ascending times, so records out of order are left out and counted.
                     if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
@@ -185,16 +190,19 @@ impl From<LogError> for Stopped {
     }
 }
 
+fn is_signal(column: &str) -> bool {
+    !NO_SIGNALS.contains(&column) && !NO_SIGNALS_OF.iter().any(|beginning| column.starts_with(beginning))
+}
+
 /// The vehicle's time in a message, s since power-up.
 fn boot_time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
-    let place = shape.columns.iter().position(|column| column.name == TIME_BOOT_MS)?;
+    let place = shape.place_of(TIME_BOOT_MS)?;
     cells.get(place)?.number().map(|time_ms| time_ms / 1e3)
 }
 
 /// The vehicle time in the record, s.
 fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
-    let place =
-        shape.columns.iter().position(|column| column.name == "time_s" || column.name == "input.time_s")?;
+    let place = shape.place_of("time_s")?;
     cells.get(place)?.number().filter(|time_s| time_s.is_finite())
 }
 
@@ -228,7 +236,9 @@ impl Anchors {
             u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn)
         };
         match entry {
-            Entry::PilotTick(tick) if lit(tick.output.phase) => self.ignition_s = Some(tick.input.time_s),
+            Entry::ComputerFrame(frame) if lit(frame.record.output.phase) => {
+                self.ignition_s = frame.flight_time_s();
+            }
             Entry::Telemetry(telemetry) if telemetry.phase.is_some_and(lit) => {
                 self.ignition_s = Some(telemetry.time_s);
             }

@@ -12,7 +12,7 @@
 //! rms = 0.01              # in the signal's own unit
 //! max = 0.05
 //!
-//! [signals."pilot_tick.output.*"]
+//! [signals."computer_frame.output.*"]
 //! max = 1e-9              # of several patterns that fit a signal, the longest applies
 //! ```
 

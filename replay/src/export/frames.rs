@@ -6,6 +6,7 @@ use std::path::Path;
 
 use board::stream::{Answer, Begin, Frame, put};
 use flight::guidance::baseline::Controller;
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 
 use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
 use crate::log::{Entry, FlightLog, LogError};
@@ -79,65 +80,27 @@ fn write_into<R: io::Read>(
     let files = [directory.join("frames"), directory.join("recorded")];
     let mut inputs = Records::create(&files[0], overwrite, path)?;
     let mut expected = Records::create(&files[1], overwrite, path)?;
-    let (mut begin, mut from_power_up, mut written) = (None, false, 0);
+    let (mut begin, mut written) = (None, 0);
     let not_whole =
         |log: &FlightLog<_>, reason| FramesError::NotWhole { file: log.name().to_owned(), reason };
     while let Some(stamped) = log.next_entry()? {
         match stamped.entry {
+            // The computer of a flight from power-up needs no other start.
+            Entry::ComputerStart(start) if start.released && written > 0 => {}
             Entry::ComputerStart(_) if begin.is_some() || written > 0 => {
                 return Err(not_whole(&log, "has more than one flight"));
             }
             Entry::ComputerStart(start) => {
-                from_power_up = true;
-                let began = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
-                begin = Some(Begin { at_power_up: Some(*start), ..began });
+                begin = Some(beginning(&log, *start).map_err(|reason| not_whole(&log, reason))?);
             }
-            // The computer of a flight from power-up needs no other start.
-            Entry::PilotStart(_) if from_power_up => {}
-            Entry::PilotStart(_) if begin.is_some() || written > 0 => {
-                return Err(not_whole(&log, "has more than one flight"));
-            }
-            Entry::PilotStart(start) => {
-                let began = beginning(&log).map_err(|reason| not_whole(&log, reason))?;
-                begin = Some(Begin { in_the_air: Some(*start), ..began });
-            }
-            Entry::ComputerFrame(frame) if from_power_up => {
-                let number = frame.input.frame;
-                inputs.send(&Frame {
-                    from_power_up: Some(frame.input),
-                    begin: begin.take(),
-                    ..Frame::default()
-                })?;
-                let (output, state_digest) = (Some(frame.output), frame.state_digest);
-                expected.send(&Answer {
-                    frame: number,
-                    from_power_up: output,
-                    in_the_air: None,
-                    state_digest,
-                    heard: None,
-                })?;
+            Entry::ComputerFrame(frame) if begin.is_some() || written > 0 => {
+                let ComputerFrame { input, output, state_digest } = frame.record;
+                let frame = input.frame;
+                inputs.send(&Frame { input, begin: begin.take() })?;
+                expected.send(&Answer { frame, output, state_digest, heard: None })?;
                 written += 1;
             }
-            Entry::PilotTick(tick) if !from_power_up && (begin.is_some() || written > 0) => {
-                let number = tick.input.frame;
-                inputs.send(&Frame {
-                    in_the_air: Some(tick.input),
-                    begin: begin.take(),
-                    ..Frame::default()
-                })?;
-                let (output, state_digest) = (Some(tick.output), tick.state_digest);
-                expected.send(&Answer {
-                    frame: number,
-                    from_power_up: None,
-                    in_the_air: output,
-                    state_digest,
-                    heard: None,
-                })?;
-                written += 1;
-            }
-            // Its part of a frame from power-up.
-            Entry::PilotTick(_) if from_power_up => {}
-            Entry::ComputerFrame(_) | Entry::PilotTick(_) => {
+            Entry::ComputerFrame(_) => {
                 return Err(not_whole(&log, "the start of its flight is missing"));
             }
             Entry::Unreadable { .. } => {
@@ -158,7 +121,7 @@ fn write_into<R: io::Read>(
 }
 
 /// What the computer of a log is built from, besides its record of the start.
-fn beginning<R: io::Read>(log: &FlightLog<R>) -> Result<Begin, &'static str> {
+fn beginning<R: io::Read>(log: &FlightLog<R>, start: ComputerStart) -> Result<Begin, &'static str> {
     let head = log.head();
     if head.run.contains_key(SETTINGS_IN_FLIGHT) {
         return Err("its settings were changed in flight");
@@ -173,8 +136,7 @@ fn beginning<R: io::Read>(log: &FlightLog<R>) -> Result<Begin, &'static str> {
     Ok(Begin {
         toml: toml.clone(),
         controller: controller.unwrap_or_else(|| Controller::default().name().to_owned()),
-        at_power_up: None,
-        in_the_air: None,
+        start,
         on_the_air: None,
         flight: 0,
     })

@@ -3,11 +3,14 @@
 
 use std::path::Path;
 
-use flight::computer::pilot::{PilotInput, PilotOutput, Sensed};
+use flight::computer::Commands;
+use flight::computer::pilot::{PilotInput, Sensed};
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use tick_log::pilot::{estimate_from_log, input_from_log, output_from_log};
+use protocol::log::computer_v1::ComputerFrame;
+use tick_log::estimate::estimate_from_log;
+use tick_log::frame::{commands_from_log, input_from_log, phase_of};
 
 use crate::log::{Entry, FlightLog, LogError, RecordingError};
 use crate::settings::explained;
@@ -89,7 +92,8 @@ impl Trace {
     pub fn push(
         &mut self,
         input: &PilotInput,
-        output: &PilotOutput,
+        commands: &Commands,
+        phase: Phase,
         believed: &Estimate,
         gimbal_reported_rad: Option<[f64; 2]>,
     ) {
@@ -98,7 +102,7 @@ impl Trace {
         let sound = believed.state.is_finite()
             && believed.wind_m_s.iter().all(|wind| wind.is_finite())
             && numbers.iter().all(|vector| vector.iter().all(|value| value.is_finite()))
-            && input.fins_rad.iter().chain(&output.gimbal_rad).all(|angle| angle.is_finite())
+            && input.fins_rad.iter().chain(&commands.gimbal_rad).all(|angle| angle.is_finite())
             && input.time_s.is_finite()
             && measured.gnss.is_none_or(|fix| {
                 fix.position_m.iter().chain(fix.velocity_m_s.iter()).all(|value| value.is_finite())
@@ -113,12 +117,12 @@ impl Trace {
             measured,
             fins_rad: input.fins_rad,
             gimbal_reported_rad,
-            gimbal_rad: output.gimbal_rad,
-            ignite: output.ignite,
-            parachute: output.parachute,
+            gimbal_rad: commands.gimbal_rad,
+            ignite: commands.ignite,
+            parachute: commands.parachute,
             contact: input.contact,
             booster_attached: input.booster_attached,
-            phase: output.phase,
+            phase,
             believed: *believed,
         });
     }
@@ -141,31 +145,39 @@ impl Trace {
         let name = log.name().to_owned();
         let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
         let mut trace: Option<Self> = None;
-        let (mut waiting, mut reported_rad) = (None, None);
+        let mut waiting = None;
         let (mut telemetry, mut flights) = (false, 0_usize);
         while let Some(stamped) = log.next_entry()? {
             match stamped.entry {
                 Entry::Telemetry(_) => telemetry = true,
-                Entry::PilotStart(_) => flights += 1,
-                Entry::ComputerFrame(frame) => {
-                    reported_rad = frame.input.gimbal_rad.as_slice().try_into().ok();
-                }
-                Entry::PilotTick(tick) => {
-                    let input = input_from_log(&tick.input).map_err(|error| unknown(error.to_string()))?;
-                    let output = output_from_log(&tick.output, tick.input.frame)
-                        .map_err(|error| unknown(error.to_string()))?;
-                    waiting = Some((input, output));
-                }
+                Entry::ComputerStart(start) => flights += usize::from(start.released),
+                Entry::ComputerFrame(frame) => waiting = frame.into_tick(),
                 Entry::Estimate(estimate) => {
-                    let Some((input, output)) = waiting.take() else { continue };
-                    let believed = estimate_from_log(&estimate, input.frame)
-                        .map_err(|error| unknown(error.to_string()))?;
+                    let Some(ComputerFrame { input, output, .. }) = waiting.take() else { continue };
+                    let number = input.frame;
+                    let read = input_from_log(&input).map_err(|error| unknown(error.to_string()))?;
+                    let commands =
+                        commands_from_log(&output, number).map_err(|error| unknown(error.to_string()))?;
+                    let phase =
+                        phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
+                    let read = read.input();
+                    let input = PilotInput {
+                        frame: number,
+                        time_s: read.time_s,
+                        sensed: read.sensed,
+                        fins_rad: read.fins_rad,
+                        contact: read.contact,
+                        igniter_continuity: read.igniter_continuity,
+                        booster_attached: read.booster_attached,
+                    };
+                    let believed =
+                        estimate_from_log(&estimate, number).map_err(|error| unknown(error.to_string()))?;
                     if trace.is_none() {
                         let (mission, text) = mission_of(log)?;
                         trace = Some(Self::new(&name, mission, &text));
                     }
                     if let Some(trace) = &mut trace {
-                        trace.push(&input, &output, &believed, reported_rad.take());
+                        trace.push(&input, &commands, phase, &believed, Some(read.gimbal_rad));
                         if trace.frames.len() > FRAMES_MAX {
                             let kind = "frames of the flight computer";
                             return Err(RecordingError::TooLong { name: name.clone(), kind }.into());
@@ -175,7 +187,7 @@ impl Trace {
                 _ => {}
             }
         }
-        if flights > 2 {
+        if flights > 1 {
             return Err(RecordingError::SeveralFlights { name, flights }.into());
         }
         let found = if telemetry { "it is a ground station's" } else { "none of either" };

@@ -7,7 +7,7 @@ use protocol::dialect::TdInterlock;
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;
 use serde::Serialize;
-use tick_log::computer::accepts_abort;
+use tick_log::frame::accepts_abort;
 
 use super::{Grade, GradeLevel, ProfileFacts, VerdictFacts};
 use crate::log::{Entry, FrameOrder, Gap, StampedEntry, TickRanges};
@@ -109,7 +109,7 @@ pub(super) struct FrameCounter {
 }
 
 impl FrameCounter {
-    pub(super) fn let_go(&mut self) {
+    pub(super) fn start(&mut self) {
         self.start = true;
     }
 
@@ -288,12 +288,8 @@ impl EndingTracker {
     pub(super) fn note(&mut self, entry: &Entry) {
         let phase = match entry {
             Entry::ComputerFrame(frame) => {
-                self.aborted |= accepts_abort(frame);
-                frame.output.phase
-            }
-            Entry::PilotTick(tick) => {
-                self.aborted |= tick.input.abort;
-                tick.output.phase
+                self.aborted |= accepts_abort(&frame.record);
+                frame.record.output.phase
             }
             Entry::Telemetry(telemetry) => {
                 self.aborted |= telemetry.interlocks.is_some_and(has_latched_abort);

@@ -92,15 +92,15 @@ impl Seen {
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
-            Entry::PilotStart(_) => self.frames.let_go(),
+            Entry::ComputerStart(_) => self.frames.start(),
             Entry::PilotTiming(timing) => self.frames.time(&timing),
-            Entry::PilotTick(tick) => {
-                self.vehicle_phases.note(tick.input.time_s, tick.output.phase);
-                self.frames.count(tick.input.frame, record);
+            Entry::ComputerFrame(frame) => {
+                if let Some(time_s) = frame.flight_time_s() {
+                    self.vehicle_phases.note(time_s, frame.record.output.phase);
+                }
+                self.frames.count(frame.record.input.frame, record);
             }
-            Entry::ComputerStart(_)
-            | Entry::ComputerFrame(_)
-            | Entry::Verdict(_)
+            Entry::Verdict(_)
             | Entry::Estimate(_)
             | Entry::World(_)
             | Entry::RawFrame

@@ -77,10 +77,14 @@ impl Clocks {
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>, since_s: f64) {
         match &stamped.entry {
             Entry::ComputerFrame(frame) => {
-                self.boot_zero_s.get_or_insert(since_s - frame.input.time_s);
-            }
-            Entry::PilotTick(tick) => {
-                self.flight_zero_s.get_or_insert(since_s - tick.input.time_s);
+                let input = &frame.record.input;
+                if frame.tick != Some(input.frame) {
+                    // A flight without a pad has no power-up.
+                    self.boot_zero_s.get_or_insert(since_s - input.time_s);
+                }
+                if let Some(time_s) = frame.flight_time_s() {
+                    self.flight_zero_s.get_or_insert(since_s - time_s);
+                }
             }
             Entry::Telemetry(telemetry) => {
                 self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);

@@ -1,8 +1,8 @@
 //! Separates the flights of a log: where each begins, and whether it was recorded to its end.
 //!
 //! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool may end in the
-//! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`. If the log
-//! has none, a flight begins with `/pilot/start`. Each flight ends with its verdict.
+//! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`; a second one
+//! at the release belongs to it. Each flight ends with its verdict.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,6 +10,7 @@ use std::fmt;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
 use serde::Serialize;
+use tick_log::frame::phase_of;
 
 use super::{Clock, ClockTime, Entry};
 
@@ -81,6 +82,59 @@ impl LoggedFlight {
     }
 }
 
+/// Finds the frames in flight: from the release until the flight computer says that the flight is over. Frames of a flight
+/// without a pad are all in flight.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct InFlight {
+    /// The start of the flight was seen: at its power-up or at its release.
+    started: Option<Started>,
+    /// The frame of the release.
+    release: Option<u64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Started {
+    AtPowerUp,
+    AtRelease,
+}
+
+impl InFlight {
+    /// Notes a record; a frame learns its place in the flight.
+    pub(super) fn place(&mut self, entry: &mut Entry) {
+        match entry {
+            Entry::ComputerStart(start)
+                if start.released
+                    && self.started == Some(Started::AtPowerUp)
+                    && self.release.is_none_or(|release| release == start.frame) =>
+            {
+                self.release = Some(start.frame);
+            }
+            Entry::ComputerStart(start) => {
+                let started = if start.released { Started::AtRelease } else { Started::AtPowerUp };
+                let release = start.released.then_some(start.frame);
+                *self = Self { started: Some(started), release };
+            }
+            Entry::ComputerFrame(frame) => {
+                let (input, output) = (&frame.record.input, &frame.record.output);
+                let phase = phase_of(output);
+                let release = match self.started {
+                    Some(_) => self.release,
+                    // The start is lost.
+                    None => self.release.or((!phase.is_some_and(Phase::on_pad)).then_some(0)),
+                };
+                let waits = output.over && self.started == Some(Started::AtPowerUp);
+                frame.tick = release
+                    .filter(|release| !waits && input.frame > *release)
+                    .map(|release| input.frame - release);
+                if output.released {
+                    self.release = Some(input.frame);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
 /// Separates flights while the records of a log are read.
 #[derive(Debug, Clone, Default)]
 pub struct Flights {
@@ -94,26 +148,25 @@ impl Flights {
     pub fn note(&mut self, entry: &Entry) -> bool {
         let before = self.found.len();
         match entry {
-            Entry::ComputerStart(_) => {
+            // If the log has the power-up of this flight computer, its release does not begin another flight.
+            Entry::ComputerStart(start)
+                if start.released
+                    && self.powered_up
+                    && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
+            Entry::ComputerStart(start) => {
                 self.begin();
-                self.powered_up = true;
+                self.powered_up = !start.released;
             }
             Entry::ComputerFrame(frame) => {
-                if let Some(flight) = self.found.last_mut().filter(|_| self.powered_up) {
-                    flight.on_the_pad = Some((frame.input.time_s, frame.output.phase));
-                }
-            }
-            // If the log has the power-up of this flight computer, its release does not begin another flight.
-            Entry::PilotStart(_)
-                if self.powered_up && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
-            Entry::PilotStart(_) => self.begin(),
-            Entry::PilotTick(tick) => {
                 // The start may be lost.
                 if self.found.is_empty() {
                     self.begin();
                 }
-                if let Some(flight) = self.found.last_mut() {
-                    flight.note(tick.input.time_s, tick.output.phase);
+                let phase = frame.record.output.phase;
+                match (self.found.last_mut(), frame.flight_time_s()) {
+                    (Some(flight), Some(time_s)) => flight.note(time_s, phase),
+                    (Some(flight), None) => flight.on_the_pad = Some((frame.record.input.time_s, phase)),
+                    (None, _) => {}
                 }
             }
             Entry::Verdict(verdict) => {

@@ -15,15 +15,16 @@ use std::io::{BufReader, BufWriter, Chain, Cursor, Read, Seek as _, Write as _};
 use std::path::Path;
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
+use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight, TickRanges};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, RECORD_LIMIT_BYTES};
-use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_RAW_RX, TOPIC_TELEMETRY};
+use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 use protocol::text::printable;
-pub use record::{Entry, StampedEntry};
-pub(crate) use record::{computer_descriptor, pilot_descriptor};
+pub(crate) use record::frame_descriptor;
+pub use record::{Entry, LoggedFrame, StampedEntry};
 pub use recording::{Recording, RecordingError};
 pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
 
@@ -42,6 +43,9 @@ pub struct FlightLog<R: Read> {
     /// Whether a record was found that only flight logs have.
     recognised: bool,
     last_log_time_ns: Option<u64>,
+    in_flight: InFlight,
+    /// The topics whose records are decoded; all, if `None`.
+    wanted: Option<&'static [&'static str]>,
 }
 
 impl FlightLog<BufReader<File>> {
@@ -81,7 +85,15 @@ impl<R: Read> FlightLog<R> {
             head: Head::default(),
             recognised: false,
             last_log_time_ns: None,
+            in_flight: InFlight::default(),
+            wanted: None,
         })
+    }
+
+    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`].
+    #[must_use]
+    pub fn decoding(self, topics: &'static [&'static str]) -> Self {
+        Self { wanted: Some(topics), ..self }
     }
 
     /// The file's name, for messages.
@@ -128,8 +140,14 @@ impl<R: Read> FlightLog<R> {
             match item {
                 None => return self.end().map(|()| None),
                 Some(LogItem::Message { channel_id, log_time_ns, sequence, data }) => {
-                    let entry = Entry::decode(self.reader.channel(channel_id), &data);
-                    self.recognised |= entry.is_ours();
+                    let channel = self.reader.channel(channel_id);
+                    let wanted = |channel: &&LogChannel| {
+                        self.wanted.is_none_or(|topics| topics.contains(&channel.topic.as_str()))
+                    };
+                    let mut entry = Entry::decode(channel.filter(wanted), &data);
+                    self.recognised |= entry.is_ours()
+                        || channel.is_some_and(|channel| channel.schema_name.starts_with("touchdown."));
+                    self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
                     return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, data, entry }));
                 }
@@ -195,9 +213,8 @@ pub enum LogError {
     },
     /// An MCAP file of another program.
     #[error(
-        "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {}, {} or similar topics",
-        printable(library.as_bytes()), listed(topics), TOPIC_COMPUTER_FRAME, TOPIC_PILOT_TICK, TOPIC_TELEMETRY,
-        TOPIC_RAW_RX
+        "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {} or similar topics",
+        printable(library.as_bytes()), listed(topics), TOPIC_COMPUTER_FRAME, TOPIC_TELEMETRY, TOPIC_RAW_RX
     )]
     Foreign {
         /// The file.
@@ -274,7 +291,7 @@ pub struct SummaryFacts {
     /// Messages in the file.
     pub message_count: u64,
     /// Of these, frames of the flight computer.
-    pub ticks: u64,
+    pub frames: u64,
     /// Time of the last message, ns since the Unix epoch.
     pub last_log_time_ns: u64,
 }
@@ -283,12 +300,12 @@ pub struct SummaryFacts {
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     let summary = read_summary(path)?;
     let stats = summary.stats?;
-    let is_tick =
-        |id: &u16| summary.channels.get(id).is_some_and(|channel| channel.topic == TOPIC_PILOT_TICK);
-    let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_tick(id));
+    let is_frame =
+        |id: &u16| summary.channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
+    let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_frame(id));
     Some(SummaryFacts {
         message_count: stats.message_count,
-        ticks: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
+        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
         last_log_time_ns: stats.message_end_time,
     })
 }

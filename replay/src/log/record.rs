@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use flight::computer::flight_time_s;
 use prost::Message;
 use prost_reflect::{
     Cardinality, DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMessage as _, Value,
@@ -9,8 +10,8 @@ use prost_reflect::{
 use protocol::log::reader::LogChannel;
 use protocol::log::record::{
     ENCODING_MAVLINK, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_EVENTS,
-    TOPIC_OPERATOR, TOPIC_PILOT_START, TOPIC_PILOT_TICK, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX,
-    TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE, TOPIC_VERDICT,
+    TOPIC_OPERATOR, TOPIC_PILOT_TIMING, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_TELEMETRY, TOPIC_TRUTH_SAMPLE,
+    TOPIC_VERDICT,
 };
 use protocol::log::{
     DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, computer_v1, flight_v1, v1,
@@ -31,17 +32,37 @@ pub struct StampedEntry {
     pub entry: Entry,
 }
 
+/// A frame of the flight computer, and its place in the flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedFrame {
+    /// As recorded: numbers and times count from power-up.
+    pub record: computer_v1::ComputerFrame,
+    /// Its number since the release, until the flight is over.
+    pub tick: Option<u64>,
+}
+
+impl LoggedFrame {
+    /// Time since the release, s, in flight.
+    pub fn flight_time_s(&self) -> Option<f64> {
+        self.tick.map(flight_time_s)
+    }
+
+    /// The frame on the clock of its flight: number and time count from the release. `None` outside the flight.
+    pub fn into_tick(self) -> Option<computer_v1::ComputerFrame> {
+        let frame = self.tick?;
+        let mut record = self.record;
+        (record.input.frame, record.input.time_s) = (frame, flight_time_s(frame));
+        Some(record)
+    }
+}
+
 /// One record of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// The data from which the flight computer was built at power-up.
+    /// The data from which the flight computer was built, at power-up or at its release.
     ComputerStart(Box<computer_v1::ComputerStart>),
-    /// A frame of the flight computer, from power-up on.
-    ComputerFrame(Box<computer_v1::ComputerFrame>),
-    /// The start record of the flight computer: its estimate at its release.
-    PilotStart(Box<flight_v1::PilotStart>),
-    /// A frame of the flight computer from its release on.
-    PilotTick(Box<flight_v1::PilotTick>),
+    /// A frame of the flight computer.
+    ComputerFrame(Box<LoggedFrame>),
     /// Solve time of a planning frame.
     PilotTiming(flight_v1::PilotTiming),
     /// What the flight computer believed after a frame.
@@ -77,9 +98,9 @@ impl Entry {
         };
         match channel.topic.as_str() {
             TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
-            TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, Self::ComputerFrame),
-            TOPIC_PILOT_START => decoded(channel, "PilotStart", data, Self::PilotStart),
-            TOPIC_PILOT_TICK => decoded(channel, "PilotTick", data, Self::PilotTick),
+            TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, |record| {
+                Self::ComputerFrame(Box::new(LoggedFrame { record: *record, tick: None }))
+            }),
             TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
                 Self::PilotTiming(*timing)
             }),
@@ -106,7 +127,7 @@ fn decoded<M: Message + Default>(
 ) -> Entry {
     let package = match message_name {
         "ComputerStart" | "ComputerFrame" => PACKAGE_COMPUTER,
-        "PilotStart" | "PilotTick" | "PilotTiming" | "Estimate" | "TruthSample" => PACKAGE_FLIGHT,
+        "PilotTiming" | "Estimate" | "TruthSample" => PACKAGE_FLIGHT,
         _ => PACKAGE,
     };
     let accepted = format!("{package}.{message_name}");
@@ -138,10 +159,10 @@ fn decoded<M: Message + Default>(
 /// Package of the log's own records.
 pub(super) const PACKAGE: &str = "touchdown.log.v1";
 
-/// Package of the records of the flight from apogee.
+/// Package of what the flight computer thought, and of the truth.
 pub(super) const PACKAGE_FLIGHT: &str = "touchdown.flight.v1";
 
-/// Package of the flight computer's frames from power-up on.
+/// Package of the flight computer's frames.
 pub(super) const PACKAGE_COMPUTER: &str = "touchdown.computer.v1";
 
 static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
@@ -153,12 +174,7 @@ static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
 });
 
 /// Describes a frame of the flight computer.
-pub(crate) fn pilot_descriptor() -> Option<MessageDescriptor> {
-    POOL.get_message_by_name("touchdown.flight.v1.PilotTick")
-}
-
-/// Descriptor of a frame of the flight computer from power-up on.
-pub(crate) fn computer_descriptor() -> Option<MessageDescriptor> {
+pub(crate) fn frame_descriptor() -> Option<MessageDescriptor> {
     POOL.get_message_by_name("touchdown.computer.v1.ComputerFrame")
 }
 
@@ -199,23 +215,23 @@ fn message_complaint(message: &DynamicMessage, path: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::log::{flight_v1, v1};
+    use protocol::log::{computer_v1, v1};
 
     #[test]
     fn every_record_is_described() {
         for name in ["LandingVerdict", "Telemetry", "OperatorAction"] {
             assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
         }
-        assert!(pilot_descriptor().is_some() && computer_descriptor().is_some());
+        assert!(frame_descriptor().is_some());
     }
 
     #[test]
     fn a_missing_field_is_named() {
-        let tick = "touchdown.flight.v1.PilotTick";
-        assert_eq!(complaint(tick, &flight_v1::PilotTick::default().encode_to_vec()), None);
-        assert_eq!(complaint(tick, &[]).unwrap(), "input is missing; this build needs it");
+        let frame = "touchdown.computer.v1.ComputerFrame";
+        assert_eq!(complaint(frame, &computer_v1::ComputerFrame::default().encode_to_vec()), None);
+        assert_eq!(complaint(frame, &[]).unwrap(), "input is missing; this build needs it");
         // Field 1, a message of no bytes.
-        assert_eq!(complaint(tick, &[0x0a, 0x00]).unwrap(), "input.frame is missing; this build needs it");
+        assert_eq!(complaint(frame, &[0x0a, 0x00]).unwrap(), "input.frame is missing; this build needs it");
     }
 
     #[test]

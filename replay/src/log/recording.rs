@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use foxglove::messages::Log as EventRecord;
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::{flight_v1, v1};
 
 use super::verdict::{Verdicts, heard_message};
@@ -32,7 +33,7 @@ pub enum RecordingError {
     },
     /// The log has no frames to re-execute.
     #[error(
-        "{name}: has no frames of a flight computer after a record /pilot/start: {}",
+        "{name}: has no frames of a flight computer after its release: {}",
         unreadable.as_deref().unwrap_or("this command needs the log of the vehicle or of the demonstration")
     )]
     NoFrames {
@@ -82,10 +83,10 @@ pub struct Recording {
     pub name: String,
     /// Metadata and attachments of the log.
     pub head: Head,
-    /// The start record of the flight computer at its release.
-    pub pilot_start: Option<flight_v1::PilotStart>,
-    /// Its frames, in file order.
-    pub frames: Vec<flight_v1::PilotTick>,
+    /// The start record of the flight computer at its release, where its frames and their times begin.
+    pub start: Option<ComputerStart>,
+    /// Its frames in flight, in file order: numbers and times count from the release.
+    pub frames: Vec<ComputerFrame>,
     /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
     /// Solve times of planning frames, in file order; empty for a flight simulated without a clock.
@@ -145,20 +146,22 @@ impl Recording {
                     recording.unreadable.get_or_insert(reason);
                 }
                 // A start record without frames after it says nothing.
-                Entry::PilotStart(start) if recording.frames.is_empty() => {
-                    recording.pilot_start = Some(*start);
+                Entry::ComputerStart(start) if start.released && recording.frames.is_empty() => {
+                    recording.start = Some(ComputerStart { frame: 0, ..*start });
                 }
-                Entry::PilotTick(tick) => {
-                    if frame_order.note(tick.input.frame, stamped.sequence).is_some() {
-                        frames_lost.get_or_insert(recording.frames.len());
+                Entry::ComputerFrame(frame) => {
+                    let lost = frame_order.note(frame.record.input.frame, stamped.sequence).is_some();
+                    if let Some(tick) = frame.into_tick() {
+                        // What is lost before the release is not of the flight.
+                        if lost && tick.input.frame > 1 {
+                            frames_lost.get_or_insert(recording.frames.len());
+                        }
+                        recording.frames.push(tick);
                     }
-                    recording.frames.push(*tick);
                 }
                 Entry::ComputerStart(_)
-                | Entry::ComputerFrame(_)
                 | Entry::Estimate(_)
                 | Entry::Verdict(_)
-                | Entry::PilotStart(_)
                 | Entry::RawFrame
                 | Entry::Operator
                 | Entry::Other => {}
@@ -207,10 +210,8 @@ impl Recording {
     ///
     /// # Errors
     /// The log has no frames or no start record.
-    pub fn recorded_frames(
-        &self,
-    ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
-        match &self.pilot_start {
+    pub fn recorded_frames(&self) -> Result<(&ComputerStart, &[ComputerFrame]), RecordingError> {
+        match &self.start {
             Some(start) if !self.frames.is_empty() => Ok((start, &self.frames)),
             _ => {
                 Err(RecordingError::NoFrames { name: self.name.clone(), unreadable: self.unreadable.clone() })
@@ -222,9 +223,7 @@ impl Recording {
     ///
     /// # Errors
     /// The log has no frames or no start record.
-    pub fn replayable_frames(
-        &self,
-    ) -> Result<(&flight_v1::PilotStart, &[flight_v1::PilotTick]), RecordingError> {
+    pub fn replayable_frames(&self) -> Result<(&ComputerStart, &[ComputerFrame]), RecordingError> {
         let (start, frames) = self.recorded_frames()?;
         match (frames.get(..self.frames_unbroken), frames.first()) {
             (Some([]), Some(first)) => {

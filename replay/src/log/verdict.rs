@@ -125,7 +125,7 @@ impl Verdicts {
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
         match &stamped.entry {
             Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
-            Entry::PilotTick(_) => self.has_ticks = true,
+            Entry::ComputerFrame(_) => self.has_ticks = true,
             Entry::RawFrame if !self.has_ticks => {
                 if let Some(message) = message {
                     self.heard.take(message);

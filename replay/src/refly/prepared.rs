@@ -7,12 +7,12 @@ use flight::computer::FRAME_S;
 use flight::guidance::baseline::{Controller, Law as BurnLaw};
 use flight::rules::phase::Phase;
 use prost::Message as _;
-use protocol::log::flight_v1;
+use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput, ComputerStart};
 use protocol::log::record::Record;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
-use tick_log::pilot::tick_to_log;
-use tick_log::sortie::{self, pilot_start};
+use tick_log::frame::phase_of;
+use tick_log::sortie;
 use world::Truth;
 
 use super::rerun::{Recorded, Rerun};
@@ -20,7 +20,7 @@ use super::{
     From, Law, Reached, ReflownFlight, ReflyError, ReflyOptions, ReflyReport, StartAt, StartState, margin,
     refuse_timed,
 };
-use crate::controller::{LoggedPilot, Moment, Replayed as _, SETTINGS_IN_FLIGHT};
+use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT};
 use crate::info::VerdictFacts;
 use crate::log::Recording;
 use crate::settings::{Setting, is_whole_in_mission, mission_value_of, mission_with, truth_with};
@@ -32,8 +32,8 @@ type Kept = Vec<(f64, Record)>;
 #[derive(Debug)]
 pub struct Prepared<'a> {
     recording: &'a Recording,
-    pilot_start: &'a flight_v1::PilotStart,
-    frames: &'a [flight_v1::PilotTick],
+    start: &'a ComputerStart,
+    frames: &'a [ComputerFrame],
     dispersion: Dispersion,
     number: u64,
     truth: Truth,
@@ -50,19 +50,17 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// See [`ReflyError`].
     pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
-        let (pilot_start, frames) = recording.recorded_frames()?;
+        let (start, frames) = recording.recorded_frames()?;
         let Recorded { dispersion, number, mut rerun, .. } = Recorded::of(recording)?;
         let place = find(recording, frames, &options.start)?;
         let first_frame = frames[place].input.frame;
         let mut reached = Reached { frames: 0, identical: 0, first_different: None };
         while rerun.flight.frame() + 1 < first_frame && rerun.step() {
-            let flight = &rerun.flight;
-            if let Some((input, piloted)) = rerun.piloted()
-                && let Some(then) = recorded_frame(&frames[..place], flight.frame())
+            if let Some(now) = rerun.last.take()
+                && let Some(then) = recorded_frame(&frames[..place], rerun.flight.frame())
             {
                 reached.frames += 1;
-                let now = tick_to_log(input, piloted, flight.computer().flight_digest());
-                if now.encode_to_vec() == then.encode_to_vec() {
+                if is_same_flight(&now, then) {
                     reached.identical += 1;
                 } else {
                     reached.first_different.get_or_insert(then.input.frame);
@@ -87,7 +85,7 @@ impl<'a> Prepared<'a> {
         let place_m = world.state().position_m;
         let before = place
             .checked_sub(1)
-            .map_or("DEPLOY", |before| phase_of(&frames[before]).map_or("unknown", Phase::name));
+            .map_or("DEPLOY", |before| phase_of(&frames[before].output).map_or("unknown", Phase::name));
         let state = StartState {
             tick: first_frame,
             time_s: frames[place].input.time_s,
@@ -98,7 +96,7 @@ impl<'a> Prepared<'a> {
         };
         Ok(Self {
             recording,
-            pilot_start,
+            start,
             frames,
             dispersion,
             number,
@@ -170,11 +168,11 @@ impl<'a> Prepared<'a> {
         loop {
             let goes_on = rerun.step();
             let flight = &rerun.flight;
-            if let Some((_, piloted)) = rerun.piloted() {
+            if let Some(commands) = rerun.commands() {
                 ticks += 1;
                 if let Some(then) = recorded_frame(self.frames, flight.frame()) {
                     let then = &then.output.gimbal_rad;
-                    let pairs = || then.iter().zip(&piloted.gimbal_rad);
+                    let pairs = || then.iter().zip(&commands.gimbal_rad);
                     commands_recorded += 1;
                     commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
                     let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -182,7 +180,7 @@ impl<'a> Prepared<'a> {
                 }
             }
             if let Some(kept) = &mut kept {
-                keep(kept, &rerun, phase);
+                keep(kept, &mut rerun, phase);
             }
             phase = rerun.flight.computer().mode().phase;
             if !goes_on {
@@ -224,12 +222,12 @@ impl<'a> Prepared<'a> {
     /// See [`ReflyError`].
     pub fn fly_kept(&self, options: &ReflyOptions) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
         let Recorded { mut rerun, faults, .. } = Recorded::with_faults(self.recording, &options.faults)?;
-        let flight_v1::PilotStart { believed, gyro_bias_rad_s, .. } = pilot_start(&rerun.flight);
-        let start = flight_v1::PilotStart { believed, gyro_bias_rad_s, ..*self.pilot_start };
-        let mut records: Kept = vec![(0.0, Record::PilotStart(Box::new(start)))];
+        let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie::start(&rerun.flight);
+        let start = ComputerStart { believed, gyro_bias_rad_s, ..*self.start };
+        let mut records: Kept = vec![(0.0, Record::ComputerStart(Box::new(start)))];
         let mut phase = rerun.flight.computer().mode().phase;
         while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {
-            keep(&mut records, &rerun, phase);
+            keep(&mut records, &mut rerun, phase);
             phase = rerun.flight.computer().mode().phase;
         }
         let (report, verdict) = self.fly_on(options, Some(&mut records))?;
@@ -257,7 +255,7 @@ impl<'a> Prepared<'a> {
         }
         if let Some(controller) = Self::other_controller(options) {
             let mission = mission_with(self.recording.profile_toml()?, &lasting(options))?;
-            let fixed_m = self.pilot_start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
+            let fixed_m = self.start.fixed_ignition_height_m.or(mission.ignition.fixed_height_m);
             let height_m = BurnLaw::of(controller, &mission).ignition_height_m();
             if let (Some(height_m), None) = (height_m, fixed_m) {
                 in_flight.push(Setting {
@@ -305,7 +303,7 @@ impl<'a> Prepared<'a> {
         refuse_misplaced(options)?;
         let mut rerun = self.with_other_faults(options)?;
         let in_flight = self.in_flight(options)?;
-        rerun.schedule = Some(LoggedPilot::schedule(toml, self.pilot_start, &in_flight)?);
+        rerun.schedule = Some(LoggedComputer::schedule(toml, self.start, &in_flight)?);
 
         // The world gets its airframe from all settings without a time, and its draw from the settings of the draw.
         let lasting = lasting(options);
@@ -346,9 +344,10 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
 }
 
 /// Keeps the frame just flown; `phase` is the phase before it.
-fn keep(kept: &mut Kept, rerun: &Rerun, phase: Phase) {
+fn keep(kept: &mut Kept, rerun: &mut Rerun, phase: Phase) {
     let time_s = rerun.flight.frame() as f64 * FRAME_S;
-    kept.extend(sortie::frame_and_phase(&rerun.flight, phase).into_iter().map(|record| (time_s, record)));
+    let records = sortie::frame_and_phase(&rerun.flight, &mut rerun.last, phase);
+    kept.extend(records.into_iter().map(|record| (time_s, record)));
 }
 
 /// The settings without a time.
@@ -357,23 +356,37 @@ fn lasting(options: &ReflyOptions) -> Vec<Setting> {
 }
 
 /// Whether a frame's flight computer has noticed that it is on the ground.
-fn is_down(tick: &flight_v1::PilotTick) -> bool {
-    matches!(phase_of(tick), Some(Phase::Touchdown | Phase::Safed))
+fn is_down(tick: &ComputerFrame) -> bool {
+    matches!(phase_of(&tick.output), Some(Phase::Touchdown | Phase::Safed))
 }
 
-fn phase_of(tick: &flight_v1::PilotTick) -> Option<Phase> {
-    u8::try_from(tick.output.phase).ok().and_then(Phase::from_index)
+/// Whether two frames are of the same flight: what was felt, and what was decided. What only a crew or a log's disk makes
+/// different does not count.
+fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame) -> bool {
+    let felt = |frame: &ComputerFrame| {
+        let ComputerInput {
+            measured, known, fins_rad, contact, igniter_continuity, booster_attached, ..
+        } = frame.input.clone();
+        let input = ComputerInput {
+            measured,
+            known,
+            fins_rad,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            ..ComputerInput::default()
+        };
+        let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
+        ComputerFrame { input, output, state_digest: 0 }.encode_to_vec()
+    };
+    felt(now) == felt(then)
 }
 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
 /// cannot act earlier.
-fn find(
-    recording: &Recording,
-    frames: &[flight_v1::PilotTick],
-    start: &StartAt,
-) -> Result<usize, ReflyError> {
+fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Result<usize, ReflyError> {
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
-        let entered = frames.iter().position(|tick| phase_of(tick).is_some_and(wanted))?;
+        let entered = frames.iter().position(|tick| phase_of(&tick.output).is_some_and(wanted))?;
         Some(entered + 1).filter(|place| *place < frames.len())
     };
     let found = match start {
@@ -383,9 +396,8 @@ fn find(
         StartAt::Phase(phase) => in_phase(&|found| found == *phase),
     };
     found.ok_or_else(|| {
-        let first = frames.first().map(LoggedPilot::moment);
-        let last = frames.last().map(LoggedPilot::moment);
-        let number = |moment: Option<Moment>| moment.map_or(0, |moment| moment.tick);
+        let (first, last) = (frames.first(), frames.last());
+        let number = |frame: Option<&ComputerFrame>| frame.map_or(0, |frame| frame.input.frame);
         let reason = match start {
             StartAt::Landing => {
                 "no frame of a landing to start from; a frame, a time or a phase names another moment"
@@ -397,7 +409,7 @@ fn find(
             StartAt::Time(time_s) => {
                 format!(
                     "no frame at or after {time_s} s; the last is at {:.3} s",
-                    last.map_or(0.0, |moment| moment.time_s)
+                    last.map_or(0.0, |frame| frame.input.time_s)
                 )
             }
             StartAt::Phase(phase) => format!("no frame in phase {}", phase.name()),
@@ -429,7 +441,7 @@ fn put_where_it_believes(
 }
 
 /// A recorded frame by its number; a log may have lost it.
-fn recorded_frame(frames: &[flight_v1::PilotTick], number: u64) -> Option<&flight_v1::PilotTick> {
+fn recorded_frame(frames: &[ComputerFrame], number: u64) -> Option<&ComputerFrame> {
     let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
     frames.get(place)
 }

@@ -1,17 +1,18 @@
 //! Sets up a recorded flight to be flown again, from the facts in its log.
 
-use flight::computer::FRAME_S;
-use flight::computer::pilot::{PilotInput, PilotOutput};
+use flight::computer::{Commands, FRAME_S};
 use flight::vehicle::mission::Mission;
 use sim::dispersion::Dispersion;
 use sim::fault::{Breakage, FaultError, TimedFault};
+use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use tick_log::pilot::{state_from_log, vector_from_log};
-use tick_log::sortie as sortie_log;
+use tick_log::estimate::{state_from_log, vector_from_log};
+use tick_log::frame::accepts_abort;
+use tick_log::sortie::{self as sortie_log, LastFrame};
 
 use super::{FaultChanges, ReflyError};
-use crate::controller::LoggedPilot;
+use crate::controller::LoggedComputer;
 use crate::log::Recording;
 use crate::settings::Schedule;
 
@@ -25,6 +26,8 @@ pub(super) struct Rerun {
     pub(super) schedule: Option<Schedule<Mission>>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
+    /// The flight computer's last frame.
+    pub(super) last: LastFrame,
 }
 
 /// The recipe of a flight, and the flight at apogee.
@@ -50,7 +53,7 @@ impl Recorded {
     /// # Errors
     /// As [`of`](Self::of); or a fault to leave out is not there, or a fault to add is unknown.
     pub(super) fn with_faults(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
-        let (pilot_start, frames) = recording.recorded_frames()?;
+        let (start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
         let run = &recording.head.run;
         if let Some(original) = run.get("reflown_from") {
@@ -71,7 +74,7 @@ impl Recorded {
             .collect::<Result<_, _>>()
             .map_err(|error: FaultError| lacking(error.to_string()))?;
         let faults = changed(recording, &recorded, changes)?;
-        let mission = LoggedPilot::schedule(recording.profile_toml()?, pilot_start, &[])?.base().clone();
+        let mission = LoggedComputer::schedule(recording.profile_toml()?, start, &[])?.base().clone();
         let recipe = Recipe {
             mission,
             mission_toml: recording.profile_toml()?.to_owned(),
@@ -83,15 +86,15 @@ impl Recorded {
             faults,
         };
         let flight = Sortie::new(&recipe, number)?;
-        let flight = match &pilot_start.gyro_bias_rad_s {
-            Some(bias) => flight.standing(&state_from_log(&pilot_start.believed), vector_from_log(bias)),
+        let flight = match &start.gyro_bias_rad_s {
+            Some(bias) => flight.standing(&state_from_log(&start.believed), vector_from_log(bias)),
             None => flight,
         };
         // An abort that no fault caused came from the crew.
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
-        let crews = frames.iter().filter(|tick| tick.input.abort && !by_fault);
+        let crews = frames.iter().filter(|tick| accepts_abort(tick) && !by_fault);
         let aborts = crews.map(|tick| tick.input.frame).collect();
-        let rerun = Rerun { flight, schedule: None, aborts };
+        let rerun = Rerun { flight, schedule: None, aborts, last: LastFrame::default() };
         let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
         Ok(Self { dispersion, number, rerun, faults })
     }
@@ -108,13 +111,13 @@ impl Rerun {
         if self.aborts.binary_search(&(self.flight.frame() + 1)).is_ok() {
             self.flight.abort();
         }
-        self.flight.step();
+        self.flight.step_with(&Outside::NOBODY, &mut self.last);
         self.flight.goes_on()
     }
 
-    /// Input and output of the last frame; `None` while the computer is dead.
-    pub(super) fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
-        self.flight.computer().piloted().filter(|_| !self.flight.computer_is_dead())
+    /// The commands of the last frame; `None` while the computer is dead.
+    pub(super) fn commands(&self) -> Option<&Commands> {
+        (!self.flight.computer_is_dead()).then(|| self.flight.computer().commands())
     }
 }
 

@@ -13,10 +13,11 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
+use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::{flight_v1, v1};
-use tick_log::pilot::{state_from_log, vector_from_log};
+use tick_log::estimate::{state_from_log, vector_from_log};
 
-use crate::controller::{LoggedPilot, NewPlans, Replayed as _};
+use crate::controller::{LoggedComputer, NewPlans};
 use crate::log::Recording;
 
 /// Prediction times at which predictions are compared with the flight, s.
@@ -393,7 +394,7 @@ fn error(estimate: &Estimate, time_s: f64, world: &[flight_v1::TruthSample]) -> 
 fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot)> {
     let (start, frames) = recording.replayable_frames().ok()?;
     let toml = recording.profile_toml().ok()?;
-    let mut controller = LoggedPilot::recorded(toml, start, &recording.head.run, &[]).ok()?;
+    let mut controller = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
     let mission = controller.pilot().mission().clone();
     let curve: ThrustCurve = mission.motor_curve.clone();
     let (mut again, mut plans) = (Vec::new(), NewPlans::default());
@@ -429,7 +430,7 @@ impl Again {
     }
 }
 
-fn plant(sample: &flight_v1::TruthSample, frames: &[flight_v1::PilotTick], plane: &Plane) -> Plant {
+fn plant(sample: &flight_v1::TruthSample, frames: &[ComputerFrame], plane: &Plane) -> Plant {
     let behind = frames.partition_point(|tick| tick.input.time_s <= sample.time_s + SAME_MOMENT_S);
     let frame = behind.checked_sub(1).and_then(|place| frames.get(place));
     Plant {

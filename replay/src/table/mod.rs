@@ -47,6 +47,9 @@ const UNITS: [(&str, &str); 13] = [
 /// The components of vectors and quaternions.
 const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
 
+/// Column of the flight computer's frames that is not in the record: time since the release, s.
+pub(crate) const FLIGHT_TIME_S: &str = "flight_time_s";
+
 /// The type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -144,6 +147,11 @@ impl TableShape {
             meaning: Meaning::default(),
         });
         Self { name: name.to_owned(), columns: std::iter::once(time).chain(others).collect() }
+    }
+
+    /// The index of a column.
+    pub(crate) fn place_of(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.name == name)
     }
 
     /// The table of a kind of record, and the paths of its columns' values, without the time. Lists are assumed to be
@@ -359,7 +367,19 @@ impl TableReader {
             Vacant(entry) => {
                 let known = described(channel).and_then(|descriptor| {
                     let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
-                    let (shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
+                    let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
+                    if matches!(stamped.entry, Entry::ComputerFrame(_)) {
+                        shape.columns.push(Column {
+                            name: FLIGHT_TIME_S.to_owned(),
+                            kind: Kind::Float,
+                            meaning: Meaning {
+                                unit: "s".to_owned(),
+                                words: "Time since the release; empty on the pad and after the flight."
+                                    .to_owned(),
+                                values_of: None,
+                            },
+                        });
+                    }
                     // Two channels with one topic share a table.
                     let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
                         shapes.push(shape);
@@ -373,7 +393,11 @@ impl TableReader {
         let Known { table, descriptor, places } = known.as_ref()?;
         let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
         let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
-        Some(Row { table: *table, cells: std::iter::once(time).chain(values).collect() })
+        let flight_time = match &stamped.entry {
+            Entry::ComputerFrame(frame) => Some(frame.flight_time_s().map_or(Cell::Absent, Cell::Float)),
+            _ => None,
+        };
+        Some(Row { table: *table, cells: std::iter::once(time).chain(values).chain(flight_time).collect() })
     }
 
     fn limits_of(&mut self, verdict: &v1::LandingVerdict, time: &Cell) -> Vec<Row> {

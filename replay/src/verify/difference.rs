@@ -4,11 +4,13 @@ use std::fmt;
 
 use prost::Message;
 use prost_reflect::{DynamicMessage, MessageDescriptor, ReflectMessage as _, Value};
+use protocol::log::computer_v1::ComputerFrame;
 use serde::{Serialize, Serializer};
 
-use crate::controller::{Moment, Replayed};
+use crate::controller::phase_name;
+use crate::log::{LoggedFrame, frame_descriptor};
 
-/// A field in which a recorded and a recomputed tick differ.
+/// A field in which a recorded and a recomputed frame differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldDifference {
     /// Path of the field, as in `output.gimbal_rad[1]`.
@@ -156,22 +158,28 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
         }
         _ => {
             let (recorded, recomputed) = (FieldValue::of(a), FieldValue::of(b));
-            if recorded != recomputed {
+            let same = match (recorded, recomputed) {
+                (FieldValue::Opaque, FieldValue::Opaque) => a == b,
+                _ => recorded == recomputed,
+            };
+            if !same {
                 found.push(difference(path.to_owned(), recorded, recomputed));
             }
         }
     }
 }
 
-/// Most differing fields that are kept of the first diverged tick.
+/// Most differing fields that are kept of the first diverged frame.
 const FIELDS_KEPT: usize = 32;
 
-/// A tick that differs.
+/// A frame that differs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Divergence {
-    /// Its number.
-    pub tick: u64,
-    /// Vehicle time, s.
+    /// Its number since power-up.
+    pub frame: u64,
+    /// In flight: its number since the release.
+    pub tick: Option<u64>,
+    /// Time since the release in flight, since power-up on the pad, s.
     pub time_s: f64,
     pub phase: &'static str,
     /// Number of fields that differ.
@@ -183,11 +191,14 @@ pub struct Divergence {
 /// The comparisons so far.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    pub(super) ticks: u64,
-    pub(super) ticks_different: u64,
+    pub(super) compared: u64,
+    /// Of these, in flight.
+    pub(super) in_flight: u64,
+    pub(super) different: u64,
     pub(super) fields_different: u64,
-    pub(super) first: Option<Moment>,
-    pub(super) last: Option<Moment>,
+    /// Number and vehicle time, s, of the first and of the last frame.
+    pub(super) first: Option<(u64, f64)>,
+    pub(super) last: Option<(u64, f64)>,
     pub(super) divergence: Option<Divergence>,
     pub(super) growth: Growth,
     recorded: Vec<u8>,
@@ -195,42 +206,36 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Compares a record with the recomputed one.
-    pub(super) fn compare<C: Replayed>(
-        &mut self,
-        descriptor: Option<&MessageDescriptor>,
-        recorded: &C::Tick,
-        again: &C::Tick,
-    ) {
-        let moment = C::moment(again);
-        encode_into(recorded, &mut self.recorded);
+    /// Compares a recorded frame, and the bytes of its record, with the recomputed one.
+    pub(super) fn compare(&mut self, logged: &LoggedFrame, data: &[u8], again: &ComputerFrame) {
+        let recorded = &logged.record;
         encode_into(again, &mut self.recomputed);
-        self.ticks += 1;
-        self.first.get_or_insert(moment);
-        self.last = Some(moment);
-        if self.recorded != self.recomputed {
-            let fields = differences(descriptor, &self.recorded, &self.recomputed);
-            let axes = C::gimbal_rad(recorded).iter().zip(C::gimbal_rad(again));
-            let gimbal_rad = axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max);
-            self.differs(moment, fields, gimbal_rad);
+        let (frame, boot_s) = (recorded.input.frame, recorded.input.time_s);
+        self.compared += 1;
+        self.in_flight += u64::from(logged.tick.is_some());
+        self.first.get_or_insert((frame, boot_s));
+        self.last = Some((frame, boot_s));
+        if self.recomputed == data {
+            return;
         }
-    }
-
-    fn differs(&mut self, moment: Moment, mut fields: Vec<FieldDifference>, gimbal_rad: f64) {
-        let Moment { tick, time_s, phase } = moment;
+        // Another writer may have put the same fields into other bytes.
+        encode_into(recorded, &mut self.recorded);
+        if self.recorded == self.recomputed {
+            return;
+        }
+        let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
+        let axes = recorded.output.gimbal_rad.iter().zip(&again.output.gimbal_rad);
+        let gimbal_rad = axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max);
         let fields_different = fields.len();
-        self.ticks_different += 1;
+        let time_s = logged.flight_time_s().unwrap_or(boot_s);
+        self.different += 1;
         self.fields_different += fields_different as u64;
-        self.growth.note(GrowthStep {
-            tick,
-            time_s,
-            fields_different,
-            gimbal_rad,
-            worst_ulps: fields.iter().filter_map(|field| field.ulps).max(),
-        });
+        let worst_ulps = fields.iter().filter_map(|field| field.ulps).max();
+        self.growth.note(GrowthStep { frame, time_s, fields_different, gimbal_rad, worst_ulps });
         if self.divergence.is_none() {
             fields.truncate(FIELDS_KEPT);
-            self.divergence = Some(Divergence { tick, time_s, phase, fields_different, fields });
+            let (tick, phase) = (logged.tick, phase_name(&again.output));
+            self.divergence = Some(Divergence { frame, tick, time_s, phase, fields_different, fields });
         }
     }
 }
@@ -241,15 +246,15 @@ fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
     record.encode_raw(bytes);
 }
 
-/// Most differing ticks that are kept.
+/// Most differing frames that are kept.
 const STEPS_KEPT: usize = 200;
 
-/// One differing tick.
+/// One differing frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GrowthStep {
-    /// Its number.
-    pub tick: u64,
-    /// Vehicle time, s.
+    /// Its number since power-up.
+    pub frame: u64,
+    /// Time since the release in flight, since power-up on the pad, s.
     pub time_s: f64,
     /// Number of fields that differ.
     pub fields_different: usize,
@@ -262,16 +267,16 @@ pub struct GrowthStep {
 /// How a divergence grows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Growth {
-    /// The first differing ticks.
+    /// The first differing frames.
     pub steps: Vec<GrowthStep>,
-    /// The tick with the largest difference of the gimbal commands.
+    /// The frame with the largest difference of the gimbal commands.
     pub peak: Option<GrowthStep>,
-    /// The last differing tick.
+    /// The last differing frame.
     pub last: Option<GrowthStep>,
 }
 
 impl Growth {
-    /// Notes a differing tick.
+    /// Notes a differing frame.
     pub(super) fn note(&mut self, step: GrowthStep) {
         if self.steps.len() < STEPS_KEPT {
             self.steps.push(step);
@@ -289,9 +294,6 @@ impl Growth {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use protocol::log::flight_v1::PilotTick;
-
-    use crate::log::pilot_descriptor;
 
     #[test]
     fn neighbours_are_one_apart_across_zero_and_up_to_infinity() {
@@ -316,11 +318,11 @@ mod tests {
         fn nans_with_different_payloads_differ(a: u64, b: u64) {
             const NAN: u64 = 0x7ff8_0000_0000_0000;
             let tick = |bits: u64| {
-                let mut tick = PilotTick::default();
+                let mut tick = ComputerFrame::default();
                 tick.input.time_s = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
                 tick.encode_to_vec()
             };
-            let found = differences(pilot_descriptor().as_ref(), &tick(a), &tick(b));
+            let found = differences(frame_descriptor().as_ref(), &tick(a), &tick(b));
             if tick(a) == tick(b) {
                 prop_assert!(found.is_empty());
             } else {
@@ -333,11 +335,11 @@ mod tests {
 
     #[test]
     fn lists_of_different_lengths_differ_in_length() {
-        let mut longer = PilotTick::default();
+        let mut longer = ComputerFrame::default();
         longer.output.fins_rad = vec![1.0, 2.0];
         let mut shorter = longer.clone();
         shorter.output.fins_rad.pop();
-        let descriptor = pilot_descriptor();
+        let descriptor = frame_descriptor();
         let found = differences(descriptor.as_ref(), &longer.encode_to_vec(), &shorter.encode_to_vec());
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].path, "output.fins_rad.len");

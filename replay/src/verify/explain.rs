@@ -14,12 +14,12 @@ use flight::vehicle::dynamics::PlanarState;
 use nalgebra::Vector3;
 use nmpc::{Problem, Solution};
 use prost::Message as _;
-use protocol::log::flight_v1;
+use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
-use tick_log::pilot::{PilotLogError, input_from_log, tick_to_log};
+use tick_log::frame::level_of;
 
 use crate::cli::{Answer, answer, warn_of_what_is_missing};
-use crate::controller::{FrameError, LoggedPilot, Replayed as _};
+use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
 use crate::print::{print_json, shown};
 use crate::settings::SettingError;
@@ -39,9 +39,6 @@ pub enum TickError {
     /// The log names settings that this build does not have.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// This build cannot interpret a recorded frame.
-    #[error(transparent)]
-    FrameInput(#[from] PilotLogError),
     /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -106,7 +103,7 @@ pub struct TickReport {
     pub recorded_gimbal_rad: Vec<f64>,
     /// The gimbal commands of this build, rad.
     pub gimbal_rad: Vec<f64>,
-    /// Whether the whole output and the memory are equal to the recorded ones, bit for bit.
+    /// Whether the whole output is equal to the recorded one, bit for bit.
     pub identical: bool,
     /// The solve as in flight; `None` if this tick solved nothing.
     pub warm: Option<Solved>,
@@ -149,9 +146,10 @@ pub struct PathPoint {
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
     let (start, frames) = recording.replayable_frames()?;
-    let mut controller = LoggedPilot::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
+    let mut controller =
+        LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
     let place = frames.iter().position(|tick| tick.input.frame == number).ok_or_else(|| {
-        let bound = |tick: Option<&flight_v1::PilotTick>| tick.map_or(0, |tick| tick.input.frame);
+        let bound = |tick: Option<&ComputerFrame>| tick.map_or(0, |tick| tick.input.frame);
         TickError::NoTick {
             name: recording.name.clone(),
             tick: number,
@@ -163,11 +161,10 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
         controller.run_again(before)?;
     }
     let recorded = &frames[place];
-    let input = input_from_log(&recorded.input)?;
+    let time_s = recorded.input.time_s;
     let held = place.checked_sub(1).and_then(|before| frames.get(before));
-    let (output, solved) = controller.step_inspected(&input)?;
+    let (again, solved) = controller.run_inspected(recorded)?;
     let pilot = controller.pilot();
-    let again = tick_to_log(&input, &output, controller.digest());
     let warm = solved.as_ref().map(|solved| &solved.warm.solution);
     let state = match &solved {
         Some(solved) => solved.problem.initial,
@@ -176,18 +173,18 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
     Ok(TickReport {
         file: recording.name.clone(),
         tick: number,
-        time_s: input.time_s,
-        phase: output.phase.name(),
+        time_s,
+        phase: phase_name(&again.output),
         input: InputFacts {
             state: state.to_array(),
-            time_since_ignition_s: pilot.burning_s(input.time_s).unwrap_or(0.0),
+            time_since_ignition_s: pilot.burning_s(time_s).unwrap_or(0.0),
             gimbal_applied_rad: held.map_or_else(Vec::new, |held| held.output.gimbal_rad.clone()),
             thrust_scale: pilot.motor().impulse_scale(),
         },
-        level: output.level.name(),
+        level: level_of(&again.output).map_or("unknown", ControlLevel::name),
         recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
-        gimbal_rad: output.gimbal_rad.to_vec(),
-        identical: again.encode_to_vec() == recorded.encode_to_vec(),
+        gimbal_rad: again.output.gimbal_rad.clone(),
+        identical: again.output.encode_to_vec() == recorded.output.encode_to_vec(),
         warm: warm.map(solved_facts),
         cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
         nearest_solved: nearest(
@@ -257,7 +254,7 @@ fn active_constraints(problem: &Problem, solution: &Solution) -> Vec<ActiveConst
 }
 
 /// Whether a landing is planned in a frame.
-fn plans(tick: &flight_v1::PilotTick) -> bool {
+fn plans(tick: &ComputerFrame) -> bool {
     let idle = u32::from(ControlLevel::Idle.index());
     tick.input.frame.is_multiple_of(FRAMES_PER_PLAN) && tick.output.level != idle
 }

@@ -1,13 +1,13 @@
 //! Checks whether the controller makes the recorded decisions again, bit for bit.
 //!
-//! [`verify`] builds the controller from the profile in the log and runs it on every recorded input in tick order. It
-//! compares every field of the output, and the digest of the memory, with the record. Measured times are not compared.
+//! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded input. It compares every
+//! field of the output, and the digest of the memory, with the record. Measured times are not compared.
 //!
-//! A log of this release has every frame of the whole flight computer from power-up on. The whole
-//! computer is then run again, so self-test, arming, countdown, gate and abort are compared as well. Older logs, and
-//! logs of flights that begin at their release, have only ticks from the release on, and the report says so.
+//! A vehicle's log has every frame from power-up on, so self-test, arming, countdown, gate and abort are compared as well. A
+//! frame in flight is a *tick* and counts from the release; a log of a flight that begins there has only ticks, and the
+//! report says so.
 //!
-//! The controller remembers its plan, so a tick can be re-executed only if every tick before it can be. The comparison
+//! The computer remembers its plan, so a frame can be re-executed only if every frame before it can be. The comparison
 //! ends at a gap, and the report says so.
 //!
 //! A log joined by other tools may hold several flights; each has its own report. A flight without comparisons is never
@@ -34,29 +34,32 @@ use difference::Tally;
 pub use difference::{
     Divergence, FieldDifference, FieldValue, Growth, GrowthStep, differences, ulp_distance,
 };
-use prost_reflect::MessageDescriptor;
 use protocol::log::reader::Damage;
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
 use crate::cli::{Answer, answer, say, warn_of_cut, warn_of_damage};
-use crate::controller::{FrameError, Replayed};
+use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
 use crate::output::NewFile;
 use crate::print::{self, JunitCase, JunitOutcome, counted, print_json, print_junit, shown};
+
+/// The topics that a verification reads.
+const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_VERDICT];
 
 /// Verifies a log file: one report on each of its flights, or one report if it has none.
 ///
 /// # Errors
 /// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
 pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
-    let mut log = FlightLog::open(path)?;
+    let mut log = FlightLog::open(path)?.decoding(&VERIFIED);
     let mut reports = verify_log(&mut log, || {
         // Another tool may have moved the attachments to the end of the file, after the messages.
         let mut whole = FlightLog::open(path)?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
     })?;
-    let read = reports.iter().map(|report| report.ticks_recorded).sum();
+    let read = reports.iter().map(|report| report.frames_recorded).sum();
     // A recovered log is read to its end; what is lost is not in it.
     let unread = !matches!(log.damage(), Some(Damage::Recovered(_)));
     for report in reports.iter_mut().filter(|report| unread && report.damage.is_some()) {
@@ -147,7 +150,7 @@ pub enum Obstacle {
     },
     /// The log does not begin with the first tick.
     #[error(
-        "it begins with tick {first}, and the ticks before it are missing: what the controller remembered then is unknown"
+        "it begins with frame {first}, and the frames before it are missing: what the flight computer remembered then is unknown"
     )]
     BeginningMissing {
         /// The first tick in the log.
@@ -155,7 +158,7 @@ pub enum Obstacle {
     },
     /// Ticks are missing.
     #[error(
-        "after tick {after} comes tick {before}: what the controller remembered there is unknown, and nothing behind the gap was compared"
+        "after frame {after} comes frame {before}: what the flight computer remembered there is unknown, and nothing behind the gap was compared"
     )]
     Gap {
         /// The last tick before the gap.
@@ -163,38 +166,14 @@ pub enum Obstacle {
         /// The first tick after the gap.
         before: u64,
     },
-    /// A tick is recorded twice.
-    #[error(
-        "tick {tick} is recorded twice, as if two controllers had written: nothing behind it was compared"
-    )]
-    Repeated {
-        /// Its number.
-        tick: u64,
-    },
-    /// Frames of the flight computer are missing.
-    #[error(
-        "after frame {after} of the flight computer comes frame {before}: what it remembered there is unknown, and nothing after the gap was compared"
-    )]
-    FramesLost {
-        /// The last frame before the gap.
-        after: u64,
-        /// The first after it.
-        before: u64,
-    },
-    /// A tick was computed and is not in the log.
-    #[error("the flight computer made tick {tick}, and the log has lost its record")]
-    TickLost { tick: u64 },
-    /// A recorded tick belongs to no frame of the flight computer.
-    #[error("tick {tick} belongs to no frame of the flight computer that was run again")]
-    TickWithoutFrame { tick: u64 },
     /// A record cannot be read.
     #[error("a record cannot be read: {reason}")]
     Unreadable { reason: String },
     /// A flight computer was released, and none of its frames follow.
-    #[error("it has a record /pilot/start and no frame of the flight computer behind it")]
+    #[error("it has a record /computer/start and no frame of the flight computer behind it")]
     NoFrames,
-    /// There are frames of a flight computer, and no record of its release.
-    #[error("it has frames of the flight computer and no record /pilot/start before them to begin from")]
+    /// There are frames of a flight computer, and no record of what it was built from.
+    #[error("it has frames of the flight computer and no record /computer/start before them to begin from")]
     NoStart,
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
@@ -206,21 +185,6 @@ impl Serialize for Obstacle {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
-}
-
-/// Result of comparing the flight computer's frames.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FramesReport {
-    /// Frames that could be read.
-    pub recorded: u64,
-    /// Frames that were run again and compared.
-    pub compared: u64,
-    /// Frames that differ.
-    pub different: u64,
-    /// The first frame that differs.
-    pub first_divergence: Option<Divergence>,
-    /// Vehicle time of the last frame that was compared, s.
-    pub until_s: Option<f64>,
 }
 
 /// The place of a flight in a log that holds several.
@@ -250,25 +214,26 @@ pub struct VerifyReport {
     pub flight: Option<FlightPlace>,
     /// The result of a verification.
     pub outcome: Verification,
-    /// The frames of the flight computer from power-up on; `None` if the log has none, so that only its ticks were
-    /// compared.
-    pub frames: Option<FramesReport>,
+    /// Whether the frames begin at power-up, and not at the release.
+    pub from_power_up: bool,
     /// Whether digests of the computer's memory were compared as well. Digests of another schema are not compared.
     pub digests_compared: bool,
-    /// Ticks that could be read.
-    pub ticks_recorded: u64,
-    /// Ticks that were re-executed and compared.
-    pub ticks_compared: u64,
-    /// Ticks identical in every bit.
-    pub ticks_identical: u64,
-    pub ticks_different: u64,
-    /// Fields that differ, over all ticks.
+    /// Frames that could be read.
+    pub frames_recorded: u64,
+    /// Frames that were re-executed and compared.
+    pub frames_compared: u64,
+    /// Frames identical in every bit.
+    pub frames_identical: u64,
+    pub frames_different: u64,
+    /// Frames in flight that were compared.
+    pub frames_in_flight: u64,
+    /// Fields that differ, over all frames.
     pub fields_different: u64,
-    /// The first and the last tick compared.
+    /// The numbers of the first and the last frame compared.
     pub span: Option<(u64, u64)>,
-    /// Vehicle time from the first tick compared to the last, s.
+    /// Vehicle time from the first frame compared to the last, s.
     pub flight_s: Option<f64>,
-    /// The first tick that differs.
+    /// The first frame that differs.
     pub first_divergence: Option<Divergence>,
     /// How the divergence grows.
     pub growth: Option<Growth>,
@@ -289,14 +254,13 @@ pub struct VerifyReport {
 impl VerifyReport {
     fn new(
         facts: FileFacts,
-        (ticks_recorded, counts): (u64, Tally),
-        frames: Option<FramesReport>,
+        (frames_recorded, counts): (u64, Tally),
+        (from_power_up, digests_compared): (bool, bool),
         obstacle: Option<Obstacle>,
     ) -> Self {
         let (first_divergence, growth) = (counts.divergence, counts.growth);
         let FileFacts { file, flight, cut, damage, build } = facts;
-        let frame_differs = frames.as_ref().is_some_and(|frames| frames.different > 0);
-        let outcome = if first_divergence.is_some() || frame_differs {
+        let outcome = if first_divergence.is_some() {
             Verification::Diverged
         } else if obstacle.is_some() {
             Verification::NotReplayable
@@ -305,19 +269,21 @@ impl VerifyReport {
         } else {
             Verification::Identical
         };
+        let (first, last) = (counts.first, counts.last);
         Self {
             file,
             flight,
             outcome,
-            frames,
-            digests_compared: true,
-            ticks_recorded,
-            ticks_compared: counts.ticks,
-            ticks_identical: counts.ticks - counts.ticks_different,
-            ticks_different: counts.ticks_different,
+            from_power_up,
+            digests_compared,
+            frames_recorded,
+            frames_compared: counts.compared,
+            frames_identical: counts.compared - counts.different,
+            frames_different: counts.different,
+            frames_in_flight: counts.in_flight,
             fields_different: counts.fields_different,
-            span: counts.first.zip(counts.last).map(|(first, last)| (first.tick, last.tick)),
-            flight_s: counts.first.zip(counts.last).map(|(first, last)| last.time_s - first.time_s),
+            span: first.zip(last).map(|((first, _), (last, _))| (first, last)),
+            flight_s: first.zip(last).map(|((_, first_s), (_, last_s))| last_s - first_s),
             growth: first_divergence.is_some().then_some(growth),
             first_divergence,
             consequence: None,
@@ -330,36 +296,7 @@ impl VerifyReport {
     }
 }
 
-/// Re-executes ticks and compares them; ticks must come in order, from the first tick on.
-#[derive(Debug)]
-pub struct Verifier<C> {
-    controller: C,
-    descriptor: Option<MessageDescriptor>,
-    tally: Tally,
-}
-
-impl<C: Replayed> Verifier<C> {
-    /// A controller before its first tick.
-    pub fn new(controller: C) -> Self {
-        Self { controller, descriptor: C::descriptor(), tally: Tally::default() }
-    }
-
-    pub(super) fn controller(&self) -> &C {
-        &self.controller
-    }
-
-    /// Re-executes the next tick and compares it with its record.
-    ///
-    /// # Errors
-    /// The recorded input cannot be given to this build's controller.
-    pub fn check(&mut self, tick: &C::Tick) -> Result<(), C::Error> {
-        let again = self.controller.run_again(tick)?;
-        self.tally.compare::<C>(self.descriptor.as_ref(), tick, &again);
-        Ok(())
-    }
-}
-
-/// Most fields of the first diverged tick that are shown.
+/// Most fields of the first diverged frame that are shown.
 const FIELDS_SHOWN: usize = 5;
 
 /// Writes a verification as text.
@@ -368,47 +305,41 @@ const FIELDS_SHOWN: usize = 5;
 /// The output failed.
 pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
     let name = name_of(report);
-    let VerifyReport { ticks_identical, ticks_compared, ticks_recorded, .. } = report;
+    let VerifyReport { frames_identical, frames_compared, frames_recorded, .. } = report;
     match report.outcome {
         Verification::Identical => {
-            writeln!(output, "{name}: {ticks_identical} of {ticks_compared} ticks identical")?;
+            writeln!(output, "{name}: {frames_identical} of {frames_compared} frames identical")?;
         }
         Verification::IdenticalReadablePart => {
             let of = if report.damage.is_some() { " of the readable part" } else { "" };
             let what_is_missing = what_is_missing(report);
             writeln!(
                 output,
-                "{name}: {ticks_identical} of {ticks_compared} ticks identical{of}{what_is_missing}"
-            )?;
-        }
-        Verification::Diverged if report.ticks_different == 0 => {
-            writeln!(
-                output,
-                "{name}: DIVERGED, though {ticks_identical} of {ticks_compared} ticks are identical"
+                "{name}: {frames_identical} of {frames_compared} frames identical{of}{what_is_missing}"
             )?;
         }
         Verification::Diverged => {
-            let VerifyReport { ticks_different, fields_different, .. } = report;
+            let VerifyReport { frames_different, fields_different, .. } = report;
             let fields = counted(*fields_different, "field");
             writeln!(
                 output,
-                "{name}: DIVERGED: {ticks_different} of {ticks_compared} ticks differ, in {fields}"
+                "{name}: DIVERGED: {frames_different} of {frames_compared} frames differ, in {fields}"
             )?;
         }
-        Verification::NotReplayable if *ticks_compared == 0 => {
+        Verification::NotReplayable if *frames_compared == 0 => {
             let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
             writeln!(output, "{name}: nothing was compared: {}", reason.unwrap_or_default())?;
         }
         Verification::NotReplayable => writeln!(
             output,
-            "{name}: not replayable as a whole: the first {ticks_identical} of {ticks_recorded} ticks are identical"
+            "{name}: not replayable as a whole: the first {frames_identical} of {frames_recorded} frames are identical"
         )?,
     }
     if let Some(first) = &report.first_divergence {
-        print_divergence("tick", first, output)?;
+        print_divergence(first, output)?;
     }
-    print_frames(report, output)?;
-    if !report.digests_compared && report.ticks_compared > 0 {
+    print_beginning(report, output)?;
+    if !report.digests_compared && report.frames_compared > 0 {
         writeln!(
             output,
             "another release wrote it: what it remembered was not compared, what it decided was"
@@ -420,8 +351,8 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     if let Some(consequence) = &report.consequence {
         print_consequence(consequence, output)?;
     }
-    if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *ticks_compared > 0) {
-        writeln!(output, "not every tick was compared: {}", shown(&obstacle.to_string()))?;
+    if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *frames_compared > 0) {
+        writeln!(output, "not every frame was compared: {}", shown(&obstacle.to_string()))?;
     }
     if report.outcome != Verification::IdenticalReadablePart {
         let what_is_missing = what_is_missing(report);
@@ -432,22 +363,18 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
     Ok(())
 }
 
-/// Prints the comparison of the flight computer's frames from power-up on, or that only its ticks were compared.
-fn print_frames(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
-    let Some(frames) = &report.frames else {
-        let nothing = report.ticks_compared == 0;
-        return if nothing { Ok(()) } else { writeln!(output, "{TICKS_ALONE}") };
-    };
-    let FramesReport { compared, different, until_s, .. } = frames;
-    let until = until_s.map(|until_s| format!(" to {until_s:.3} s after it")).unwrap_or_default();
-    if *different == 0 {
-        writeln!(output, "flight computer from power-up{until}: {compared} of {compared} frames identical")?;
-    } else {
-        writeln!(output, "flight computer from power-up{until}: {different} of {compared} frames DIFFER")?;
-    }
-    match &frames.first_divergence {
-        Some(first) => print_divergence("frame", first, output),
-        None => Ok(()),
+/// Prints from where on the flight computer was run again.
+fn print_beginning(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
+    let VerifyReport { from_power_up, frames_compared, frames_in_flight, flight_s, .. } = report;
+    match (frames_compared, flight_s) {
+        (0, _) | (_, None) => Ok(()),
+        (_, Some(flight_s)) if *from_power_up => {
+            writeln!(
+                output,
+                "from power-up to {flight_s:.3} s after it, {frames_in_flight} of them in flight"
+            )
+        }
+        _ => writeln!(output, "{TICKS_ALONE}"),
     }
 }
 
@@ -466,9 +393,9 @@ fn name_of(report: &VerifyReport) -> String {
 fn what_is_missing(report: &VerifyReport) -> String {
     let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
     let unread = report.damage.as_ref().map(|damage| {
-        let ticks = match report.unread.and_then(|unread| unread.ticks) {
-            Some((unread, all)) => format!("{unread} of {all} ticks were not read"),
-            None => "how many ticks were not read is not known".to_owned(),
+        let ticks = match report.unread.and_then(|unread| unread.frames) {
+            Some((unread, all)) => format!("{unread} of {all} frames were not read"),
+            None => "how many frames were not read is not known".to_owned(),
         };
         let seconds = report.unread.and_then(|unread| unread.seconds);
         let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
@@ -477,15 +404,14 @@ fn what_is_missing(report: &VerifyReport) -> String {
     [cut, unread].into_iter().flatten().collect()
 }
 
-fn print_divergence(kind: &str, first: &Divergence, output: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        output,
-        "first at {kind} {} (t = {:.3} s, {}), {}:",
-        first.tick,
-        first.time_s,
-        first.phase,
-        counted(first.fields_different as u64, "field")
-    )?;
+fn print_divergence(first: &Divergence, output: &mut impl Write) -> io::Result<()> {
+    let Divergence { frame, tick, time_s, phase, fields_different, .. } = first;
+    let place = match tick {
+        Some(tick) if tick != frame => format!("frame {frame}, tick {tick} (T+{time_s:.3} s, {phase})"),
+        Some(_) => format!("frame {frame} (T+{time_s:.3} s, {phase})"),
+        None => format!("frame {frame} ({time_s:.3} s after power-up, {phase})"),
+    };
+    writeln!(output, "first at {place}, {}:", counted(*fields_different as u64, "field"))?;
     for field in first.fields.iter().take(FIELDS_SHOWN) {
         print_field(field, output)?;
     }
@@ -507,20 +433,20 @@ fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<(
     Ok(())
 }
 
-/// Prints the first diverged tick, the ticks 1, 2, 4, 8 and so on after it, the worst tick and the last tick.
+/// Prints the first diverged frame, those 1, 2, 4, 8 and so on after it, the worst and the last.
 fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "how it grows (gimbal command, worst field):")?;
     let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
     let mut shown: Vec<&GrowthStep> = doubling.filter_map(|place| growth.steps.get(place)).collect();
     shown.extend(growth.peak.iter().chain(&growth.last));
-    shown.sort_by_key(|step| step.tick);
-    shown.dedup_by_key(|step| step.tick);
+    shown.sort_by_key(|step| step.frame);
+    shown.dedup_by_key(|step| step.frame);
     for step in shown {
         let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
         writeln!(
             output,
-            "  tick {:>5} {:>9.3} s  {:>10.3e} rad  {ulps} ULP in {}",
-            step.tick,
+            "  frame {:>5} {:>9.3} s  {:>10.3e} rad  {ulps} ULP in {}",
+            step.frame,
             step.time_s,
             step.gimbal_rad,
             counted(step.fields_different as u64, "field")

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use flight::rules::phase::Phase;
 use proptest::prelude::*;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::{ComputerFrame, Request};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
@@ -96,7 +96,7 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
         assert_eq!(flown.verdict, recording.verdict, "{start:?}");
         assert_eq!(report.verdict_changed, Some(false));
         let again = flown.records.iter().filter_map(|(_, record)| match record {
-            Record::PilotTick(tick) => Some(tick.as_ref()),
+            Record::ComputerFrame(tick) => Some(tick.as_ref()),
             _ => None,
         });
         assert!(again.eq(&recording.frames), "{start:?}");
@@ -149,7 +149,7 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
     assert!(refused(&with(&["truth.wind_m_s=3"])).contains("belongs to the plant alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
-    let landing = |tick: &PilotTick| tick.output.phase != u32::from(Phase::AeroDescent.index());
+    let landing = |tick: &ComputerFrame| tick.output.phase != u32::from(Phase::AeroDescent.index());
     let fallen = recording.frames.iter().position(landing).unwrap();
     let mut falling = recording.clone();
     falling.frames.truncate(fallen);
@@ -164,7 +164,7 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
 #[test]
 fn a_difference_before_the_start_is_reported() {
     let mut recording = recording();
-    recording.frames[99].state_digest ^= 1;
+    recording.frames[99].output.fins_rad[0] += 1e-9;
     let report = refly(&recording, &ReflyOptions::default()).unwrap();
     let reached = report.reached;
     assert_eq!((reached.first_different, reached.frames - reached.identical), (Some(100), 1));
@@ -291,7 +291,7 @@ fn every_command_answers_for_a_flight_from_apogee() {
     assert!(code == 0 && stdout.contains("flown by oscillating"), "{stdout}");
     // A plan in the middle of the burn.
     let recording = recording();
-    let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+    let in_burn = |tick: &&ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
     let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|tick| tick.input.frame).collect();
     let planning = burning[burning.len() / 2].next_multiple_of(10);
     let (code, stdout, _) = run(replay("verify", log).args(["--explain", &planning.to_string()]));
@@ -315,7 +315,7 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
         ..LogHeader::default()
     };
     let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
-    writer.write(&Record::PilotStart(Box::new(recording.pilot_start.unwrap())), 0).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(recording.start.unwrap())), 0).unwrap();
     let forged = recording.frames.len() / 2;
     for (place, tick) in recording.frames.iter().enumerate() {
         let mut tick = tick.clone();
@@ -323,13 +323,13 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
             tick.output.gimbal_rad[1] += 0.1;
         }
         let time_ns = tick.input.frame * 5_000_000;
-        writer.write(&Record::PilotTick(Box::new(tick)), time_ns).unwrap();
+        writer.write(&Record::ComputerFrame(Box::new(tick)), time_ns).unwrap();
     }
     writer.write(&Record::LandingVerdict(Box::new(recording.verdict.unwrap())), 15_000_000_000).unwrap();
     writer.finish().unwrap();
     let (code, stdout, _) = run(&mut replay("verify", &path));
     assert_eq!(code, 1);
-    let first = format!("first at tick {}", recording.frames[forged].input.frame);
+    let first = format!("first at frame {}", recording.frames[forged].input.frame);
     assert!(stdout.contains(&first) && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
     assert!(
         stdout.contains("verdict: would not change: recorded LANDED, flown on by this build"),
@@ -338,7 +338,7 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
 }
 
 /// Changes some number of a frame to arbitrary bits.
-fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
+fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let (input, output) = (&mut tick.input, &mut tick.output);
     match field {
@@ -351,7 +351,7 @@ fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
         6 => output.level = bits as u32,
         7 => input.known = None,
         8 => input.contact = true,
-        9 => input.abort = true,
+        9 => input.requests.push(Request { asked: (bits % 12) as u32, ..Request::default() }),
         _ => {
             if let Some(measured) = &mut input.measured {
                 match field {
@@ -373,7 +373,7 @@ proptest! {
     fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
         let mut recording = recording();
         // Around the ignition, where plans begin.
-        let lit = |tick: &PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+        let lit = |tick: &ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
         let landing = recording.frames.iter().position(lit).unwrap() - 20;
         recording.frames.truncate(landing + 60);
         for (place, field, bits) in spoilt {

@@ -22,7 +22,9 @@ fn ticks_truth_and_transforms_have_one_time_base() {
         while let Some(stamped) = entries.next_entry().unwrap() {
             let at_ns = stamped.log_time_ns;
             match &stamped.entry {
-                Entry::PilotTick(tick) => drop(ticks.insert(at_ns, tick.input.time_s)),
+                Entry::ComputerFrame(frame) => {
+                    ticks.extend(frame.flight_time_s().map(|time_s| (at_ns, time_s)));
+                }
                 Entry::World(sample) => drop(truth.insert(at_ns, (sample.time_s, sample.state.position_m.z))),
                 _ if entries.channel(stamped.channel_id).is_some_and(|channel| channel.topic == "/tf") => {
                     let transform = FrameTransform::decode(stamped.data.as_slice()).unwrap();

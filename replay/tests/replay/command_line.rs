@@ -40,7 +40,7 @@ fn an_identical_log_exits_0_with_the_count() {
     let files = Files::new();
     let (code, stdout, _) = run(&mut replay("verify", &files.file(&WHOLE.bytes)));
     let count = FLIGHT.ticks.len();
-    assert!(stdout.contains(&format!("{count} of {count} ticks identical\n")), "{stdout}");
+    assert!(stdout.contains(&format!("{count} of {count} frames identical\n")), "{stdout}");
     assert_eq!(code, 0);
 }
 
@@ -53,7 +53,7 @@ fn the_log_is_identical_with_other_functions_of_the_c_library() {
     command.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4");
     let (code, stdout, _) = run(&mut command);
     assert_eq!(code, 0, "{stdout}");
-    assert!(stdout.contains("ticks identical"), "{stdout}");
+    assert!(stdout.contains("frames identical"), "{stdout}");
 }
 
 #[test]
@@ -68,8 +68,8 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
     let (code, stdout, _) = run(&mut replay("verify", &file));
     assert_eq!(code, 1, "{stdout}");
     for part in [
-        "1 of 8 ticks differ, in 1 field",
-        "first at tick 7 (t = 0.035 s, AERO_DESCENT), 1 field:",
+        "1 of 8 frames differ, in 1 field",
+        "first at frame 7 (T+0.035 s, AERO_DESCENT), 1 field:",
         "output.fins_rad[2]",
         &format!("{recorded_rad:?}"),
         &format!("{recomputed_rad:?}"),
@@ -87,7 +87,10 @@ fn a_cut_log_exits_0_with_a_warning() {
     let file = files.file(&WHOLE.bytes[..usize::try_from(at).unwrap() + 5]);
     let (code, stdout, stderr) = run(&mut replay("verify", &file));
     assert_eq!(code, 0);
-    assert!(stdout.contains(&format!("{ticks} of {ticks} ticks identical of the readable part")), "{stdout}");
+    assert!(
+        stdout.contains(&format!("{ticks} of {ticks} frames identical of the readable part")),
+        "{stdout}"
+    );
     assert!(stderr.contains("warning"), "{stderr}");
 
     let (code, stdout, stderr) = run(&mut replay("info", &file));

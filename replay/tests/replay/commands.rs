@@ -1,7 +1,7 @@
 //! Tests the other subcommands: exit codes, formats, and the messages if there is no answer.
 
 use flight::rules::phase::Phase;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::ComputerFrame;
 
 use crate::command_line::{Files, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
@@ -24,8 +24,8 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--json"));
     let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, reports.as_array().unwrap().len()), (1, 2));
-    assert_eq!(reports[1]["growth"]["steps"][0]["tick"], 7);
-    assert_eq!(reports[1]["growth"]["peak"]["tick"], 7);
+    assert_eq!(reports[1]["growth"]["steps"][0]["frame"], 7);
+    assert_eq!(reports[1]["growth"]["peak"]["frame"], 7);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn an_unreadable_log_does_not_hide_the_others() {
     assert!(stdout.contains("none.mcap: cannot be read"), "{stdout}");
     let (code, stdout, stderr) = run(replay("verify", &none).arg(&good));
     assert!(
-        code == 2 && stdout.contains("ticks identical") && stderr.contains("none.mcap"),
+        code == 2 && stdout.contains("frames identical") && stderr.contains("none.mcap"),
         "{stdout}{stderr}"
     );
 }
@@ -127,7 +127,7 @@ fn an_unreadable_log_does_not_hide_the_others() {
 #[test]
 fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     let frames = MK2.recording().frames;
-    let in_burn = |tick: &&PilotTick| tick.output.phase == u32::from(Phase::Powered.index());
+    let in_burn = |tick: &&ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
     let planning = frames.iter().filter(in_burn).nth(40).unwrap().input.frame.next_multiple_of(10);
     let planning = planning.to_string();
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
@@ -178,7 +178,7 @@ fn the_command_exports_and_imports_logs() {
         let (code, stdout, _) =
             run(replay("export", &WITH_FRAMES.log).args(["--to", format, "--output"]).arg(at(format)));
         assert!(code == 0 && stdout.contains("vehicle_truth3d"), "{stdout}");
-        assert!(at(format).join(format!("pilot_tick.{format}")).exists());
+        assert!(at(format).join(format!("computer_frame.{format}")).exists());
     }
     let tlog = at("flight.tlog");
     let (code, stdout, _) =
@@ -208,7 +208,7 @@ fn a_recovery_is_reported_and_never_overwrites() {
     let (code, stdout, _) = run(&mut replay("verify", &output));
     assert!(
         code == 0
-            && stdout.contains(&format!("{ticks} of {ticks} ticks identical of the readable part"))
+            && stdout.contains(&format!("{ticks} of {ticks} frames identical of the readable part"))
             && stdout.contains("it was recovered from a damaged log"),
         "{stdout}"
     );

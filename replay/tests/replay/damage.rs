@@ -1,7 +1,7 @@
 //! Tests cut and broken logs: no panic, everything before the damage is used, and no damage goes unnoticed.
 
 use proptest::prelude::*;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::ComputerFrame;
 use replay::info::{GradeLevel, info_of};
 use replay::log::{Entry, FlightLog, LogError};
 use replay::verify::Verification;
@@ -9,12 +9,12 @@ use replay::verify::Verification;
 use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
 
 /// Every tick that can be read, and whether the log is damaged.
-fn read_ticks(bytes: &[u8]) -> Result<(Vec<PilotTick>, bool), LogError> {
+fn read_ticks(bytes: &[u8]) -> Result<(Vec<ComputerFrame>, bool), LogError> {
     let mut log = FlightLog::read("test.mcap".to_owned(), bytes)?;
     let mut ticks = Vec::new();
     while let Some(stamped) = log.next_entry()? {
-        if let Entry::PilotTick(tick) = stamped.entry {
-            ticks.push(*tick);
+        if let Entry::ComputerFrame(frame) = stamped.entry {
+            ticks.push(frame.record);
         }
     }
     Ok((ticks, log.damage().is_some()))
@@ -53,7 +53,7 @@ fn the_readable_part_of_a_cut_log_is_verified() {
         let (at, ticks) = WHOLE.synced[place];
         let report = verify_bytes(&WHOLE.bytes[..usize::try_from(at).unwrap() + 11]).unwrap();
         assert_eq!(report.outcome, Verification::IdenticalReadablePart);
-        assert_eq!(report.ticks_identical, ticks as u64);
+        assert_eq!(report.frames_identical, ticks as u64);
         assert!(report.damage.unwrap().contains("without an end mark"));
     }
 }
@@ -93,7 +93,7 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
 #[test]
 fn every_bit_pattern_survives_the_log() {
     let patterns = [0x7ff8_0000_0000_0001, 0xfff0_dead_beef_cafe, 0x8000_0000_0000_0000, 1, u64::MAX];
-    let ticks: Vec<PilotTick> = (1..)
+    let ticks: Vec<ComputerFrame> = (1..)
         .zip(patterns)
         .map(|(number, bits)| {
             let mut tick = idle_tick(number);

@@ -49,7 +49,7 @@ fn a_log_with_a_flipped_byte_does_not_pass() {
         assert_eq!(code, 0, "{stdout}");
         let read: usize = stdout.split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!(0 < read && read < all / 2, "{stdout}");
-        let unread = format!("{} of {all} ticks were not read", all - read);
+        let unread = format!("{} of {all} frames were not read", all - read);
         assert!(stdout.contains(&unread), "{stdout}");
         let (code, _, _) = run(replay("verify", &path).arg("--strict"));
         assert_eq!(code, 1);

@@ -1,12 +1,12 @@
 //! Tests that one changed bit in one recorded output is found at its tick and field.
 
 use proptest::prelude::*;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::ComputerFrame;
 use replay::verify::{FieldValue, Verification};
 
 use crate::flown::{FLIGHT, WHOLE, verify_bytes, verify_ticks};
 
-type Flip = fn(&mut PilotTick, u32);
+type Flip = fn(&mut ComputerFrame, u32);
 
 fn flip_f64(number: &mut f64, bit: u32) {
     *number = f64::from_bits(number.to_bits() ^ (1 << (bit % 64)));
@@ -36,8 +36,8 @@ const FIELDS: [(&str, Flip); 10] = [
 fn the_flight_is_identical() {
     let report = verify_bytes(&WHOLE.bytes).unwrap();
     assert_eq!(report.outcome, Verification::Identical, "{report:?}");
-    assert_eq!(report.ticks_identical, FLIGHT.ticks.len() as u64);
-    assert!(report.ticks_compared > 50, "the whole flight is compared");
+    assert_eq!(report.frames_identical, FLIGHT.ticks.len() as u64);
+    assert!(report.frames_compared > 50, "the whole flight is compared");
     assert_eq!(report.build.differences, []);
 }
 
@@ -49,9 +49,9 @@ fn every_kind_of_field_is_compared() {
     }
     let report = verify_ticks(&ticks);
     assert_eq!(report.outcome, Verification::Diverged);
-    assert_eq!(report.ticks_different, FIELDS.len() as u64, "one change in each tick, and none spreads");
+    assert_eq!(report.frames_different, FIELDS.len() as u64, "one change in each tick, and none spreads");
     assert_eq!(report.fields_different, FIELDS.len() as u64);
-    assert_eq!(report.first_divergence.unwrap().tick, 2);
+    assert_eq!(report.first_divergence.unwrap().frame, 2);
 }
 
 #[test]
@@ -74,8 +74,8 @@ fn an_input_that_is_not_a_number_is_replayed_like_any_other() {
     let mut ticks = FLIGHT.ticks[..8].to_vec();
     ticks[7].input.measured.as_mut().unwrap().gyro_rad_s.x = payload;
     let report = verify_ticks(&ticks);
-    assert_eq!(report.ticks_compared, 8);
-    assert_eq!(report.first_divergence.unwrap().tick, 8, "the recorded output belonged to another input");
+    assert_eq!(report.frames_compared, 8);
+    assert_eq!(report.first_divergence.unwrap().frame, 8, "the recorded output belonged to another input");
 }
 
 proptest! {
@@ -90,9 +90,9 @@ proptest! {
         flip(&mut ticks[place], bit);
         let report = verify_ticks(&ticks);
         prop_assert_eq!(report.outcome, Verification::Diverged);
-        prop_assert_eq!((report.ticks_different, report.fields_different), (1, 1));
+        prop_assert_eq!((report.frames_different, report.fields_different), (1, 1));
         let first = report.first_divergence.unwrap();
-        prop_assert_eq!(first.tick, place as u64 + 1);
+        prop_assert_eq!(first.frame, place as u64 + 1);
         prop_assert_eq!(&first.fields[0].path, path);
     }
 }

@@ -4,16 +4,17 @@ use std::fs::File;
 use std::io::Read as _;
 use std::sync::LazyLock;
 
-use protocol::log::flight_v1::{PilotStart, PilotTick, PilotTiming};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::log::{FlightLog, LogError};
 use replay::verify::{VerifyReport, verify_log};
+use sim::outside::Outside;
 use sim::recipe::Recipe as FlightRecipe;
 use sim::sortie::Sortie;
-use tick_log::pilot::tick_to_log;
-use tick_log::sortie::{campaign_header, pilot_start};
+use tick_log::sortie::{self, LastFrame, campaign_header};
 
 pub(crate) const MISSION: &str = "mk2";
 const FRAMES: usize = 68;
@@ -24,8 +25,8 @@ const DEADLINE_S: f64 = 0.005;
 
 /// The beginning of a flight from apogee, with a verdict as if it had come down then.
 pub(crate) struct Flight {
-    pub(crate) start: PilotStart,
-    pub(crate) ticks: Vec<PilotTick>,
+    pub(crate) start: ComputerStart,
+    pub(crate) ticks: Vec<ComputerFrame>,
     pub(crate) verdict: v1::LandingVerdict,
     header: LogHeader,
 }
@@ -34,12 +35,11 @@ pub(crate) struct Flight {
 pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
-    let start = pilot_start(&flight);
-    let mut ticks = Vec::new();
+    let start = sortie::start(&flight);
+    let (mut ticks, mut last) = (Vec::new(), LastFrame::default());
     while ticks.len() < FRAMES {
-        flight.step();
-        let (input, output) = flight.computer().piloted().unwrap();
-        ticks.push(tick_to_log(input, output, flight.computer().flight_digest()));
+        flight.step_with(&Outside::NOBODY, &mut last);
+        ticks.push(*last.take().unwrap());
     }
     let limit = |name: &str| v1::LimitResult {
         name: name.to_owned(),
@@ -85,14 +85,14 @@ pub(crate) struct Written {
 }
 
 /// A log of these frames, synced after every fifth. The start is left out if there are no frames.
-pub(crate) fn write_log(ticks: &[PilotTick], recipe: &Recipe) -> Written {
+pub(crate) fn write_log(ticks: &[ComputerFrame], recipe: &Recipe) -> Written {
     let file = tempfile::tempfile().unwrap();
     let header = LogHeader { profile_toml: recipe.profile_toml.clone(), ..FLIGHT.header.clone() };
     let mut writer = LogWriter::new(file.try_clone().unwrap(), &header).unwrap();
     let mut synced = Vec::new();
     let size = |file: &File| file.metadata().unwrap().len();
     if !ticks.is_empty() {
-        writer.write(&Record::PilotStart(Box::new(FLIGHT.start)), 0).unwrap();
+        writer.write(&Record::ComputerStart(Box::new(FLIGHT.start)), 0).unwrap();
     }
     for (index, tick) in ticks.iter().enumerate() {
         let time_ns = index as u64 * FRAME_NS;
@@ -101,7 +101,7 @@ pub(crate) fn write_log(ticks: &[PilotTick], recipe: &Recipe) -> Written {
                 writer.write(&record, time_ns).unwrap();
             }
         }
-        writer.write(&Record::PilotTick(Box::new(tick.clone())), time_ns).unwrap();
+        writer.write(&Record::ComputerFrame(Box::new(tick.clone())), time_ns).unwrap();
         if index % 5 == 4 {
             writer.flush().unwrap();
             synced.push((size(&file), index + 1));
@@ -121,14 +121,14 @@ pub(crate) fn write_log(ticks: &[PilotTick], recipe: &Recipe) -> Written {
 }
 
 /// What else a vehicle records in a frame.
-fn around(tick: &PilotTick) -> [Record; 3] {
+fn around(tick: &ComputerFrame) -> [Record; 3] {
     let frame = RawFrame {
         direction: Direction::Tx,
         endpoint: "vehicle",
         link: "udpout:127.0.0.1:14550".to_owned(),
         bytes: vec![0xfd; 40],
     };
-    let PilotTick { input, .. } = tick;
+    let ComputerFrame { input, .. } = tick;
     let timing = PilotTiming {
         frame: input.frame,
         time_s: input.time_s,
@@ -160,13 +160,13 @@ pub(crate) fn verify_bytes(bytes: &[u8]) -> Result<VerifyReport, LogError> {
 }
 
 /// Verifies a log of these frames.
-pub(crate) fn verify_ticks(ticks: &[PilotTick]) -> VerifyReport {
+pub(crate) fn verify_ticks(ticks: &[ComputerFrame]) -> VerifyReport {
     let recipe = Recipe { with_frames: false, ..Recipe::default() };
     verify_bytes(&write_log(ticks, &recipe).bytes).unwrap()
 }
 
 /// A frame with this number; for tests that need no flight.
-pub(crate) fn idle_tick(number: u64) -> PilotTick {
+pub(crate) fn idle_tick(number: u64) -> ComputerFrame {
     let mut tick = FLIGHT.ticks[0].clone();
     tick.input.frame = number;
     tick

@@ -41,7 +41,7 @@ fn an_mcap_file_of_another_program_is_refused_by_its_topics() {
     assert!(reason.contains("the topics /pose"), "{reason}");
     assert!(reason.contains("none of /computer/frame"), "{reason}");
     // Our topic's name alone does not make it ours.
-    assert!(matches!(verify_bytes(&foreign_mcap("/pilot/tick")), Err(LogError::Foreign { .. })));
+    assert!(matches!(verify_bytes(&foreign_mcap("/computer/frame")), Err(LogError::Foreign { .. })));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use protocol::log::record::Record;
 use protocol::log::writer::LogWriter;
 use sim::recipe::Recipe;
 use tempfile::TempDir;
-use tick_log::sortie;
+use tick_log::sortie::{self, LastFrame};
 
 const NUMBER: u64 = 3;
 
@@ -34,11 +34,12 @@ pub(crate) fn fly_recipe(recipe: &Recipe) -> Logged {
     let mut tally = Tally::new(recipe, NUMBER).unwrap();
     let file = std::fs::File::create(&log).unwrap();
     let mut writer = LogWriter::new(file, &sortie::campaign_header(recipe, NUMBER)).unwrap();
-    writer.write(&sortie::start(tally.flight()), 0).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(sortie::start(tally.flight()))), 0).unwrap();
+    let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     loop {
-        let goes_on = tally.step();
-        for record in sortie::frame_and_phase(tally.flight(), phase) {
+        let goes_on = tally.step_watched(&mut last);
+        for record in sortie::frame_and_phase(tally.flight(), &mut last, phase) {
             writer.write(&record, sortie::time_ns(tally.flight())).unwrap();
         }
         phase = tally.flight().computer().mode().phase;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use proptest::prelude::*;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::{ComputerFrame, Request};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Align, Flown, Tolerances, compare};
@@ -43,7 +43,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     file.set_len(10 << 30).unwrap();
     for (arguments, expected) in [
         (&["info"][..], "type 0, which does not exist".to_owned()),
-        (&["verify"], format!("{ticks} of {ticks} ticks identical of the readable part")),
+        (&["verify"], format!("{ticks} of {ticks} frames identical of the readable part")),
         (&["evaluate"], "open loop".to_owned()),
         (&["refly", "--tick", "12"], "closed loop".to_owned()),
         (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
@@ -114,7 +114,7 @@ fn write_long_log(path: &Path, bytes: u64) -> u64 {
                 noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                 tick.input.fins_rad.push(noise as f64 / 1e18);
             }
-            writer.write(&Record::PilotTick(Box::new(tick)), number * FRAME_NS).unwrap();
+            writer.write(&Record::ComputerFrame(Box::new(tick)), number * FRAME_NS).unwrap();
         }
     }
     writer.finish().unwrap();
@@ -148,7 +148,7 @@ fn a_hundred_megabytes_are_exported_in_bounded_memory() {
     let arguments = ["export", "--to", "csv", "--output", tables.to_str().unwrap()];
     let (code, said) = within(64, &arguments, &path);
     assert_eq!(code, 0, "{said}");
-    let table = std::fs::read_to_string(tables.join("pilot_tick.csv")).unwrap();
+    let table = std::fs::read_to_string(tables.join("computer_frame.csv")).unwrap();
     assert_eq!(table.lines().count() as u64, ticks + 1);
 }
 
@@ -159,7 +159,7 @@ fn a_gigabyte_is_described_within_200_megabytes() {
 }
 
 /// Changes some number of a frame to arbitrary bits.
-fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
+fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let (input, output) = (&mut tick.input, &mut tick.output);
     let measured = input.measured.as_mut().unwrap();
@@ -176,7 +176,8 @@ fn spoil(tick: &mut PilotTick, field: usize, bits: u64) {
         9 => output.level = bits as u32,
         10 => input.igniter_continuity = false,
         11 => tick.state_digest = bits,
-        12 => input.abort = true,
+        // An abort.
+        12 => input.requests.push(Request { asked: 4, ..Request::default() }),
         13 => output.ignite = true,
         _ => output.fins_rad = vec![number; (bits % 6) as usize],
     }

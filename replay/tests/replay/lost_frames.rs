@@ -44,7 +44,7 @@ fn verify_ends_at_the_loss() {
     let report = only(verify(&RECOVERED).unwrap());
     assert_eq!(report.outcome, Verification::NotReplayable, "{report:?}");
     assert_eq!(report.obstacle, Some(Obstacle::Gap { after, before }));
-    assert_eq!((report.first_divergence, report.ticks_identical), (None, after));
+    assert_eq!((report.first_divergence, report.frames_identical), (None, after));
 }
 
 #[test]

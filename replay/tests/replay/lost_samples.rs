@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use protocol::log::record::{TOPIC_PILOT_TICK, TOPIC_TRUTH_SAMPLE};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_TRUTH_SAMPLE};
 
 use crate::command_line::{replay, run};
 use crate::flown::WHOLE;
@@ -15,9 +15,9 @@ fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
     let (mut ticks, mut truths) = (0, 0);
     held.keep(|message| match message.topic.as_str() {
-        TOPIC_PILOT_TICK => {
+        TOPIC_COMPUTER_FRAME => {
             ticks += 1;
-            ticks % 2 == 1
+            ticks % 2 == 0
         }
         TOPIC_TRUTH_SAMPLE => {
             truths += 1;
@@ -79,7 +79,7 @@ fn tolerances_limit_what_may_be_missing() {
     assert_eq!(code, 0, "{stdout}{stderr}");
     let (code, stdout, _) = compared("samples_missing = 0.6\n");
     assert_eq!(code, 1, "{stdout}");
-    assert!(stdout.contains("vehicle_truth3d") && !stdout.contains("- pilot_tick"), "{stdout}");
+    assert!(stdout.contains("vehicle_truth3d") && !stdout.contains("- computer_frame"), "{stdout}");
     let (code, stdout, _) = compared(
         "missing = 2\nsamples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n",
     );

@@ -14,7 +14,6 @@ mod damage;
 mod damage_told;
 mod day;
 mod divergence;
-mod earlier_releases;
 mod fit;
 mod flown;
 mod foreign;

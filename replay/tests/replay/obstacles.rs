@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::PathBuf;
 
 use prost::Message as _;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::ComputerFrame;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info, info_of};
 use replay::log::{FlightLog, Recording};
@@ -30,7 +30,7 @@ fn a_log_without_a_profile_is_refused() {
     let bytes = write_log(&FLIGHT.ticks[..3], &Recipe { profile_toml: None, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
     assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoProfile)));
-    assert_eq!(report.ticks_recorded, 3);
+    assert_eq!(report.frames_recorded, 3);
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::Numeric);
 }
 
@@ -46,13 +46,13 @@ fn a_profile_of_another_kind_is_refused() {
 }
 
 /// The log of these frames, which has lost some of them: the numbers of its records have a gap.
-fn lossy(ticks: &[PilotTick], kept: impl Fn(u64) -> bool) -> (tempfile::TempDir, PathBuf) {
+fn lossy(ticks: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("lossy.mcap");
     std::fs::write(&path, write_log(ticks, &Recipe::default()).bytes).unwrap();
     let mut held = Held::read(&path);
     held.keep(|message| {
-        !message.is_tick() || kept(PilotTick::decode(message.data.as_slice()).unwrap().input.frame)
+        !message.is_tick() || kept(ComputerFrame::decode(message.data.as_slice()).unwrap().input.frame)
     });
     held.write(&path);
     (directory, path)
@@ -63,7 +63,7 @@ fn a_log_without_its_first_frames_is_refused() {
     let (_directory, path) = lossy(&FLIGHT.ticks[..5], |frame| frame > 2);
     let report = only(verify(&path).unwrap());
     assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing { first: 3 }));
-    assert_eq!((report.outcome, report.ticks_compared), (Verification::NotReplayable, 0));
+    assert_eq!((report.outcome, report.frames_compared), (Verification::NotReplayable, 0));
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn frames_before_a_gap_are_compared() {
     let (_directory, path) = lossy(&ticks, kept);
     let report = only(verify(&path).unwrap());
     assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 4, before: 7 }));
-    assert_eq!((report.outcome, report.ticks_identical), (Verification::NotReplayable, 4));
+    assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 4));
 
     let info = info(&path).unwrap();
     assert_eq!((info.completeness.complete, info.completeness.messages_lost), (false, 2));
@@ -90,7 +90,7 @@ fn an_input_of_another_version_is_refused() {
     let mut ticks = FLIGHT.ticks[..4].to_vec();
     ticks[3].input.fins_rad.pop();
     let report = verify_ticks(&ticks);
-    assert_eq!((report.outcome, report.ticks_identical), (Verification::NotReplayable, 3));
+    assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 3));
     let reason = report.obstacle.unwrap().to_string();
     assert!(reason.contains("fin"), "{reason}");
 }
@@ -100,10 +100,11 @@ fn an_input_of_another_version_is_refused() {
 fn a_frame_of_a_newer_version_is_refused() {
     let mut writer =
         mcap::WriteOptions::new().library("touchdown test").create(Cursor::new(Vec::new())).unwrap();
-    let schema = writer.add_schema("touchdown.flight.v1.PilotTick", "protobuf", &[]).unwrap();
-    let channel =
-        writer.add_channel(schema, "/pilot/tick", "protobuf", &std::collections::BTreeMap::new()).unwrap();
-    let mut data = PilotTick::default().encode_to_vec();
+    let schema = writer.add_schema("touchdown.computer.v1.ComputerFrame", "protobuf", &[]).unwrap();
+    let channel = writer
+        .add_channel(schema, "/computer/frame", "protobuf", &std::collections::BTreeMap::new())
+        .unwrap();
+    let mut data = ComputerFrame::default().encode_to_vec();
     data.extend([0x78, 0x01]);
     let header =
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };

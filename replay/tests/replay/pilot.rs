@@ -3,19 +3,21 @@
 use std::io::{Cursor, Read as _, Seek as _};
 use std::sync::LazyLock;
 
-use flight::computer::pilot::{PilotInput, Sensed};
-use flight::computer::{Computer, Input};
+use flight::computer::pilot::Sensed;
+use flight::computer::{Computer, Input, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::guidance::baseline::Law;
+use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{UnitQuaternion, Vector3};
-use protocol::log::flight_v1::{PilotStart, PilotTick};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::info::{GradeLevel, Info, info_of};
 use replay::log::FlightLog;
 use replay::verify::{Obstacle, Verification};
-use tick_log::pilot::{state_to_log, tick_to_log};
+use tick_log::estimate::state_to_log;
+use tick_log::frame::frame_to_log;
 
 use crate::flown::verify_bytes;
 
@@ -25,8 +27,8 @@ const FRAME_NS: u64 = 5_000_000;
 const DEAD: std::ops::RangeInclusive<u64> = 120..=131;
 
 struct Fall {
-    start: PilotStart,
-    ticks: Vec<PilotTick>,
+    start: ComputerStart,
+    ticks: Vec<ComputerFrame>,
 }
 
 fn mission_toml() -> &'static str {
@@ -43,7 +45,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -1.2),
         rate_rad_s: Vector3::zeros(),
     };
-    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released();
+    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
     let mut ticks = Vec::new();
     for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
         if frame == DEAD.end() + 1 {
@@ -61,22 +63,30 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             gnss: None,
             lidar_range_m: None,
         };
-        let input = PilotInput {
+        let input = Input {
             frame,
             time_s,
             sensed: Sensed::Measured(measured),
+            gimbal_rad: [0.0; 2],
             fins_rad: [0.3; 4],
             contact: false,
             igniter_continuity: true,
             booster_attached: false,
-            abort: false,
+            pin_out: true,
+            battery_v: None,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            people: None,
+            requests: &[],
+            rehearsed: None,
         };
-        computer.step(&Input::in_the_air(&input));
-        let (_, output) = computer.piloted().unwrap();
-        ticks.push(tick_to_log(&input, output, computer.flight_digest()));
+        let output = computer.step(&input);
+        ticks.push(frame_to_log(&input, &output, &computer, false));
     }
-    let start = PilotStart {
-        time_s: 0.0,
+    let start = ComputerStart {
+        frame: 0,
+        released: true,
         believed: state_to_log(&believed),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
@@ -85,14 +95,14 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
     Fall { start, ticks }
 });
 
-fn write(start: Option<&PilotStart>, ticks: &[PilotTick], profile_toml: Option<&str>) -> Vec<u8> {
+fn write(start: Option<&ComputerStart>, ticks: &[ComputerFrame], profile_toml: Option<&str>) -> Vec<u8> {
     let header = LogHeader { profile_toml: profile_toml.map(str::to_owned), ..LogHeader::default() };
     let mut writer = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     if let Some(start) = start {
-        writer.write(&Record::PilotStart(Box::new(*start)), 0).unwrap();
+        writer.write(&Record::ComputerStart(Box::new(*start)), 0).unwrap();
     }
     for tick in ticks {
-        writer.write(&Record::PilotTick(Box::new(tick.clone())), tick.input.frame * FRAME_NS).unwrap();
+        writer.write(&Record::ComputerFrame(Box::new(tick.clone())), tick.input.frame * FRAME_NS).unwrap();
     }
     let mut written = writer.finish().unwrap();
     let mut bytes = Vec::new();
@@ -112,7 +122,7 @@ fn frames_are_identical_over_a_restart() {
     // Everything recorded was read, but the vehicle was still falling.
     assert_eq!((report.outcome, report.obstacle), (Verification::IdenticalReadablePart, None));
     assert!((report.cut.unwrap().time_s - 2.0).abs() < 1e-9);
-    assert_eq!(report.ticks_identical, FALL.ticks.len() as u64);
+    assert_eq!(report.frames_identical, FALL.ticks.len() as u64);
     assert_eq!(report.span, Some((1, 400)));
     let info = described(&bytes);
     assert_eq!(info.grade.level, GradeLevel::BitExact, "{}", info.grade.reason);
@@ -130,9 +140,9 @@ fn one_changed_bit_is_found_at_its_frame() {
     let command_rad = &mut ticks[place].output.fins_rad[2];
     *command_rad = f64::from_bits(command_rad.to_bits() ^ 1);
     let report = verify_bytes(&write(Some(&FALL.start), &ticks, Some(mission_toml()))).unwrap();
-    assert_eq!((report.outcome, report.ticks_different), (Verification::Diverged, 1));
+    assert_eq!((report.outcome, report.frames_different), (Verification::Diverged, 1));
     let first = report.first_divergence.unwrap();
-    assert_eq!((first.tick, first.fields_different), (200, 1));
+    assert_eq!((first.frame, first.fields_different), (200, 1));
     assert_eq!(first.fields[0].path, "output.fins_rad[2]");
     assert_eq!(first.fields[0].ulps, Some(1));
     // A lost frame looks like a restart, and everything after it differs.
@@ -140,7 +150,7 @@ fn one_changed_bit_is_found_at_its_frame() {
     lost.remove(50);
     let report = verify_bytes(&write(Some(&FALL.start), &lost, Some(mission_toml()))).unwrap();
     assert_eq!(report.outcome, Verification::Diverged);
-    assert_eq!(report.first_divergence.unwrap().tick, 52);
+    assert_eq!(report.first_divergence.unwrap().frame, 52);
 }
 
 #[test]

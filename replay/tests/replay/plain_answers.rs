@@ -31,7 +31,7 @@ fn a_foreign_file_exports_to_no_folder() {
     let (foreign, tables) = (MK2.beside("foreign.mcap"), MK2.beside("no-tables"));
     std::fs::write(&foreign, foreign_mcap("/pose")).unwrap();
     let (code, _, stderr) = run(replay("export", &foreign).args(["--to", "csv", "--output"]).arg(&tables));
-    assert!(code == 2 && stderr.contains("none of /computer/frame, /pilot/tick"), "{stderr}");
+    assert!(code == 2 && stderr.contains("none of /computer/frame, /telemetry"), "{stderr}");
     assert!(!tables.exists());
 }
 

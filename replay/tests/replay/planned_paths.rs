@@ -1,6 +1,6 @@
 //! Compares the planned paths, recomputed from the log, with the path of the rocket.
 
-use replay::controller::{LoggedPilot, NewPlans, Replayed as _, path_in_world_m};
+use replay::controller::{LoggedComputer, NewPlans, path_in_world_m};
 
 use crate::simulated::MK2;
 
@@ -20,7 +20,7 @@ fn val_flown_paths_begin_at_the_rocket_and_the_last_ends_at_its_touchdown() {
     let recording = MK2.recording();
     let (start, frames) = recording.replayable_frames().unwrap();
     let mut pilot =
-        LoggedPilot::recorded(recording.profile_toml().unwrap(), start, &recording.head.run, &[]).unwrap();
+        LoggedComputer::recorded(recording.profile_toml().unwrap(), start, &recording.head.run, &[]).unwrap();
     let (mut plans, mut paths) = (NewPlans::default(), Vec::new());
     for tick in frames {
         let again = pilot.run_again(tick).unwrap();

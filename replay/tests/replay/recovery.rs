@@ -51,7 +51,7 @@ fn a_cut_log_recovers_what_was_synced() {
         let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
         // Data that was not yet on the disk is missing, although no checksum shows it any more.
         assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
-        assert_eq!((verified.ticks_identical, verified.cut.unwrap().contact_s), (*ticks as u64, None));
+        assert_eq!((verified.frames_identical, verified.cut.unwrap().contact_s), (*ticks as u64, None));
     }
 }
 

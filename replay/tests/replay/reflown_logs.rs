@@ -33,10 +33,10 @@ fn a_reflown_log_holds_only_frames_of_this_build() {
     let mut forged = whole.clone();
     forged.frames[99].state_digest ^= 1;
     forged.frames[99].output.gimbal_rad[1] += 0.1;
-    forged.pilot_start.as_mut().unwrap().believed.position_m.x += 0.1;
+    forged.start.as_mut().unwrap().believed.position_m.x += 0.1;
     let again = written("of_another_build.mcap", &forged, &ReflyOptions::default());
     assert_whole(&again);
-    assert_eq!((again.pilot_start, again.frames), (whole.pilot_start, whole.frames));
+    assert_eq!((again.start, again.frames), (whole.start, whole.frames));
 }
 
 /// Frames that the log has lost are flown again too: the new log says nothing of a restart.

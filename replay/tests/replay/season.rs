@@ -5,7 +5,7 @@ use std::process::Command;
 
 use campaign::store::{Order, Shard, Store};
 use prost::Message as _;
-use protocol::log::flight_v1::PilotTick;
+use protocol::log::computer_v1::ComputerFrame;
 use quick_xml::events::Event as Xml;
 use serde_json::Value;
 use sim::recipe::Recipe;
@@ -150,7 +150,7 @@ fn a_log_that_diverges_or_breaks_fails() {
     // A forged command: the recorded decisions are not those of this build.
     let mut held = Held::read(&MK2.log);
     let forged = held.messages.iter_mut().filter(|message| message.is_tick()).nth(50).unwrap();
-    let mut tick = PilotTick::decode(forged.data.as_slice()).unwrap();
+    let mut tick = ComputerFrame::decode(forged.data.as_slice()).unwrap();
     tick.output.fins_rad[0] += 0.01;
     forged.data = tick.encode_to_vec();
     held.write(&season.logs().join("week-1/nominal.mcap"));

@@ -36,7 +36,7 @@ fn the_solve_times_of_a_flown_rocket_are_read_from_its_log() {
 fn solve_times_are_not_verified() {
     let report = only(verify(&MK2.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
-    assert_eq!(report.ticks_compared as usize, MK2.recording().frames.len());
+    assert_eq!(report.frames_in_flight as usize, MK2.recording().frames.len());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
 use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::TOPIC_PILOT_TICK;
+use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
 /// A message of a log, by its topic.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ impl Kept {
 
     /// A frame of the flight computer.
     pub(crate) fn is_tick(&self) -> bool {
-        self.topic == TOPIC_PILOT_TICK
+        self.topic == TOPIC_COMPUTER_FRAME
     }
 }
 

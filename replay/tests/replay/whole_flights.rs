@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use prost::Message as _;
-use protocol::log::flight_v1::PilotTick;
-use protocol::log::record::{TOPIC_PILOT_START, TOPIC_VERDICT};
+use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::record::{TOPIC_COMPUTER_START, TOPIC_VERDICT};
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
@@ -26,7 +26,7 @@ fn written(held: &Held, directory: &tempfile::TempDir, name: &str) -> PathBuf {
 /// Turns a bit of what a tick decided.
 fn tamper(message: &mut Kept) {
     let turned = |number: f64| f64::from_bits(number.to_bits() ^ 1);
-    let mut tick = PilotTick::decode(message.data.as_slice()).unwrap();
+    let mut tick = ComputerFrame::decode(message.data.as_slice()).unwrap();
     tick.output.fins_rad[0] = turned(tick.output.fins_rad[0]);
     message.data = tick.encode_to_vec();
 }
@@ -43,7 +43,7 @@ fn a_whole_log_that_was_only_rewritten_is_identical() {
         let (code, stdout, _) = verify(&written(&held, &directory, "same.mcap"), &["--strict"]);
         let count = held.ticks();
         assert_eq!(code, 0, "{stdout}");
-        assert!(stdout.contains(&format!("{count} of {count} ticks identical\n")), "{stdout}");
+        assert!(stdout.contains(&format!("{count} of {count} frames identical\n")), "{stdout}");
     }
 }
 
@@ -52,7 +52,7 @@ fn a_whole_log_that_was_only_rewritten_is_identical() {
 fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     let directory = tempfile::tempdir().unwrap();
     let mut held = Held::read(&LANDED.log);
-    let start = held.messages.iter().find(|message| message.topic == TOPIC_PILOT_START).unwrap().clone();
+    let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
     let last_ns = held.messages.last().unwrap().log_time_ns;
     let honest = {
         let mut honest = held.clone();
@@ -64,13 +64,13 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     let count = held.ticks();
     let (code, stdout, _) = verify(&written(&held, &directory, "tampered.mcap"), &[]);
     assert_eq!(code, 1, "{stdout}");
-    assert!(stdout.contains(&format!("DIVERGED: {count} of {count} ticks differ")), "{stdout}");
+    assert!(stdout.contains(&format!("DIVERGED: {count} of {count} frames differ")), "{stdout}");
     assert!(!stdout.contains("0 of 0"), "{stdout}");
 
     // Nothing follows the copy, so it must not be called "identical".
     let (code, stdout, _) = verify(&honest, &[]);
     assert_eq!(code, 2, "{stdout}");
-    assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} ticks identical")), "{stdout}");
+    assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} frames identical")), "{stdout}");
     assert!(stdout.contains("flight 2 of 2: nothing was compared"), "{stdout}");
     assert!(!stdout.contains("0 of 0"), "{stdout}");
     let (_, stdout, _) = verify(&honest, &["--junit"]);
@@ -83,12 +83,12 @@ fn a_start_copied_into_the_middle_is_no_flight() {
     let directory = tempfile::tempdir().unwrap();
     let mut held = Held::read(&LANDED.log);
     let place = held.messages.len() / 2;
-    let start = held.messages.iter().find(|message| message.topic == TOPIC_PILOT_START).unwrap().clone();
+    let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
     held.messages.insert(place, start);
     let (code, stdout, _) = verify(&written(&held, &directory, "middle.mcap"), &[]);
     assert_eq!(code, 2, "{stdout}");
     assert!(stdout.contains("flight 1 of 2") && stdout.contains("INCOMPLETE flight: ends at T+"), "{stdout}");
-    assert!(stdout.contains("flight 2 of 2: nothing was compared: it begins with tick"), "{stdout}");
+    assert!(stdout.contains("flight 2 of 2: nothing was compared: it begins with frame"), "{stdout}");
 }
 
 #[test]
@@ -106,11 +106,11 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
         let (code, stdout, _) = verify(&path, &["--strict"]);
         assert_eq!(code, 0, "{stdout}");
         assert!(
-            stdout.contains(&format!("flight 1 of 2: {count_a} of {count_a} ticks identical")),
+            stdout.contains(&format!("flight 1 of 2: {count_a} of {count_a} frames identical")),
             "{stdout}"
         );
         assert!(
-            stdout.contains(&format!("flight 2 of 2: {count_b} of {count_b} ticks identical")),
+            stdout.contains(&format!("flight 2 of 2: {count_b} of {count_b} frames identical")),
             "{stdout}"
         );
         let (_, stdout, _) = verify(&path, &["--json"]);
@@ -175,7 +175,7 @@ fn a_log_without_its_last_ticks_is_not_complete() {
             assert_eq!(code, 0, "{name}: {stdout}");
             assert!(
                 stdout.contains(&format!(
-                    "{count} of {count} ticks identical of an INCOMPLETE flight: ends at T+"
+                    "{count} of {count} frames identical of an INCOMPLETE flight: ends at T+"
                 )),
                 "{name}: {stdout}"
             );

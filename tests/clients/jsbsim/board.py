@@ -99,13 +99,14 @@ class Computer:
             vector(3, believed["world_from_body"]), vector(4, believed["rate_rad_s"]),
         ))
         self.flight += 1
-        start = double(1, 0.0) + message(2, state) + whole(3, True)
-        content = message(1, mission_toml.encode()) + message(2, b"nmpc") + message(4, start)
-        return message(3, content + whole(6, self.flight))
+        # Frame, estimate, steered, released.
+        start = whole(1, 0) + message(2, state) + whole(4, True) + whole(6, True)
+        content = message(1, mission_toml.encode()) + message(2, b"nmpc") + message(3, start)
+        return message(2, content + whole(5, self.flight))
 
     def ask(self, frame, content, begin=b""):
         """Has a frame of a flight in the air decided; returns gimbal and fins, rad, and whether it lights and ejects."""
-        record = message(2, whole(1, frame) + content) + begin
+        record = message(1, whole(1, frame) + content) + begin
         self.process.stdin.write(stuffed(record + struct.pack("<I", zlib.crc32(record))))
         self.process.stdin.flush()
         answered = b""
@@ -118,6 +119,6 @@ class Computer:
         answer, sum_of_it = answer[:-4], answer[-4:]
         assert struct.pack("<I", zlib.crc32(answer)) == sum_of_it
         answer = fields(answer)
-        assert answer[5] == frame
+        assert answer[1] == frame
         output = fields(answer[2])
         return numbers(output[1]), numbers(output[2]), bool(output[3]), bool(output[4])

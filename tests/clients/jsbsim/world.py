@@ -131,7 +131,7 @@ def euler(world_from_body):
 
 
 def input_of(time_s, plant, sample, contact):
-    """A frame's input but for its number: time, readings, fins, contact, igniter, no abort."""
+    """A frame's input but for its number: time, readings, gimbal (its servos do not say), fins, contact, igniter, pin, log."""
     gyro, force, height, fix, distance = sample
     measured = vector(1, gyro) + vector(2, force)
     if height is not None:
@@ -143,8 +143,8 @@ def input_of(time_s, plant, sample, contact):
     if distance is not None:
         measured += double(5, distance)
     fins = [plant.fdm[f"fcs/fin{fin}-rad"] for fin in range(4)]
-    flags = whole(6, contact) + whole(7, True) + whole(8, False)
-    return double(2, time_s) + message(3, measured) + doubles(5, fins) + flags
+    flags = whole(8, contact) + whole(9, True) + whole(10, True) + whole(11, True) + whole(12, 1 << 30)
+    return double(2, time_s) + message(3, measured) + doubles(6, (0.0, 0.0)) + doubles(7, fins) + flags
 
 
 def fly(computer, order, draw):

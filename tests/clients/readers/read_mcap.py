@@ -11,8 +11,8 @@ with open(sys.argv[1], "rb") as file:
     assert reader.get_summary() is not None
     for schema, channel, message, decoded in reader.iter_decoded_messages(
         topics=[
-            "/pilot/start",
-            "/pilot/tick",
+            "/computer/start",
+            "/computer/frame",
             "/pilot/estimate",
             "/vehicle/truth3d",
             "/verdict",
@@ -22,7 +22,7 @@ with open(sys.argv[1], "rb") as file:
     ):
         assert message.log_time == message.publish_time
         counts[channel.topic] += 1
-        if channel.topic == "/pilot/tick":
+        if channel.topic == "/computer/frame":
             command = decoded.output.gimbal_rad[0]
 for topic in sorted(counts):
     print(topic, counts[topic])

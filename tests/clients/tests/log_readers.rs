@@ -54,7 +54,7 @@ static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
 /// The topic of the flight computer's frames, their number, and the last gimbal command, rad.
 fn commands(recording: &Recording) -> (&'static str, usize, f64) {
     let last = recording.frames.last().unwrap();
-    ("/pilot/tick", recording.frames.len(), last.output.gimbal_rad[0])
+    ("/computer/frame", recording.frames.len(), last.output.gimbal_rad[0])
 }
 
 #[test]
@@ -101,8 +101,8 @@ fn logs_are_read_by_foxgloves_library() {
 fn logs_open_in_foxglove_with_plots() {
     let browser = found(&["chromium", "chromium-browser", "google-chrome"], "chromium");
     let flights = [
-        (&MK2, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[0]"),
-        (&DISPERSED, "/vehicle/truth3d.height_m", "/pilot/tick.output.gimbal_rad[1]"),
+        (&MK2, "/vehicle/truth3d.height_m", "/computer/frame.output.gimbal_rad[0]"),
+        (&DISPERSED, "/vehicle/truth3d.height_m", "/computer/frame.output.gimbal_rad[1]"),
     ];
     for (flight, height, gimbal) in flights {
         let picture = flight.beside("foxglove.png");

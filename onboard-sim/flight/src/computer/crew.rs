@@ -194,27 +194,22 @@ remembers!(CrewMemory { two_person, held_by });
 type Agreed = (Ask, Operator);
 
 impl Computer {
-    /// Decides a request; `None` for an abort in the air, which the pilot handles in this frame.
-    pub(super) fn answer(&mut self, request: &Request) -> Option<Answer> {
+    /// Decides a request.
+    pub(super) fn answer(&mut self, request: &Request) -> Answer {
         let mode = *self.table.mode();
         let time_s = self.table.time_s();
         let Request { asked, uplink, station, by, .. } = *request;
         if let Some(reason) = self.why_not_of(request) {
-            return Some(self.deny(asked, reason));
+            return self.deny(asked, reason);
         }
         // Whatever else the crew wants, the check is over first.
         let check_ended = !matches!(asked, Asked::Check | Asked::CheckStill) && self.end_check(asked.name());
         if check_ended && matches!(asked, Asked::Arm | Asked::Start) {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
-            return Some(Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) });
+            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) };
         }
-        match asked {
-            Asked::Tap => return Some(self.tap(by)),
-            Asked::TakeCommand => return Some(self.take_command(request)),
-            Asked::Check | Asked::CheckStill => return Some(self.begin_check(asked, by)),
-            Asked::EndCheck => return Some(Answer::ACCEPTED),
-            _ if is_so_already(&mode, asked) => return Some(Answer::ACCEPTED),
-            _ => {}
+        if is_so_already(&mode, asked) {
+            return Answer::ACCEPTED;
         }
         if asked == Asked::Abort && !mode.interlocks.abort_latched {
             let who = match (by, station) {
@@ -228,13 +223,16 @@ impl Computer {
                 self.table.say(Severity::Warning, format!("{who} aborts"));
             }
         }
-        let on_ground = mode.phase.on_pad() || matches!(mode.phase, Phase::Touchdown | Phase::Safed);
-        if asked == Asked::Abort && !on_ground {
-            return None;
-        }
         let checks = self.arming_checks_by(uplink);
         let start = self.start_point();
-        let event = event_of(asked, &checks, (self.countdown_s, start), self.abort_event())?;
+        let Some(event) = event_of(asked, &checks, (self.countdown_s, start), self.abort_event()) else {
+            return match asked {
+                Asked::Tap => self.tap(by),
+                Asked::TakeCommand => self.take_command(request),
+                Asked::Check | Asked::CheckStill => self.begin_check(asked, by),
+                _ => Answer::ACCEPTED,
+            };
+        };
         if let (Asked::Hold, true, Some(station)) = (asked, mode.may_hold(start, time_s), station) {
             let who = by.map_or_else(String::new, |by| format!("{by}, "));
             self.table.say(Severity::Notice, format!("{who}station {station} asks for a hold"));
@@ -243,15 +241,15 @@ impl Computer {
         let refusal = transition(&mode, event, time_s).refusal;
         let agreed = match refusal.map_or_else(|| self.agree(request), |_| Ok(None)) {
             Ok(agreed) => agreed,
-            Err(answer) => return Some(answer),
+            Err(answer) => return answer,
         };
-        Some(match self.table.happen(event) {
+        match self.happen(event) {
             Ok(_) => {
                 self.note_done(asked, by, agreed);
                 Answer::ACCEPTED
             }
             Err(refusal) => refused(&mut self.table, asked, event, refusal, &checks),
-        })
+        }
     }
 
     /// Why this sender may ask for nothing of the kind.
@@ -379,14 +377,6 @@ impl Computer {
         let silence = if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "not heard".into() };
         self.table.say(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
         Answer::ACCEPTED
-    }
-
-    /// The answer to an abort that the pilot has handled.
-    pub(super) fn abort_answer(&self) -> Answer {
-        if self.table.mode().interlocks.abort_latched {
-            return Answer::ACCEPTED;
-        }
-        Answer { ending: Ending::Failed, reason: Some("the flight ended before it".into()) }
     }
 
     /// Holds the countdown if the station that armed the vehicle has fallen silent.

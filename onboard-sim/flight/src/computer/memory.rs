@@ -11,7 +11,7 @@ use twox_hash::XxHash64;
 
 use super::pad_check::PadCheck;
 use super::{Computer, CrewMemory};
-use crate::rules::phase::{Interlocks, Motor};
+use crate::rules::phase::Motor;
 
 /// Bytes that are given to the hash at once. Word by word, the hash took a third of the time of `replay verify`.
 const BLOCK: usize = 1024;
@@ -173,29 +173,7 @@ macro_rules! remembers {
 }
 pub(crate) use remembers;
 
-// Digests of the flight computer's memory: of all of it, and of the part that decides in the air.
-
-/// The part of the phase table that decides in the air. Times of the vehicle's clock decide nothing there, nor do the
-/// pin and the arming, which a person may change on the ground.
-struct InTheAir<'a>(&'a Computer);
-
-impl Remembers for InTheAir<'_> {
-    fn remember(&self, memory: &mut Memory) {
-        let mode = self.0.mode();
-        mode.phase.index().remember(memory);
-        let Interlocks {
-            pin_out: _,
-            armed: _,
-            landing_motor_inhibited,
-            abort_latched,
-            no_light_latched,
-            lands_here,
-        } = mode.interlocks;
-        [landing_motor_inhibited, abort_latched, no_light_latched, lands_here].remember(memory);
-        stage(mode.motor).remember(memory);
-        self.0.pilot.remember(memory);
-    }
-}
+// The digest of the flight computer's memory.
 
 fn stage(motor: Motor) -> u8 {
     match motor {
@@ -276,17 +254,12 @@ impl Remembers for Whole<'_> {
 }
 
 impl Computer {
-    /// A number that changes with anything that the computer remembers, from power-up on.
-    pub fn digest(&self) -> u64 {
-        Memory::digest_of(&Whole(self))
-    }
-
-    /// A number that changes with anything that decides in the air, to compare a replay with a log.
+    /// A number that changes with anything that the computer remembers, to compare a replay with a log.
     ///
     /// The mission is left out because it is constant, and a solve's workspace because the next solve reads nothing of
     /// it.
-    pub fn flight_digest(&self) -> u64 {
-        Memory::digest_of(&InTheAir(self))
+    pub fn digest(&self) -> u64 {
+        Memory::digest_of(&Whole(self))
     }
 }
 

@@ -29,7 +29,7 @@ use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
-use self::crew::{Answer, Asked, People, Request};
+use self::crew::{Answer, People, Request};
 use self::memory::remembers;
 use self::news::{MotorWatch, News, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
@@ -51,7 +51,7 @@ pub const FRAME_MS: u32 = 5;
 /// Frame length, s.
 pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
-pub const AT_REST_S: f64 = 1.0;
+const AT_REST_S: f64 = 1.0;
 
 /// When the vehicle was released.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -73,8 +73,8 @@ pub struct Computer {
     /// The law and the state at power-up, to power up again.
     law: Law,
     believed: RigidState,
-    /// The pilot's last frame in the air.
-    flown: Option<(PilotInput, PilotOutput)>,
+    /// The input of the pilot's last frame.
+    flown: Option<PilotInput>,
     /// The gate check that the crew was last told of.
     gate_told: Option<&'static str>,
     frame: u64,
@@ -100,7 +100,8 @@ pub struct Computer {
 }
 
 impl Computer {
-    /// One frame: note the input, answer the crew, watch over the countdown, fly or wait on the pad, keep the time, report.
+    /// One frame: note the input, estimate, answer the crew, watch over the countdown, fly or wait on the pad, keep the
+    /// time, report.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         self.frame = input.frame;
         self.table.begin(input.time_s);
@@ -108,13 +109,16 @@ impl Computer {
         if self.table.mode().phase.on_pad() {
             self.pad.feel(&input.sensed);
         }
-        let asked: Vec<Option<Answer>> = input.requests.iter().map(|request| self.answer(request)).collect();
+        let in_flight = self.release.map(|release| PilotInput::of(input, release));
+        if let Some(flown) = &in_flight {
+            self.pilot.look(&mut self.table, flown);
+            self.flown = in_flight;
+        }
+        let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
-        let abort = asked.iter().any(Option::is_none);
-        let released_before = self.release;
-        let planned = if let Some(release) = released_before {
-            self.fly(input, release, abort)
+        let planned = if let Some(flown) = &in_flight {
+            self.fly(flown)
         } else {
             self.wait_on_the_pad(input);
             false
@@ -123,10 +127,9 @@ impl Computer {
         self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;
         self.commands.parachute = mode.phase == Phase::Chute;
         self.keep_time();
-        let answers = asked.into_iter().map(|answer| answer.unwrap_or_else(|| self.abort_answer())).collect();
         Output {
             commands: self.commands,
-            released: released_before.is_none() && self.release.is_some(),
+            released: in_flight.is_none() && self.release.is_some(),
             answers,
             news: self.table.take_news(),
             planned,
@@ -138,8 +141,7 @@ impl Computer {
         let before = self.pilot.clone();
         let output = self.step(input);
         let flown = self.flown.as_ref();
-        let solved =
-            flown.and_then(|(input, _)| self.pilot.landing_planned(&before, self.table.mode(), input));
+        let solved = flown.and_then(|input| self.pilot.landing_planned(&before, self.table.mode(), input));
         (output, solved)
     }
 
@@ -167,35 +169,22 @@ impl Computer {
         }
     }
 
-    /// One frame in the air, or on the ground after the flight. Returns whether it planned.
-    fn fly(&mut self, input: &Input<'_>, release: Release, abort: bool) -> bool {
-        let frame = input.frame.saturating_sub(release.frame);
-        let input = PilotInput {
-            frame,
-            time_s: flight_time_s(frame),
-            sensed: input.sensed,
-            fins_rad: input.fins_rad,
-            contact: input.contact,
-            igniter_continuity: input.igniter_continuity,
-            booster_attached: input.booster_attached,
-            abort,
-        };
-        let output = self.pilot.step(&mut self.table, &input);
-        self.flown = Some((input, output));
+    /// The rest of a frame in the air, or on the ground after the flight. Returns whether it planned.
+    fn fly(&mut self, input: &PilotInput) -> bool {
+        let PilotOutput { gimbal_rad, fins_rad, level, booster } = self.pilot.fly(&mut self.table, input);
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
             self.table.say_gate_shut(check);
         }
         self.gate_told = refusal;
-        let PilotOutput { gimbal_rad, fins_rad, level, booster, .. } = output;
         self.commands = Commands { gimbal_rad, fins_rad, booster, ..self.commands };
         if phase.in_landing_burn() && level != self.level {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
         }
         self.level = level;
         (phase.in_descent() || phase.in_landing_burn())
-            && frame.is_multiple_of(crate::computer::pilot::FRAMES_PER_PLAN)
+            && input.frame.is_multiple_of(crate::computer::pilot::FRAMES_PER_PLAN)
     }
 
     /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
@@ -266,9 +255,14 @@ impl Computer {
         &self.pilot
     }
 
-    /// Input and output of the pilot's last frame.
-    pub fn piloted(&self) -> Option<(&PilotInput, &PilotOutput)> {
-        self.flown.as_ref().map(|(input, output)| (input, output))
+    /// The input of the pilot's last frame; its time counts from the release.
+    pub fn flown(&self) -> Option<&PilotInput> {
+        self.flown.as_ref()
+    }
+
+    /// What decided where the nose points in the last frame.
+    pub fn level(&self) -> ControlLevel {
+        self.level
     }
 
     /// Vehicle time of the release, s.
@@ -366,38 +360,6 @@ pub struct Input<'a> {
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
-}
-
-impl Input<'_> {
-    /// A frame in the air of a computer that was [released at once](Computer::released), made from its record in a
-    /// pilot's log: no station is connected, and a recorded abort becomes a request.
-    pub fn in_the_air(input: &PilotInput) -> Self {
-        const ABORT: [Request; 1] = [Request {
-            asked: Asked::Abort,
-            uplink: Uplink::NotNeeded,
-            station: None,
-            by: None,
-            confirms: None,
-        }];
-        Self {
-            frame: input.frame,
-            time_s: input.time_s,
-            sensed: input.sensed,
-            gimbal_rad: [0.0; 2],
-            fins_rad: input.fins_rad,
-            contact: input.contact,
-            igniter_continuity: input.igniter_continuity,
-            booster_attached: input.booster_attached,
-            pin_out: true,
-            battery_v: None,
-            log: LogState { running: true, space_bytes: u64::MAX },
-            uplink: Uplink::NotNeeded,
-            commander: None,
-            people: None,
-            requests: if input.abort { &ABORT } else { &[] },
-            rehearsed: None,
-        }
-    }
 }
 
 // The output of one frame of the flight computer.

@@ -20,7 +20,7 @@ use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
 use super::pilot::{BoosterCommands, Pilot, SavedPilot};
 use super::table::PhaseTable;
-use super::{Commands, Computer, CrewMemory, LogState, Release, Severity};
+use super::{Commands, Computer, CrewMemory, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::ControlLevel;
@@ -232,9 +232,12 @@ impl Computer {
         self
     }
 
-    /// The same computer, released at the start of its clock, for flights that begin without a pad.
+    /// The same computer, released in a frame: for flights that begin without a pad, and for a replay that begins at the
+    /// release.
     #[must_use]
-    pub fn released(mut self) -> Self {
+    pub fn released(mut self, frame: u64) -> Self {
+        self.frame = frame;
+        self.table.begin(flight_time_s(frame));
         for event in [
             Event::SelfTestPassed,
             Event::PinPulled,
@@ -246,7 +249,7 @@ impl Computer {
         }
         self.let_go();
         self.table.take_news();
-        self.motor_watch.news(self.table.mode(), 0.0);
+        self.motor_watch.news(self.table.mode(), self.table.time_s());
         self.log = LogState { running: true, space_bytes: u64::MAX };
         self
     }
@@ -287,9 +290,9 @@ mod tests {
 
     /// A falling computer after some frames.
     fn falling() -> Computer {
-        let mut computer = powered_up().released();
+        let mut computer = powered_up().released(0);
         for frame in 1..=40 {
-            computer.step(&crate::computer::Input::in_the_air(&sample::input(frame, 0.005 * frame as f64)));
+            computer.step(&sample::in_the_air(&sample::input(frame, 0.005 * frame as f64)));
         }
         computer
     }
@@ -337,7 +340,7 @@ mod tests {
         assert_eq!(here.digest(), there.digest());
         for frame in 61..=100 {
             let input = sample::input(frame, 0.005 * frame as f64);
-            let input = crate::computer::Input::in_the_air(&input);
+            let input = sample::in_the_air(&input);
             assert_eq!(here.step(&input), there.step(&input));
             assert_eq!(here.digest(), there.digest(), "frame {frame}");
         }

@@ -125,12 +125,23 @@ pub enum AbortEffect {
 }
 
 impl Computer {
+    /// Applies an event of the crew. In the air the pilot takes note of what it does.
+    ///
+    /// # Errors
+    /// The table refuses it, and nothing has changed.
+    pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
+        match &self.flown {
+            Some(input) => self.pilot.told(&mut self.table, event, input.time_s),
+            None => self.table.happen(event),
+        }
+    }
+
     /// The event that an abort would be now, from the findings of the last frame.
     pub(super) fn abort_event(&self) -> Event {
         if self.release.is_none() {
             return Event::AbortRequested { above_commit_height: false, gate_open: false };
         }
-        self.pilot.abort_event(self.table.mode(), self.flown.as_ref().map(|(input, _)| input))
+        self.pilot.abort_event(self.table.mode(), self.flown.as_ref())
     }
 
     /// Whether a landing under thrust can be planned; true until the first attempt.

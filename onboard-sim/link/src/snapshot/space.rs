@@ -1,6 +1,6 @@
 //! The rocket's state at one instant, for telemetry: what its flight computer believes.
 
-use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, PilotOutput, touchdown_from_below_m, touchdown_m};
+use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, touchdown_from_below_m, touchdown_m};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
 use flight::rules::phase::Phase;
@@ -66,15 +66,15 @@ impl InSpace<'_> {
             battery: self.battery,
             ..self.known.standing(Motion::in_space(&believed, cg_m, &Vector2::zeros()), limits)
         };
-        let flying = computer.released_at_s().zip(computer.piloted()).zip(pilot.estimate());
+        let flying = computer.released_at_s().zip(computer.flown()).zip(pilot.estimate());
         match flying {
             None => standing,
-            Some(((released_at_s, (input, output)), estimate)) => {
+            Some(((released_at_s, flown), estimate)) => {
                 let since = Airborne {
                     released_at_s,
-                    frame: input.frame,
-                    flight_s: input.time_s,
-                    output,
+                    frame: flown.frame,
+                    flight_s: flown.time_s,
+                    level: computer.level(),
                     estimate,
                     mass: &mass,
                 };
@@ -84,7 +84,7 @@ impl InSpace<'_> {
     }
 
     fn flying(&self, pilot: &Pilot, since: &Airborne<'_>, standing: &Snapshot) -> Snapshot {
-        let &Airborne { released_at_s, frame, flight_s, output, estimate, mass } = since;
+        let &Airborne { released_at_s, frame, flight_s, level, estimate, mass } = since;
         let motor = pilot.motor();
         let burn = motor.burn(pilot.curve());
         let burning_s = pilot.burning_s(flight_s);
@@ -98,7 +98,7 @@ impl InSpace<'_> {
             since_zero_s: Some(until_s),
             motion: Motion::in_space(&estimate.state, feet_m, &estimate.wind_m_s),
             thrust_n: burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)),
-            controller: Some(facts(frame / FRAMES_PER_PLAN, output.level, pilot.report())),
+            controller: Some(facts(frame / FRAMES_PER_PLAN, level, pilot.report())),
             prediction: planned.and_then(|planned| {
                 let landing_miss = self.mission.powered.landing_miss;
                 prediction(pilot, estimate, planned, flight_s, landing_miss, &standing.limits)
@@ -161,7 +161,7 @@ impl InSpace<'_> {
             return None;
         }
         let computer = self.known.computer;
-        let attached = computer.piloted().is_some_and(|(input, _)| input.booster_attached);
+        let attached = computer.flown().is_some_and(|flown| flown.booster_attached);
         let booster = match (attached, computer.commands().booster.separate) {
             (true, false) => Booster::Attached,
             (true, true) => Booster::Separating,
@@ -179,7 +179,7 @@ struct Airborne<'a> {
     frame: u64,
     /// Time since then, s.
     flight_s: f64,
-    output: &'a PilotOutput,
+    level: ControlLevel,
     estimate: &'a Estimate,
     mass: &'a MassModel,
 }

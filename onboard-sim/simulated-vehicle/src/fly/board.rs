@@ -27,8 +27,8 @@ use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDG
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::record::Record;
 use protocol::transport::LinkAddress;
-use tick_log::computer::{commander_from_log, request_from_log, uplink_from_log};
-use tick_log::pilot::PilotLogError;
+use tick_log::estimate::RecordError;
+use tick_log::frame::{commander_from_log, request_from_log, uplink_from_log};
 
 use crate::endpoint::Heard;
 use crate::vehicle::{Vehicle, VehicleEvent};
@@ -53,7 +53,7 @@ pub enum BoardError {
     #[error("frame {frame}: the board has decided something else than the computer in this process")]
     Differs { frame: u64 },
     #[error("what the board has heard: {0}")]
-    Heard(#[from] PilotLogError),
+    Heard(#[from] RecordError),
 }
 
 /// A board at the other end of two pipes.
@@ -125,7 +125,7 @@ impl OnBoard {
         Ok(events)
     }
 
-    fn heard(&self) -> Result<Heard, PilotLogError> {
+    fn heard(&self) -> Result<Heard, RecordError> {
         let Some(stream::Heard { uplink, commander, requests }) = &self.heard else {
             return Ok(Heard { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
         };
@@ -142,7 +142,7 @@ impl OnBoard {
     fn decide(&mut self, vehicle: &Vehicle) -> Result<(), BoardError> {
         for record in vehicle.computer_records() {
             match record {
-                Record::ComputerStart(start) => self.begin.at_power_up = Some(*start),
+                Record::ComputerStart(start) if !start.released => self.begin.start = *start,
                 Record::ComputerFrame(frame) => self.compare(&frame)?,
                 _ => {}
             }
@@ -155,7 +155,7 @@ impl OnBoard {
         // The board knows itself what it has heard.
         let input =
             ComputerInput { uplink: None, commander: None, requests: Vec::new(), ..frame.input.clone() };
-        let sent = Frame { from_power_up: Some(input), ..Frame::default() };
+        let sent = Frame { input, begin: None };
         let (mut once, mut again) = (Vec::new(), Vec::new());
         put(&sent, &mut once);
         put(&Frame { begin: Some(self.begin.clone()), ..sent }, &mut again);
@@ -172,8 +172,7 @@ impl OnBoard {
         let answer = self.answer_to(number, &again)?;
         let expected = Answer {
             frame: number,
-            from_power_up: Some(frame.output.clone()),
-            in_the_air: None,
+            output: frame.output.clone(),
             state_digest: frame.state_digest,
             heard: None,
         };

@@ -80,8 +80,7 @@ pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEv
             recorder.sync_soon();
         }
     }
-    let changed = events.iter().any(|event| matches!(event, VehicleEvent::PhaseChanged { .. }));
-    for record in vehicle.records(changed) {
+    for record in vehicle.records() {
         recorder.record(record, time_ns);
     }
 }

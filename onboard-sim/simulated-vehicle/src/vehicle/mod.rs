@@ -16,13 +16,14 @@ use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::{StartPoint, StateWeights};
-use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
 use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
+use tick_log::sortie::LastFrame;
 use vehicle_link::sensed::SensorWatch;
 pub use vehicle_link::snapshot::{
     AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
@@ -61,15 +62,13 @@ pub struct Vehicle {
     computer_frame: Option<Box<ComputerFrame>>,
     /// How many frames the flight computer has decided.
     frames_decided: u64,
-    /// The result of the rehearsal is already in a recorded frame.
-    rehearsed: bool,
+    last: LastFrame,
 }
 
-/// Times the flight computer, and keeps its input and output.
+/// Times the flight computer, and keeps its frame.
 struct Watcher<'a> {
     stopwatch: &'a mut dyn FnMut() -> Duration,
-    rehearsed_before: bool,
-    frame: Option<Box<ComputerFrame>>,
+    last: &'a mut LastFrame,
 }
 
 impl Watch for Watcher<'_> {
@@ -78,8 +77,7 @@ impl Watch for Watcher<'_> {
     }
 
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
-        let frame = tick_log::computer::frame_to_log(input, output, computer, self.rehearsed_before);
-        self.frame = Some(Box::new(frame));
+        self.last.decided(input, output, computer);
     }
 }
 
@@ -113,7 +111,7 @@ impl Vehicle {
             ground: Ground::default(),
             computer_frame: None,
             frames_decided: 0,
-            rehearsed: false,
+            last: LastFrame::default(),
         })
     }
 
@@ -172,12 +170,10 @@ impl Vehicle {
             people: self.people,
             requests,
         };
-        let mut watcher = Watcher { stopwatch, rehearsed_before: self.rehearsed, frame: None };
+        let mut watcher = Watcher { stopwatch, last: &mut self.last };
         let Flown { output, took } = self.sortie.step_with(&outside, &mut watcher);
-        self.computer_frame = watcher.frame;
+        self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
-        // A computer that has restarted on the pad takes it again.
-        self.rehearsed = self.computer().rehearsed().is_some();
         let mut events = Vec::new();
         let (mut released, mut answers) = (false, Vec::new());
         if let Some(output) = output {
@@ -199,7 +195,7 @@ impl Vehicle {
     /// The event for a frame in which the pilot planned.
     fn planned(&mut self, took_s: f64) -> Option<VehicleEvent> {
         self.took_s = took_s;
-        let (input, _) = self.sortie.computer().piloted()?;
+        let input = self.sortie.computer().flown()?;
         let (frame, time_s, deadline_s) = (input.frame, input.time_s, FRAME_S);
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s })
     }
@@ -385,26 +381,19 @@ impl From<News> for VehicleEvent {
 // What of a flight goes into its log beside its events.
 
 impl Vehicle {
-    /// What the flight computer was given and decided in the last frame; they come before all others, so that a flight begins
-    /// with the power-up of its computer.
+    /// The last frame of the flight computer, and what it starts from: before its first frame and behind its release. They
+    /// come before all others, so that a flight begins with the power-up of its computer.
     pub fn computer_records(&self) -> Vec<Record> {
         let Some(frame) = &self.computer_frame else { return Vec::new() };
-        let start = (self.frames_decided == 1).then(|| {
-            let start = ComputerStart { start: tick_log::sortie::pilot_start(&self.sortie) };
-            Record::ComputerStart(Box::new(start))
-        });
-        start.into_iter().chain([Record::ComputerFrame(frame.clone())]).collect()
+        let started = || Record::ComputerStart(Box::new(tick_log::sortie::start(&self.sortie)));
+        let powered_up = (self.frames_decided == 1).then(started);
+        let released = frame.output.released.then(started);
+        powered_up.into_iter().chain([Record::ComputerFrame(frame.clone())]).chain(released).collect()
     }
 
-    /// The other records of the last frame. `changed`: the phase has just changed.
-    pub fn records(&self, changed: bool) -> Vec<Record> {
-        if self.flown {
-            return tick_log::sortie::frame(&self.sortie);
-        }
-        // Let go in this frame: the first frame of the flight is the next one.
-        let just_released =
-            self.computer().released_at_s().map(f64::to_bits) == Some(self.time_s().to_bits());
-        if changed && just_released { vec![tick_log::sortie::start(&self.sortie)] } else { Vec::new() }
+    /// The other records of the last frame: in flight what the computer thought, and the truth.
+    pub fn records(&self) -> Vec<Record> {
+        if self.flown { tick_log::sortie::thought_and_truth(&self.sortie) } else { Vec::new() }
     }
 
     /// The landing as a log's record, once it is judged. Its time counts from the release, as that of the frames.

@@ -76,11 +76,11 @@ pub(crate) fn write_apogee_log(path: &Path) {
     let half = f64::sqrt(0.5);
     for frame in 0..TICKS {
         let time_s = 0.5 * frame as f64;
-        let mut tick = flight_v1::PilotTick::default();
+        let mut tick = flight_v1::ComputerFrame::default();
         tick.input.frame = frame + 1;
         tick.input.time_s = time_s;
         tick.output.phase = u32::from(Phase::AeroDescent.index());
-        log.write(&Record::PilotTick(Box::new(tick)), nanoseconds(time_s)).unwrap();
+        log.write(&Record::ComputerFrame(Box::new(tick)), nanoseconds(time_s)).unwrap();
         let truth = flight_v1::TruthSample {
             time_s,
             state: flight_v1::RigidState {

@@ -58,7 +58,7 @@ fn the_text_says_where_the_rerun_differs_and_ends() {
         ..LogHeader::default()
     };
     let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
-    writer.write(&Record::PilotStart(Box::new(log.pilot_start.unwrap())), 0).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(log.start.unwrap())), 0).unwrap();
     for tick in &log.frames[..40] {
         let mut tick = tick.clone();
         if tick.input.frame == 20 {
@@ -69,7 +69,7 @@ fn the_text_says_where_the_rerun_differs_and_ends() {
             tick.input.frame = 29;
         }
         let time_ns = (tick.input.time_s * 1e9).round() as u64;
-        writer.write(&Record::PilotTick(Box::new(tick)), time_ns).unwrap();
+        writer.write(&Record::ComputerFrame(Box::new(tick)), time_ns).unwrap();
     }
     writer.finish().unwrap();
     let recording = exported(&path, &MK2.beside("forged.rrd"));

@@ -1,7 +1,8 @@
 //! How the vehicle moved: path, states, inputs, wind, fins and sensors.
 
 use flight::rules::phase::Phase;
-use protocol::log::flight_v1::{PilotTick, TruthSample};
+use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::flight_v1::TruthSample;
 
 use super::{COMPONENTS, DEGREES};
 use crate::report::chart::{Chart, Line};
@@ -282,7 +283,7 @@ pub(super) fn descent(flight: &Flight) -> String {
 fn with_truth<'a>(
     flight: &'a Flight,
     world: &'a [&TruthSample],
-) -> impl Iterator<Item = (&'a PilotTick, &'a TruthSample)> {
+) -> impl Iterator<Item = (&'a ComputerFrame, &'a TruthSample)> {
     let frames = flight.recording.frames.iter().filter(|tick| flight.is_before_contact(tick.input.time_s));
     frames.filter_map(|tick| {
         let place = world.partition_point(|sample| sample.time_s < tick.input.time_s - 1e-4);

@@ -55,7 +55,10 @@ fn log(path: &Path) -> Outcome {
             match () {
                 () if reports.iter().any(|report| report.outcome == Verification::Diverged) => {
                     let first = reports.iter().find_map(|report| report.first_divergence.as_ref());
-                    (Checked::Diverged, first.map(|first| format!("first different at tick {}", first.tick)))
+                    (
+                        Checked::Diverged,
+                        first.map(|first| format!("first different at frame {}", first.frame)),
+                    )
                 }
                 () if all(Verification::Identical) => (Checked::Identical, None),
                 () => (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned()))),
@@ -88,7 +91,7 @@ fn flight_of(path: &Path) -> Option<String> {
     while records.len() < NAMING_RECORDS
         && let Ok(Some(stamped)) = log.next_entry()
     {
-        if matches!(stamped.entry, Entry::ComputerStart(_) | Entry::ComputerFrame(_) | Entry::PilotTick(_)) {
+        if matches!(stamped.entry, Entry::ComputerStart(_) | Entry::ComputerFrame(_)) {
             records.push(stamped.data);
         }
     }

@@ -16,12 +16,13 @@ use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
 use self::known::{Burning, Known};
 pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
 use crate::computer::memory::remembers;
+use crate::computer::{Input, Release, flight_time_s};
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::guidance::baseline::{Baseline, Law};
 use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
-use crate::rules::phase::{Mode, Phase};
+use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::dynamics::PlanarState;
@@ -42,12 +43,12 @@ pub enum Sensed {
     Known(Estimate),
 }
 
-/// Everything a frame depends on besides the pilot's memory.
+/// Everything that a frame in the air depends on besides the pilot's memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PilotInput {
-    /// Number of the frame.
+    /// Number of the frame since the release.
     pub frame: u64,
-    /// End of the frame, s.
+    /// Time from the release to the end of the frame, s.
     pub time_s: f64,
     pub sensed: Sensed,
     /// Fin angles reported by the servos, rad.
@@ -58,8 +59,21 @@ pub struct PilotInput {
     pub igniter_continuity: bool,
     /// The wire between booster and vehicle is whole.
     pub booster_attached: bool,
-    /// The operator asked for an abort.
-    pub abort: bool,
+}
+
+impl PilotInput {
+    pub(super) fn of(input: &Input<'_>, release: Release) -> Self {
+        let frame = input.frame.saturating_sub(release.frame);
+        Self {
+            frame,
+            time_s: flight_time_s(frame),
+            sensed: input.sensed,
+            fins_rad: input.fins_rad,
+            contact: input.contact,
+            igniter_continuity: input.igniter_continuity,
+            booster_attached: input.booster_attached,
+        }
+    }
 }
 
 /// The commands to the booster.
@@ -73,21 +87,15 @@ pub struct BoosterCommands {
 
 remembers!(BoosterCommands { ignite, separate });
 
-/// The commands of a frame.
+/// Where a frame points the vehicle. What it lights and ejects follows from the phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PilotOutput {
+pub(super) struct PilotOutput {
     /// Gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Fin openings, rad.
     pub fins_rad: [f64; 4],
-    /// Current through the landing motor's igniter.
-    pub ignite: bool,
-    /// The parachute is released.
-    pub parachute: bool,
     /// To the booster.
     pub booster: BoosterCommands,
-    /// The phase after the frame.
-    pub phase: Phase,
     /// What decided where the nose points.
     pub level: ControlLevel,
 }
@@ -292,7 +300,7 @@ impl Pilot {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
         let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
         let estimate = self.estimate.as_ref()?;
-        // As in the frame itself, `Pilot::step`.
+        // As in the frame itself, `Pilot::fly`.
         let density_kg_m3 =
             Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
         let mass = self.known.mass_now(Some(burning_s));
@@ -395,23 +403,46 @@ pub(super) mod sample {
     use nalgebra::Vector3;
 
     use super::{Pilot, PilotInput, Sensed};
-    use crate::computer::Computer;
     use crate::computer::table::PhaseTable;
+    use crate::computer::{Computer, Input, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
     use crate::guidance::baseline::Law;
+    use crate::rules::arming::Uplink;
     use crate::vehicle::rigid::RigidState;
 
     /// A phase table as it is right after the release.
     pub(super) fn released() -> PhaseTable {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
         let computer = Computer::at_power_up(&mission, Law::Nmpc, &RigidState::upright(300.0));
-        computer.released().into_table()
+        computer.released(0).into_table()
     }
 
     /// The pilot of mk2, upright at rest, 300 m up.
     pub(super) fn falling() -> Pilot {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
         Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
+    }
+
+    /// The input of a computer that was released at once.
+    pub(in crate::computer) fn in_the_air(input: &PilotInput) -> Input<'static> {
+        Input {
+            frame: input.frame,
+            time_s: input.time_s,
+            sensed: input.sensed,
+            gimbal_rad: [0.0; 2],
+            fins_rad: input.fins_rad,
+            contact: input.contact,
+            igniter_continuity: input.igniter_continuity,
+            booster_attached: input.booster_attached,
+            pin_out: true,
+            battery_v: None,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            people: None,
+            requests: &[],
+            rehearsed: None,
+        }
     }
 
     /// The input of a frame with almost no specific force, turning at a rate.
@@ -429,7 +460,6 @@ pub(super) mod sample {
             contact: false,
             igniter_continuity: true,
             booster_attached: false,
-            abort: false,
         }
     }
 }
@@ -443,7 +473,7 @@ mod tests {
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
-        pilot.step(&mut released(), &input(1, 0.0));
+        pilot.look(&mut released(), &input(1, 0.0));
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);

@@ -203,12 +203,25 @@ mod tests {
 
     use crate::computer::pilot::sample::{self, input, released};
     use crate::computer::pilot::{PilotInput, Sensed};
+    use crate::computer::table::PhaseTable;
     use crate::estimation::estimator::StartUncertainty;
     use crate::vehicle::rigid::RigidState;
 
+    /// One frame, in which the crew may abort.
+    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &PilotInput, abort: bool) -> [f64; 4] {
+        pilot.look(table, input);
+        if abort {
+            let event = pilot.abort_event(table.mode(), Some(input));
+            pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
+        }
+        pilot.fly(table, input).fins_rad
+    }
+
     /// Whether an abort in the very next frame releases the parachute.
     fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {
-        pilot.step(&mut released(), &PilotInput { abort: true, ..input(frame, 0.0) }).parachute
+        let mut table = released();
+        frame_with(pilot, &mut table, &input(frame, 0.0), true);
+        table.mode().phase == Phase::Chute
     }
 
     #[test]
@@ -237,6 +250,8 @@ mod tests {
     /// What is wrong in a fall, at the height of the centre of gravity, m.
     type Wrong = fn(f64, &mut Estimate, &mut PilotInput);
 
+    const NO_ABORT_M: f64 = 0.0;
+
     const NOTHING: Wrong = |_, _, _| {};
 
     /// How a fall at 38 m/s ended.
@@ -250,8 +265,9 @@ mod tests {
         Unbraked,
     }
 
-    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m.
-    fn fall(wrong: Wrong) -> Ended {
+    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m. The crew
+    /// aborts below a height.
+    fn fall(wrong: Wrong, abort_below_m: f64) -> Ended {
         let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::starting(&mission, 0.0, &start, &StartUncertainty::at_apogee());
@@ -268,21 +284,29 @@ mod tests {
                 contact: false,
                 igniter_continuity: true,
                 booster_attached: false,
-                abort: false,
             };
             wrong(height_m, &mut estimate, &mut input);
-            let output = pilot.step(&mut table, &PilotInput { sensed: Sensed::Known(estimate), ..input });
-            fins_rad = output.fins_rad;
+            let input = PilotInput { sensed: Sensed::Known(estimate), ..input };
+            let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
+            fins_rad = frame_with(&mut pilot, &mut table, &input, aborts);
+            let phase = table.mode().phase;
             let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
-            let parachute = output.parachute.then_some(Ended::Parachute(height_m, lost));
-            parachute.or_else(|| output.ignite.then_some(Ended::Ignition(height_m)))
+            match phase {
+                Phase::Chute => Some(Ended::Parachute(height_m, lost)),
+                Phase::Ignition => Some(Ended::Ignition(height_m)),
+                _ => None,
+            }
         });
         ended.unwrap_or(Ended::Unbraked)
     }
 
     #[track_caller]
     fn assert_parachute(wrong: Wrong, between_m: core::ops::Range<f64>) {
-        let ended = fall(wrong);
+        assert_ended_with_the_parachute(fall(wrong, NO_ABORT_M), between_m);
+    }
+
+    #[track_caller]
+    fn assert_ended_with_the_parachute(ended: Ended, between_m: core::ops::Range<f64>) {
         let filled = matches!(ended, Ended::Parachute(at_m, false) if between_m.contains(&at_m));
         assert!(filled, "{ended:?}, not between {between_m:?} m");
     }
@@ -292,7 +316,7 @@ mod tests {
 
     #[test]
     fn a_fall_with_nothing_wrong_ends_with_the_ignition() {
-        let ended = fall(NOTHING);
+        let ended = fall(NOTHING, NO_ABORT_M);
         assert!(matches!(ended, Ended::Ignition(at_m) if (60.0..80.0).contains(&at_m)), "{ended:?}");
     }
 
@@ -311,7 +335,7 @@ mod tests {
 
     #[test]
     fn inside_the_fence_it_lands() {
-        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0);
+        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0, NO_ABORT_M);
         assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
     }
 
@@ -333,15 +357,16 @@ mod tests {
     /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for somewhat longer.
     #[test]
     fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
-        let Ended::Ignition(due_m) = fall(NOTHING) else { panic!("no ignition") };
-        let ended = fall(|height_m, estimate, _| {
+        let Ended::Ignition(due_m) = fall(NOTHING, NO_ABORT_M) else { panic!("no ignition") };
+        let turning: Wrong = |height_m, estimate, _| {
             estimate.state.rate_rad_s.y = if height_m > 66.0 && height_m < 80.0 { 1.2 } else { 0.0 };
-        });
+        };
+        let ended = fall(turning, NO_ABORT_M);
         assert!(matches!(ended, Ended::Ignition(at_m) if at_m < 66.0 && at_m < due_m), "{ended:?}");
     }
 
     #[test]
     fn an_operators_abort_with_the_gate_shut_brings_the_parachute_while_it_fills() {
-        assert_parachute(|height_m, _, input| input.abort = height_m < 86.0, 85.0..86.0);
+        assert_ended_with_the_parachute(fall(NOTHING, 86.0), 85.0..86.0);
     }
 }

@@ -14,7 +14,7 @@ use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::guidance::descent::DescentSituation;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::gate::{GateInput, gate_checks};
-use crate::rules::phase::{Effect, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase};
+use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::fins::Moments;
@@ -55,17 +55,15 @@ fn on_the_way_up(
 }
 
 impl Pilot {
-    /// One frame. Every event goes through the `table`.
-    pub(crate) fn step(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
-        let time_s = input.time_s;
+    /// The first part of a frame, before the crew is answered: estimate, motor, ascent, outlook. Every event goes through
+    /// the `table`.
+    pub(in crate::computer) fn look(&mut self, table: &mut PhaseTable, input: &PilotInput) {
         let estimate = self.sense(table.mode().phase, input);
         self.estimate = Some(estimate);
-        let density_kg_m3 =
-            Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
+        let density_kg_m3 = self.density_kg_m3(&estimate);
         self.feel(table.mode().phase, input, &estimate, density_kg_m3);
         // Before the outlook: at apogee an abort has to know at once whether the parachute has room.
         self.watch_the_ascent(table, input, &estimate);
-        let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         // A drop lasts for two seconds or three, and its speed changes all the time.
         let dropped = self.known.mission.start.at == StartPoint::Drone;
         let far = table.mode().phase == Phase::AeroDescent && !dropped;
@@ -77,8 +75,19 @@ impl Pilot {
             self.look_ahead(&estimate, density_kg_m3);
         }
         self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
+    }
+
+    /// The second part of a frame: move through the phases, plan, point fins and gimbal.
+    pub(in crate::computer) fn fly(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
+        let time_s = input.time_s;
+        // Where nobody has looked, the last commands hold.
+        let Some(estimate) = self.estimate else {
+            return self.pointing(table.mode(), ControlLevel::Idle);
+        };
+        let density_kg_m3 = self.density_kg_m3(&estimate);
         self.move_through_phases(table, input, &estimate);
         let mode = *table.mode();
+        let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
 
         let burning_s = self.known.burning_s(time_s);
         let mass = self.known.mass_now(burning_s);
@@ -105,22 +114,28 @@ impl Pilot {
             };
             self.fins_rad = self.fins(&mode, &estimate, &mass, density_kg_m3, burning.is_some());
         }
+        let level = match flying {
+            true if by_baseline.is_some() => ControlLevel::Stabiliser,
+            true => self.powered.report().level,
+            false => ControlLevel::Idle,
+        };
+        self.pointing(&mode, level)
+    }
+
+    fn pointing(&self, mode: &Mode, level: ControlLevel) -> PilotOutput {
         PilotOutput {
             gimbal_rad: self.gimbal_rad,
             fins_rad: self.fins_rad,
-            ignite: mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited,
-            parachute: mode.phase == Phase::Chute,
             booster: BoosterCommands {
                 ignite: mode.phase == Phase::Boost && !self.ascent.has_lifted_off(),
                 separate: self.ascent.separates(),
             },
-            phase: mode.phase,
-            level: match flying {
-                true if by_baseline.is_some() => ControlLevel::Stabiliser,
-                true => self.powered.report().level,
-                false => ControlLevel::Idle,
-            },
+            level,
         }
+    }
+
+    fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
+        Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
     }
 
     /// Commands of the simpler law, if one flies the landing burn: gimbal and fins, rad.
@@ -260,11 +275,6 @@ impl Pilot {
 
     fn move_through_phases(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
         let time_s = input.time_s;
-        if input.abort {
-            let gate_open = self.gate_open(table.mode(), input, estimate);
-            let above_commit_height = self.parachute_has_room(gate_open);
-            self.happen(table, Event::AbortRequested { above_commit_height, gate_open }, time_s);
-        }
         if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate) {
             self.happen(table, hopeless, time_s);
         }
@@ -331,7 +341,7 @@ impl Pilot {
         (below_m >= 0.0).then(|| below_m / (-ignition.onset_vertical_m_s).max(1.0))
     }
 
-    /// The event that an abort in the next frame would be, from the findings of the last frame, if there was one.
+    /// The event that an abort is now, from the findings of the last frame, if there was one.
     pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&PilotInput>) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open = found.is_some_and(|(input, estimate)| {
@@ -385,9 +395,24 @@ impl Pilot {
 
     /// Applies an event. If the table refuses it, nothing changes.
     fn happen(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
-        if table.happen(event).is_ok_and(|effects| effects.contains(Effect::IgniteLandingMotor)) {
+        let _ = self.told(table, event, time_s);
+    }
+
+    /// Applies an event, from whomever it comes.
+    ///
+    /// # Errors
+    /// The table refuses it, and nothing has changed.
+    pub(in crate::computer) fn told(
+        &mut self,
+        table: &mut PhaseTable,
+        event: Event,
+        time_s: f64,
+    ) -> Result<Effects, Refusal> {
+        let effects = table.happen(event)?;
+        if effects.contains(Effect::IgniteLandingMotor) {
             self.ignited_at_s = Some(time_s);
         }
+        Ok(effects)
     }
 
     fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {

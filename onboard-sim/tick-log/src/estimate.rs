@@ -1,19 +1,16 @@
-//! Converts the pilot's frames between its own types and log records, bit for bit.
+//! Converts states, measurements and estimates between the flight computer's types and log records, bit for bit.
 
-use flight::computer::pilot::{BoosterCommands, PilotInput, PilotOutput, Sensed};
 use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
 use flight::estimation::motor_estimate::MotorEstimate;
-use flight::guidance::powered::ControlLevel;
-use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
 use log_records::flight_v1 as v1;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 
-/// Why a recorded frame cannot be given to this build's pilot.
+/// Why a recorded frame cannot be given to this build's flight computer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum PilotLogError {
+pub enum RecordError {
     /// A number has no meaning in this build.
     #[error("frame {frame}: {what} {found} is unknown; this build knows 0 to {most}")]
     Unknown {
@@ -179,10 +176,10 @@ pub fn motor_to_log(motor: &MotorEstimate) -> Option<v1::MotorEstimate> {
 ///
 /// # Errors
 /// This build does not know its health.
-pub fn estimate_from_log(estimate: &v1::Estimate, frame: u64) -> Result<Estimate, PilotLogError> {
+pub fn estimate_from_log(estimate: &v1::Estimate, frame: u64) -> Result<Estimate, RecordError> {
     let sigmas = &estimate.sigmas;
     let found = estimate.health;
-    let unknown = PilotLogError::Unknown { frame, what: "health", found, most: DOUBTS.len() };
+    let unknown = RecordError::Unknown { frame, what: "health", found, most: DOUBTS.len() };
     let health = match found.checked_sub(1) {
         None => Health::Good,
         Some(index) => Health::Doubtful(*DOUBTS.get(index as usize).ok_or(unknown)?),
@@ -211,96 +208,13 @@ pub fn estimate_from_log(estimate: &v1::Estimate, frame: u64) -> Result<Estimate
     })
 }
 
-/// A frame's input as a record.
-pub fn input_to_log(input: &PilotInput) -> v1::PilotInput {
-    let (measured, known) = match &input.sensed {
-        Sensed::Measured(measurements) => (Some(measurements_to_log(measurements)), None),
-        Sensed::Known(estimate) => (None, Some(estimate_to_log(estimate))),
-    };
-    v1::PilotInput {
-        frame: input.frame,
-        time_s: input.time_s,
-        measured,
-        known,
-        fins_rad: input.fins_rad.to_vec(),
-        contact: input.contact,
-        igniter_continuity: input.igniter_continuity,
-        abort: input.abort,
-        booster_attached: input.booster_attached.then_some(true),
-    }
-}
-
-/// A recorded input.
-///
-/// # Errors
-/// This build does not know some value of it.
-pub fn input_from_log(input: &v1::PilotInput) -> Result<PilotInput, PilotLogError> {
-    let frame = input.frame;
-    let sensed = match (&input.measured, &input.known) {
-        (Some(measurements), None) => Sensed::Measured(measurements_from_log(measurements)),
-        (None, Some(estimate)) => Sensed::Known(estimate_from_log(estimate, frame)?),
-        _ => return Err(PilotLogError::Sensed { frame }),
-    };
-    Ok(PilotInput {
-        frame,
-        time_s: input.time_s,
-        sensed,
-        fins_rad: list(&input.fins_rad, frame, "fin angles")?,
-        contact: input.contact,
-        igniter_continuity: input.igniter_continuity,
-        abort: input.abort,
-        booster_attached: input.booster_attached.unwrap_or(false),
-    })
-}
-
-/// A frame's output as a record.
-pub fn output_to_log(output: &PilotOutput) -> v1::PilotOutput {
-    v1::PilotOutput {
-        gimbal_rad: output.gimbal_rad.to_vec(),
-        fins_rad: output.fins_rad.to_vec(),
-        ignite: output.ignite,
-        parachute: output.parachute,
-        phase: u32::from(output.phase.index()),
-        level: u32::from(output.level.index()),
-        ignite_booster: output.booster.ignite.then_some(true),
-        separate_booster: output.booster.separate.then_some(true),
-    }
-}
-
-/// The recorded output of a frame.
-///
-/// # Errors
-/// This build does not know some value of it.
-pub fn output_from_log(output: &v1::PilotOutput, frame: u64) -> Result<PilotOutput, PilotLogError> {
-    let unknown = |what, found, known: usize| PilotLogError::Unknown { frame, what, found, most: known - 1 };
-    let phase = u8::try_from(output.phase).ok().and_then(Phase::from_index);
-    let level = ControlLevel::ALL.get(output.level as usize).copied();
-    Ok(PilotOutput {
-        gimbal_rad: list(&output.gimbal_rad, frame, "gimbal angles")?,
-        fins_rad: list(&output.fins_rad, frame, "fin angles")?,
-        ignite: output.ignite,
-        parachute: output.parachute,
-        phase: phase.ok_or_else(|| unknown("phase", output.phase, Phase::ALL.len()))?,
-        level: level.ok_or_else(|| unknown("control level", output.level, ControlLevel::ALL.len()))?,
-        booster: BoosterCommands {
-            ignite: output.ignite_booster.unwrap_or(false),
-            separate: output.separate_booster.unwrap_or(false),
-        },
-    })
-}
-
 pub(crate) fn list<const N: usize>(
     values: &[f64],
     frame: u64,
     what: &'static str,
-) -> Result<[f64; N], PilotLogError> {
-    let wrong = |_| PilotLogError::Length { frame, what, found: values.len(), should: N };
+) -> Result<[f64; N], RecordError> {
+    let wrong = |_| RecordError::Length { frame, what, found: values.len(), should: N };
     values.try_into().map_err(wrong)
-}
-
-/// A whole frame as a record. `state_digest` is the pilot's [digest](flight::computer::pilot::Pilot::digest) after it.
-pub fn tick_to_log(input: &PilotInput, output: &PilotOutput, state_digest: u64) -> v1::PilotTick {
-    v1::PilotTick { input: input_to_log(input), output: output_to_log(output), state_digest }
 }
 
 #[cfg(test)]
@@ -370,65 +284,20 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_frame_survives_the_log_bit_for_bit(
+        fn an_estimate_and_measurements_survive_the_log_bit_for_bit(
             frame: u64,
-            numbers in prop::collection::vec(any_bits(), 56),
+            numbers in prop::collection::vec(any_bits(), 45),
             there: [bool; 3],
-            flags: [bool; 7],
             health in 0..=DOUBTS.len(),
-            phase in 0..Phase::ALL.len(),
-            level in 0..ControlLevel::ALL.len(),
         ) {
-            let sensed = if flags[3] {
-                Sensed::Measured(measurements(&numbers, there))
-            } else {
-                Sensed::Known(estimate(&numbers, health))
-            };
-            let input = PilotInput {
-                frame,
-                time_s: numbers[45],
-                sensed,
-                fins_rad: [46, 47, 48, 49].map(|place: usize| numbers[place]),
-                contact: flags[0],
-                igniter_continuity: flags[1],
-                abort: flags[2],
-                booster_attached: flags[4],
-            };
-            let output = PilotOutput {
-                gimbal_rad: [numbers[50], numbers[51]],
-                fins_rad: [52, 53, 54, 55].map(|place: usize| numbers[place]),
-                ignite: flags[1],
-                parachute: flags[2],
-                phase: Phase::ALL[phase],
-                level: ControlLevel::ALL[level],
-                booster: BoosterCommands { ignite: flags[5], separate: flags[6] },
-            };
-            let bytes = tick_to_log(&input, &output, frame).encode_to_vec();
-            let read = v1::PilotTick::decode(bytes.as_slice()).unwrap();
-            let (input_read, output_read) =
-                (input_from_log(&read.input).unwrap(), output_from_log(&read.output, frame).unwrap());
-            // Compared as bytes as well, because a NaN never equals itself.
-            prop_assert_eq!(tick_to_log(&input_read, &output_read, frame).encode_to_vec(), bytes);
-            prop_assert_eq!(input_read.time_s.to_bits(), input.time_s.to_bits());
-            prop_assert_eq!((input_read.frame, input_read.booster_attached), (frame, flags[4]));
-            prop_assert_eq!(output_read.booster, output.booster);
-            prop_assert_eq!((output_read.phase, output_read.level), (output.phase, output.level));
+            // Compared as bytes, because a NaN never equals itself.
+            let bytes = estimate_to_log(&estimate(&numbers, health)).encode_to_vec();
+            let read = estimate_from_log(&v1::Estimate::decode(bytes.as_slice()).unwrap(), frame).unwrap();
+            prop_assert_eq!(estimate_to_log(&read).encode_to_vec(), bytes);
+            let bytes = measurements_to_log(&measurements(&numbers, there)).encode_to_vec();
+            let read = measurements_from_log(&v1::Measurements::decode(bytes.as_slice()).unwrap());
+            prop_assert_eq!(measurements_to_log(&read).encode_to_vec(), bytes);
+            prop_assert_eq!(read.imu.gyro_rad_s.x.to_bits(), numbers[0].to_bits());
         }
-    }
-
-    #[test]
-    fn an_unknown_value_is_refused_with_its_number() {
-        let output = v1::PilotOutput {
-            gimbal_rad: vec![0.0; 2],
-            fins_rad: vec![0.0; 4],
-            phase: 13,
-            ..v1::PilotOutput::default()
-        };
-        let error = output_from_log(&output, 7).unwrap_err().to_string();
-        assert_eq!(error, "frame 7: phase 13 is unknown; this build knows 0 to 12");
-        let error = output_from_log(&v1::PilotOutput { fins_rad: vec![0.0], ..output }, 7).unwrap_err();
-        assert_eq!(error.to_string(), "frame 7: fin angles has 1 values and should have 4");
-        let error = input_from_log(&v1::PilotInput { frame: 8, ..v1::PilotInput::default() }).unwrap_err();
-        assert_eq!(error, PilotLogError::Sensed { frame: 8 });
     }
 }

@@ -1,17 +1,19 @@
-//! Converts the flight computer's frames from power-up on between its own types and log records, bit for bit.
+//! Converts the flight computer's frames between its own types and log records, bit for bit.
 
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, People, Request};
-use flight::computer::pilot::Sensed;
-use flight::computer::{Commander, Computer, Input, LogState, Output, Rehearsed};
+use flight::computer::pilot::{BoosterCommands, Sensed};
+use flight::computer::{Commander, Commands, Computer, Input, LogState, Output, Rehearsed};
+use flight::guidance::powered::ControlLevel;
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
+use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use log_records::computer_v1 as v1;
 
-use crate::pilot::{
-    PilotLogError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
+use crate::estimate::{
+    RecordError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
 };
 
 /// Requests, by their number in the log.
@@ -28,7 +30,7 @@ const ASKED: [Asked; 10] = [
     Asked::EndCheck,
 ];
 
-/// A frame's input, read from a log.
+/// A frame's input that owns its lists: read from a log, or by a board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedInput {
     requests: Vec<Request>,
@@ -37,6 +39,11 @@ pub struct LoggedInput {
 }
 
 impl LoggedInput {
+    /// `rest` is everything but requests and rehearsal.
+    pub fn new(rest: Input<'static>, requests: Vec<Request>, rehearsed: Option<Rehearsed>) -> Self {
+        Self { requests, rehearsed, rest }
+    }
+
     /// The input, as the flight computer takes it.
     pub fn input(&self) -> Input<'_> {
         Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
@@ -65,34 +72,52 @@ pub fn frame_to_log(
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-    let (measured, known) = match &input.sensed {
+    let &Input {
+        frame,
+        time_s,
+        ref sensed,
+        gimbal_rad,
+        fins_rad,
+        contact,
+        igniter_continuity,
+        booster_attached,
+        pin_out,
+        battery_v,
+        log: LogState { running: log_running, space_bytes: log_space_bytes },
+        uplink,
+        ref commander,
+        people,
+        requests,
+        rehearsed,
+    } = input;
+    let (measured, known) = match sensed {
         Sensed::Measured(measurements) => (Some(measurements_to_log(measurements)), None),
         Sensed::Known(estimate) => (None, Some(estimate_to_log(estimate))),
     };
     v1::ComputerInput {
-        frame: input.frame,
-        time_s: input.time_s,
+        frame,
+        time_s,
         measured,
         known,
-        gimbal_rad: input.gimbal_rad.to_vec(),
-        fins_rad: input.fins_rad.to_vec(),
-        contact: input.contact,
-        igniter_continuity: input.igniter_continuity,
-        pin_out: input.pin_out,
-        log_running: input.log.running,
-        log_space_bytes: input.log.space_bytes,
-        uplink: uplink_to_log(input.uplink),
-        commander: input.commander.as_ref().map(commander_to_log),
-        requests: input.requests.iter().map(request_to_log).collect(),
-        rehearsed: input.rehearsed.map(|rehearsed| v1::Rehearsed {
+        gimbal_rad: gimbal_rad.to_vec(),
+        fins_rad: fins_rad.to_vec(),
+        contact,
+        igniter_continuity,
+        pin_out,
+        log_running,
+        log_space_bytes,
+        uplink: uplink_to_log(uplink),
+        commander: commander.as_ref().map(commander_to_log),
+        requests: requests.iter().map(request_to_log).collect(),
+        rehearsed: rehearsed.map(|rehearsed| v1::Rehearsed {
             warm: rehearsed.warm,
             found: rehearsed.found.clone(),
             lands: rehearsed.landing.as_ref().map(|landing| landing.lands),
             landing_found: rehearsed.landing.as_ref().map(|landing| landing.found.clone()),
         }),
-        booster_attached: input.booster_attached.then_some(true),
-        people: input.people.map(people_to_log),
-        battery_v: input.battery_v,
+        booster_attached: booster_attached.then_some(true),
+        people: people.map(people_to_log),
+        battery_v,
     }
 }
 
@@ -100,12 +125,12 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 ///
 /// # Errors
 /// This build does not know some value of it.
-pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, PilotLogError> {
+pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let frame = input.frame;
     let sensed = match (&input.measured, &input.known) {
         (Some(measurements), None) => Sensed::Measured(measurements_from_log(measurements)),
         (None, Some(estimate)) => Sensed::Known(estimate_from_log(estimate, frame)?),
-        _ => return Err(PilotLogError::Sensed { frame }),
+        _ => return Err(RecordError::Sensed { frame }),
     };
     let commander = input.commander.as_ref().map(|commander| commander_from_log(commander, frame));
     let rest = Input {
@@ -157,18 +182,49 @@ fn ending_to_log(ending: Ending) -> u32 {
 
 /// A frame's output as a record; `computer` has just flown it.
 pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
+    let Output { commands, released, answers, news: _, planned } = output;
+    let &Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = commands;
     v1::ComputerOutput {
-        gimbal_rad: output.commands.gimbal_rad.to_vec(),
-        fins_rad: output.commands.fins_rad.to_vec(),
-        ignite: output.commands.ignite,
-        parachute: output.commands.parachute,
-        released: output.released,
-        planned: output.planned,
+        gimbal_rad: gimbal_rad.to_vec(),
+        fins_rad: fins_rad.to_vec(),
+        ignite,
+        parachute,
+        released: *released,
+        planned: *planned,
         phase: u32::from(computer.mode().phase.index()),
-        answers: output.answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
-        ignite_booster: output.commands.booster.ignite.then_some(true),
-        separate_booster: output.commands.booster.separate.then_some(true),
+        level: u32::from(computer.level().index()),
+        over: computer.is_over(),
+        answers: answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
+        ignite_booster: booster.ignite.then_some(true),
+        separate_booster: booster.separate.then_some(true),
     }
+}
+
+/// The commands of a recorded frame.
+///
+/// # Errors
+/// A list has the wrong length.
+pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Commands, RecordError> {
+    Ok(Commands {
+        gimbal_rad: list(&output.gimbal_rad, frame, "gimbal angles")?,
+        fins_rad: list(&output.fins_rad, frame, "fin angles")?,
+        ignite: output.ignite,
+        parachute: output.parachute,
+        booster: BoosterCommands {
+            ignite: output.ignite_booster.unwrap_or(false),
+            separate: output.separate_booster.unwrap_or(false),
+        },
+    })
+}
+
+/// The control level of a recorded frame; `None` if this build does not know it.
+pub fn level_of(output: &v1::ComputerOutput) -> Option<ControlLevel> {
+    u8::try_from(output.level).ok().and_then(ControlLevel::from_index)
+}
+
+/// The phase after a recorded frame; `None` if this build does not know it.
+pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
+    u8::try_from(output.phase).ok().and_then(Phase::from_index)
 }
 
 /// The station that armed the vehicle as a record.
@@ -187,7 +243,7 @@ pub fn commander_to_log(commander: &Commander) -> v1::Commander {
 ///
 /// # Errors
 /// This build does not know some value of it.
-pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, PilotLogError> {
+pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, RecordError> {
     let station = station_from_log((commander.system, commander.component, commander.station), frame)?;
     let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
     Ok(Commander { station, age_s: commander.age_s, by })
@@ -230,9 +286,9 @@ pub fn request_to_log(request: &Request) -> v1::Request {
 ///
 /// # Errors
 /// This build does not know some value of it.
-pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, PilotLogError> {
+pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, RecordError> {
     let unknown =
-        PilotLogError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
+        RecordError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
     let ids = request.system.zip(request.component);
     let station =
         ids.map(|(system, component)| station_from_log((system, component, request.station), frame));
@@ -248,7 +304,7 @@ pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, Pi
 fn station_from_log(
     (system, component, number): (u32, u32, Option<u32>),
     frame: u64,
-) -> Result<Station, PilotLogError> {
+) -> Result<Station, RecordError> {
     Ok(Station {
         system: byte(system, frame, "system")?,
         component: byte(component, frame, "component")?,
@@ -264,9 +320,9 @@ fn operator_to_log(operator: &Operator) -> v1::Operator {
     }
 }
 
-fn operator_from_log(operator: &v1::Operator, frame: u64) -> Result<Operator, PilotLogError> {
+fn operator_from_log(operator: &v1::Operator, frame: u64) -> Result<Operator, RecordError> {
     let most = Role::ALL.len() - 1;
-    let unknown = PilotLogError::Unknown { frame, what: "role", found: operator.role, most };
+    let unknown = RecordError::Unknown { frame, what: "role", found: operator.role, most };
     Ok(Operator {
         number: byte(operator.number, frame, "operator")?,
         role: *Role::ALL.get(operator.role as usize).ok_or(unknown)?,
@@ -281,22 +337,22 @@ fn people_to_log(people: People) -> v1::People {
     }
 }
 
-fn people_from_log(people: &v1::People, frame: u64) -> Result<People, PilotLogError> {
+fn people_from_log(people: &v1::People, frame: u64) -> Result<People, RecordError> {
     match (people.count, people.first_ask) {
         (1, _) => Ok(People::One),
         (2, Some(first_ask)) => Ok(People::Two { first_ask: short(first_ask, frame, "first ask")? }),
-        (found, _) => Err(PilotLogError::Unknown { frame, what: "crew", found, most: 2 }),
+        (found, _) => Err(RecordError::Unknown { frame, what: "crew", found, most: 2 }),
     }
 }
 
-fn short(number: u32, frame: u64, what: &'static str) -> Result<u16, PilotLogError> {
+fn short(number: u32, frame: u64, what: &'static str) -> Result<u16, RecordError> {
     let most = usize::from(u16::MAX);
-    u16::try_from(number).map_err(|_too_large| PilotLogError::Unknown { frame, what, found: number, most })
+    u16::try_from(number).map_err(|_too_large| RecordError::Unknown { frame, what, found: number, most })
 }
 
-fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, PilotLogError> {
+fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, RecordError> {
     let most = usize::from(u8::MAX);
-    u8::try_from(number).map_err(|_too_large| PilotLogError::Unknown { frame, what, found: number, most })
+    u8::try_from(number).map_err(|_too_large| RecordError::Unknown { frame, what, found: number, most })
 }
 
 #[cfg(test)]
@@ -428,6 +484,6 @@ mod tests {
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
         let both = v1::ComputerInput { known: Some(log_records::flight_v1::Estimate::default()), ..input };
-        assert_eq!(input_from_log(&both).unwrap_err(), PilotLogError::Sensed { frame: 7 });
+        assert_eq!(input_from_log(&both).unwrap_err(), RecordError::Sensed { frame: 7 });
     }
 }
