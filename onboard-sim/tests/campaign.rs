@@ -7,12 +7,12 @@ use std::process::{Command, Output};
 
 use flight::computer::Computer;
 use flight::guidance::baseline::Law;
+use flight_log::estimate::state_from_log;
+use flight_log::frame::{input_from_log, output_to_log};
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{ATTACHMENT_PROFILE, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
-use tick_log::estimate::state_from_log;
-use tick_log::frame::{input_from_log, output_to_log};
 
 fn campaign(directory: &Path, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_onboard-sim");

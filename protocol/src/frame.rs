@@ -9,7 +9,7 @@ use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use mavlink_core::{MavlinkVersion, Message as _};
+use mavlink::{MavlinkVersion, Message as _};
 
 use crate::dialect::MavMessage;
 use crate::identity::Address;
@@ -124,7 +124,7 @@ impl Frame {
         let mut bytes = self.bytes[..crc_at].to_vec();
         bytes[2] = flags;
         // The id of a frame is always in the dialect; the framer checks it.
-        let crc = mavlink_core::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
+        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra(self.message_id()).unwrap_or(0));
         bytes.extend_from_slice(&crc.to_le_bytes());
         Self { bytes }
     }
@@ -243,7 +243,7 @@ impl Encoder {
             id[2],
         ]);
         bytes.extend_from_slice(payload);
-        let crc = mavlink_core::calculate_crc(&bytes[1..], crc_extra);
+        let crc = mavlink::calculate_crc(&bytes[1..], crc_extra);
         bytes.extend_from_slice(&crc.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
         Frame { bytes }
@@ -401,7 +401,7 @@ fn examine(candidate: &[u8]) -> Candidate {
         return Candidate::Incomplete;
     }
     let found = u16::from_le_bytes([candidate[crc_at], candidate[crc_at + 1]]);
-    if mavlink_core::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
+    if mavlink::calculate_crc(&candidate[1..crc_at], crc_extra) == found {
         Candidate::Whole(len)
     } else {
         Candidate::BadCrc

@@ -66,6 +66,8 @@
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 extern crate alloc;
+// The generated dialect names it so.
+extern crate mavlink as mavlink_core;
 
 #[cfg(feature = "std")]
 pub mod book;

@@ -4,7 +4,7 @@
 //! PARAM_SET with a type that the dialect does not know must be answered, too. Values are MAV_PARAM_TYPE_REAL32.
 
 use alloc::string::String;
-use mavlink_core::types::CharArray;
+use mavlink::types::CharArray;
 
 use crate::dialect::{MavMessage, MavParamError, MavParamType, PARAM_ERROR_DATA, PARAM_VALUE_DATA};
 use crate::frame::Frame;

@@ -8,7 +8,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use mavlink_core::types::CharArray;
+use mavlink::types::CharArray;
 
 use crate::dialect::{MavSeverity, STATUSTEXT_DATA};
 use crate::identity::Address;

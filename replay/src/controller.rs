@@ -9,13 +9,13 @@ use flight::guidance::powered::{ControlLevel, LandingSolved, Plane};
 use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
+pub use flight_log::again::FrameError;
+use flight_log::again::RecordedComputer;
+use flight_log::frame::{LoggedInput, level_of, phase_of};
 use nalgebra::Vector3;
 use nmpc::SolveStatus;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
-pub use tick_log::again::FrameError;
-use tick_log::again::RecordedComputer;
-use tick_log::frame::{LoggedInput, level_of, phase_of};
 
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
 

@@ -15,7 +15,7 @@ use board::recorded::Board;
 use board::stream::{Answer, Reader};
 use clap::{Parser, Subcommand};
 use flight::rules::phase::Phase;
-use tick_log::frame::phase_of;
+use flight_log::frame::phase_of;
 
 /// The flight computer as a program for a board.
 #[derive(Parser)]

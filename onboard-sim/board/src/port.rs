@@ -2,8 +2,8 @@
 
 use flight::computer::news::News;
 use flight::computer::{Commands, Computer, Input, Output, flight_time_s};
+use flight_log::frame::{LoggedInput, frame_to_log};
 use log_records::computer_v1::ComputerFrame;
-use tick_log::frame::{LoggedInput, frame_to_log};
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {

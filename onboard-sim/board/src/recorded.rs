@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 use flight::computer::Output;
 use flight::computer::saved::Saved;
 use flight::guidance::baseline::Controller;
+use flight_log::again::{FrameError, RecordedComputer, mission_flown};
+use flight_log::frame::output_to_log;
 use log_records::computer_v1::ComputerInput;
-use tick_log::again::{FrameError, RecordedComputer, mission_flown};
-use tick_log::frame::output_to_log;
 
 use crate::radio::{Crewed, Radio};
 use crate::stream::{Answer, Begin, Frame, Reader, put};

@@ -6,13 +6,13 @@ use board::recorded::{Board, FlyError};
 use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Reader, put};
 use flight::computer::Commands;
 use flight::computer::news::News;
+use flight_log::again::RecordedComputer;
+use flight_log::frame::{LoggedInput, input_from_log};
+use flight_log::sortie::LastFrame;
 use log_records::computer_v1::ComputerFrame;
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use tick_log::again::RecordedComputer;
-use tick_log::frame::{LoggedInput, input_from_log};
-use tick_log::sortie::LastFrame;
 
 /// More than the messages of a frame need, bytes, with the parts that they are put together from: 1,073 at ignition, when the
 /// gate says every number that it has looked at.
@@ -41,7 +41,7 @@ fn begin(sortie: &Sortie) -> Begin {
     Begin {
         toml: recipe().mission_toml,
         controller: recipe().controller.name().to_owned(),
-        start: tick_log::sortie::start(sortie),
+        start: flight_log::sortie::start(sortie),
         on_the_air: None,
         flight: 7,
     }
@@ -149,7 +149,7 @@ impl port::Board for Recorded<'_> {
 }
 
 fn started(sortie: &Sortie) -> RecordedComputer {
-    RecordedComputer::started(&recipe().mission, &tick_log::sortie::start(sortie), recipe().controller)
+    RecordedComputer::started(&recipe().mission, &flight_log::sortie::start(sortie), recipe().controller)
 }
 
 #[test]

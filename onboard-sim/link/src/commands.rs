@@ -7,7 +7,7 @@
 use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,

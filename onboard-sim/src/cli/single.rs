@@ -8,10 +8,10 @@ use anyhow::Context as _;
 use campaign::row::{COLUMNS, Row, Value};
 use campaign::scenario::Expected;
 use campaign::tally::Tally;
+use flight_log::sortie::{self, LastFrame};
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
 use sim::recipe::Recipe;
-use tick_log::sortie::{self, LastFrame};
 
 /// Flies it and prints its row, one column on each line.
 ///

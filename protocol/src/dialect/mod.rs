@@ -1,7 +1,7 @@
 //! The messages of the MAVLink dialect, generated at build time from `dialect/touchdown.xml`, which includes
 //! `common.xml`.
 
-use mavlink_core::Message as _;
+use mavlink::Message as _;
 
 pub use generated::touchdown::*;
 

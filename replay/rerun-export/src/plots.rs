@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
+use flight_log::estimate::state_from_log;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::{PilotTiming, TruthSample};
 use protocol::log::v1::Telemetry;
@@ -11,7 +12,6 @@ use rerun::archetypes::{Scalars, SeriesLines, StateChange};
 use rerun::components::InterpolationMode;
 use rerun::datatypes::Rgba32;
 use rerun::{RecordingStream, RecordingStreamResult};
-use tick_log::estimate::state_from_log;
 
 use crate::entity;
 use crate::plot_list::{GIMBAL_IN_SPACE, Plot, PlotLimit};

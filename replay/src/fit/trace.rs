@@ -8,9 +8,9 @@ use flight::computer::pilot::{PilotInput, Sensed};
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
+use flight_log::estimate::estimate_from_log;
+use flight_log::frame::{commands_from_log, input_from_log, phase_of};
 use protocol::log::computer_v1::ComputerFrame;
-use tick_log::estimate::estimate_from_log;
-use tick_log::frame::{commands_from_log, input_from_log, phase_of};
 
 use crate::log::{Entry, FlightLog, LogError, RecordingError};
 use crate::settings::explained;

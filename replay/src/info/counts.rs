@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use flight::rules::phase::Phase;
+use flight_log::frame::accepts_abort;
 use protocol::dialect::TdInterlock;
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;
 use serde::Serialize;
-use tick_log::frame::accepts_abort;
 
 use super::{Grade, GradeLevel, ProfileFacts, VerdictFacts};
 use crate::log::{Entry, FrameOrder, Gap, StampedEntry, TickRanges};

@@ -9,8 +9,8 @@ use std::fmt;
 
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
+use flight_log::frame::phase_of;
 use serde::Serialize;
-use tick_log::frame::phase_of;
 
 use super::{Clock, ClockTime, Entry};
 

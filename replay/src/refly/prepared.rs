@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use flight::computer::FRAME_S;
 use flight::guidance::baseline::{Controller, Law as BurnLaw};
 use flight::rules::phase::Phase;
+use flight_log::frame::phase_of;
+use flight_log::sortie;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput, ComputerStart};
 use protocol::log::record::Record;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
-use tick_log::frame::phase_of;
-use tick_log::sortie;
 use world::Truth;
 
 use super::rerun::{Recorded, Rerun};

@@ -2,14 +2,14 @@
 
 use flight::computer::{Commands, FRAME_S};
 use flight::vehicle::mission::Mission;
+use flight_log::estimate::{state_from_log, vector_from_log};
+use flight_log::frame::accepts_abort;
+use flight_log::sortie::{self as sortie_log, LastFrame};
 use sim::dispersion::Dispersion;
 use sim::fault::{Breakage, FaultError, TimedFault};
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use tick_log::estimate::{state_from_log, vector_from_log};
-use tick_log::frame::accepts_abort;
-use tick_log::sortie::{self as sortie_log, LastFrame};
 
 use super::{FaultChanges, ReflyError};
 use crate::controller::LoggedComputer;

@@ -11,12 +11,12 @@ use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::Plane;
 use flight::vehicle::dynamics::PlanarState;
+use flight_log::frame::level_of;
 use nalgebra::Vector3;
 use nmpc::{Problem, Solution};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
-use tick_log::frame::level_of;
 
 use crate::cli::{Answer, answer, warn_of_what_is_missing};
 use crate::controller::{FrameError, LoggedComputer, phase_name};

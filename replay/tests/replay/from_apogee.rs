@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use campaign::tally::Tally;
+use flight_log::sortie::{self, LastFrame};
 use protocol::log::record::Record;
 use protocol::log::writer::LogWriter;
 use sim::recipe::Recipe;
 use tempfile::TempDir;
-use tick_log::sortie::{self, LastFrame};
 
 const NUMBER: u64 = 3;
 

@@ -77,7 +77,7 @@ fn armed_and_started(at: u64) -> Vec<Reached> {
 fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
-    let header = tick_log::sortie::header("test", &recipe, 0, 0);
+    let header = flight_log::sortie::header("test", &recipe, 0, 0);
     (Vehicle::on_the_pad(&RocketFlight { recipe, number: 0 }).unwrap(), header)
 }
 

@@ -9,6 +9,8 @@ use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::guidance::baseline::Law;
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
+use flight_log::estimate::state_to_log;
+use flight_log::frame::frame_to_log;
 use nalgebra::{UnitQuaternion, Vector3};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
@@ -16,8 +18,6 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use replay::info::{GradeLevel, Info, info_of};
 use replay::log::FlightLog;
 use replay::verify::{Obstacle, Verification};
-use tick_log::estimate::state_to_log;
-use tick_log::frame::frame_to_log;
 
 use crate::flown::verify_bytes;
 

@@ -19,7 +19,7 @@ use flight::computer::news::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Interlocks, Mode, Phase};
 use flight::rules::two_person::{Station, TwoPerson};
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use protocol::command::{CommandAnswer, CommandRequest};
 #[expect(deprecated, reason = "only [`pong`] uses it")]
 use protocol::dialect::PING_DATA;

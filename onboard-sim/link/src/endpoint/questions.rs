@@ -9,7 +9,7 @@ use core::time::Duration;
 use flight::computer::news::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
-use mavlink_core::types::CharArray;
+use mavlink::types::CharArray;
 use protocol::dialect::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult,
     MavMissionType, MavParamError, PARAM_ERROR_DATA, PARAM_EXT_ACK_DATA, ParamAck,

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
 use flight::rules::two_person::Station;
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavMessage, MavType, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal,
 };

@@ -13,8 +13,8 @@ mod ours;
 use alloc::vec::Vec;
 
 use flight::rules::phase::Phase;
-use mavlink_core::MessageData as _;
-use mavlink_core::types::CharArray;
+use mavlink::MessageData as _;
+use mavlink::types::CharArray;
 #[expect(deprecated, reason = "only [`protocol_version`] uses it")]
 use protocol::dialect::PROTOCOL_VERSION_DATA;
 use protocol::dialect::{

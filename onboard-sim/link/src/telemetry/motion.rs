@@ -3,7 +3,7 @@
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use protocol::dialect::{
     ATTITUDE_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA,
     GpsFixType, HIGHRES_IMU_DATA, HOME_POSITION_DATA, HighresImuUpdatedFlags, MavMessage, MavSysStatusSensor,

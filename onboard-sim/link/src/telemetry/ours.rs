@@ -6,8 +6,8 @@ use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::two_person::Act;
-use mavlink_core::MessageData as _;
-use mavlink_core::types::CharArray;
+use mavlink::MessageData as _;
+use mavlink::types::CharArray;
 use num_traits::FromPrimitive as _;
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,

@@ -22,13 +22,13 @@ use std::{io, thread};
 use board::stream;
 use board::stream::{Answer, Begin, Frame, OnTheAir, Reader, put};
 use flight::rules::arming::Uplink;
+use flight_log::estimate::RecordError;
+use flight_log::frame::{commander_from_log, request_from_log, uplink_from_log};
 use protocol::hub::line::SHARE;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S};
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::record::Record;
 use protocol::transport::LinkAddress;
-use tick_log::estimate::RecordError;
-use tick_log::frame::{commander_from_log, request_from_log, uplink_from_log};
 
 use crate::endpoint::Heard;
 use crate::vehicle::{Vehicle, VehicleEvent};

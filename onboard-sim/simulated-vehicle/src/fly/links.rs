@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use flight::computer::crew::People;
 use flight::rules::operator::{Name, Operator, Role};
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::crew_file::{CrewFile, Mode};
 use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA, TdRole};

@@ -38,7 +38,7 @@ impl RocketFlight {
 
     /// The header of its log.
     pub fn log_header(&self, writer: &str, start_unix_ns: u64) -> LogHeader {
-        tick_log::sortie::header(writer, &self.recipe, self.number, start_unix_ns)
+        flight_log::sortie::header(writer, &self.recipe, self.number, start_unix_ns)
     }
 }
 

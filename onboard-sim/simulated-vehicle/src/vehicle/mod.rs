@@ -16,6 +16,7 @@ use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::{StartPoint, StateWeights};
+use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
@@ -23,7 +24,6 @@ use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
-use tick_log::sortie::LastFrame;
 use vehicle_link::sensed::SensorWatch;
 pub use vehicle_link::snapshot::{
     AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
@@ -63,12 +63,21 @@ pub struct Vehicle {
     /// How many frames the flight computer has decided.
     frames_decided: u64,
     last: LastFrame,
+    servos: Servos,
+}
+
+/// Where the servos say that they are.
+#[derive(Debug, Clone, Copy)]
+struct Servos {
+    gimbal_rad: [f64; 2],
+    fins_rad: [f64; 4],
 }
 
 /// Times the flight computer, and keeps its frame.
 struct Watcher<'a> {
     stopwatch: &'a mut dyn FnMut() -> Duration,
     last: &'a mut LastFrame,
+    servos: &'a mut Servos,
 }
 
 impl Watch for Watcher<'_> {
@@ -77,6 +86,7 @@ impl Watch for Watcher<'_> {
     }
 
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
+        *self.servos = Servos { gimbal_rad: input.gimbal_rad, fins_rad: input.fins_rad };
         self.last.decided(input, output, computer);
     }
 }
@@ -96,6 +106,7 @@ impl Vehicle {
     /// # Errors
     /// The flight cannot be set up.
     pub fn on_the_pad(flight: &RocketFlight) -> Result<Self, SetUpError> {
+        let closed_rad = flight.recipe.mission.airframe.fins.closed_rad();
         Ok(Self {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             sensors: SensorWatch::default(),
@@ -112,6 +123,7 @@ impl Vehicle {
             computer_frame: None,
             frames_decided: 0,
             last: LastFrame::default(),
+            servos: Servos { gimbal_rad: [0.0; 2], fins_rad: [closed_rad; 4] },
         })
     }
 
@@ -170,7 +182,7 @@ impl Vehicle {
             people: self.people,
             requests,
         };
-        let mut watcher = Watcher { stopwatch, last: &mut self.last };
+        let mut watcher = Watcher { stopwatch, last: &mut self.last, servos: &mut self.servos };
         let Flown { output, took } = self.sortie.step_with(&outside, &mut watcher);
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
@@ -230,8 +242,8 @@ impl Vehicle {
         let seen = InSpace {
             known: self.known(),
             mission: sortie.mission(),
-            gimbal_rad: world.gimbal_rad(),
-            fins_rad: world.fins_rad(),
+            gimbal_rad: self.servos.gimbal_rad,
+            fins_rad: self.servos.fins_rad,
             sensors: self.sensors.facts(sortie.frame()),
             battery: Some(BatteryFacts {
                 volts: battery.volts(),
@@ -385,7 +397,7 @@ impl Vehicle {
     /// come before all others, so that a flight begins with the power-up of its computer.
     pub fn computer_records(&self) -> Vec<Record> {
         let Some(frame) = &self.computer_frame else { return Vec::new() };
-        let started = || Record::ComputerStart(Box::new(tick_log::sortie::start(&self.sortie)));
+        let started = || Record::ComputerStart(Box::new(flight_log::sortie::start(&self.sortie)));
         let powered_up = (self.frames_decided == 1).then(started);
         let released = frame.output.released.then(started);
         powered_up.into_iter().chain([Record::ComputerFrame(frame.clone())]).chain(released).collect()
@@ -393,13 +405,13 @@ impl Vehicle {
 
     /// The other records of the last frame: in flight what the computer thought, and the truth.
     pub fn records(&self) -> Vec<Record> {
-        if self.flown { tick_log::sortie::thought_and_truth(&self.sortie) } else { Vec::new() }
+        if self.flown { flight_log::sortie::thought_and_truth(&self.sortie) } else { Vec::new() }
     }
 
     /// The landing as a log's record, once it is judged. Its time counts from the release, as that of the frames.
     pub fn verdict_record(&self) -> Option<v1::LandingVerdict> {
         self.judged()?;
-        tick_log::sortie::verdict(&self.sortie)
+        flight_log::sortie::verdict(&self.sortie)
     }
 }
 

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
+use flight_log::sortie::{frame, header, start, time_ns};
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use tick_log::sortie::{frame, header, start, time_ns};
 
 pub(crate) const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
 pub(crate) const TICKS: u64 = 4;

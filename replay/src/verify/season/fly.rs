@@ -8,12 +8,12 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use flight_log::sortie;
 use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
 use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use tick_log::sortie;
 
 use super::{Checked, Flown, Found, Outcome, SeasonError};
 use crate::digest::{START, digest, digest_of_file};

@@ -159,7 +159,7 @@ impl Launch {
             ..COMMAND_LONG_DATA::default()
         };
         let mut bytes = [0; 255];
-        let len = mavlink_core::MessageData::ser(&payload, mavlink_core::MavlinkVersion::V1, &mut bytes);
+        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
         let encoder = &mut self.stations[station].encoder;
         let frame = encoder.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();

@@ -8,7 +8,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::computer::news::Severity;
 use flight::rules::arming::all_passed;
 use flight::rules::phase::Phase;
-use mavlink_core::MessageData as _;
+use mavlink::MessageData as _;
 use proptest::prelude::*;
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::{
@@ -121,7 +121,7 @@ impl Wire {
         };
         payload.param3 = f32::NAN;
         let mut bytes = [0; 255];
-        let len = mavlink_core::MessageData::ser(&payload, mavlink_core::MavlinkVersion::V1, &mut bytes);
+        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
         let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
         self.endpoint.on_frame(0, &frame, &self.vehicle);

@@ -1,7 +1,7 @@
 //! Tests questions about parameters, files and versions, as other clients ask them, and the vehicle's log over FTP.
 
 use flight::computer::FRAME_S;
-use mavlink_core::types::CharArray;
+use mavlink::types::CharArray;
 use protocol::dialect::{
     FILE_TRANSFER_PROTOCOL_DATA, MavParamError, MavParamType, PARAM_REQUEST_LIST_DATA,
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,

@@ -195,6 +195,23 @@ fn the_log_holds_the_start_every_frame_and_how_well_the_estimate_knew_itself() {
     assert!(errors.len() > 1_000 && (2.0..27.0).contains(&mean), "{} of {}", mean, errors.len());
 }
 
+/// As from a board: the truth is in the log alone.
+#[test]
+fn the_crew_sees_where_the_servos_say_that_they_are() {
+    let mut rocket = in_phase(&flight_of("field", &[]), Phase::Powered);
+    let mut apart = 0;
+    for _ in 0..200 {
+        rocket.advance();
+        let seen = rocket.snapshot();
+        let frame = rocket.computer_frame.clone().unwrap();
+        assert_eq!((seen.fins_rad.1.to_vec(), rocket.computer_records().len()), (frame.input.fins_rad, 1));
+        assert_eq!(seen.gimbal_rad.map(|(_, told_rad)| told_rad).to_vec(), frame.input.gimbal_rad);
+        let bits = |angles: [f64; 4]| angles.map(f64::to_bits);
+        apart += u64::from(bits(seen.fins_rad.1) != bits(rocket.sortie.world().fins_rad()));
+    }
+    assert!(apart > 100, "{apart} frames");
+}
+
 #[test]
 fn plans_are_timed_by_the_stopwatch_that_is_given() {
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::AeroDescent);
