@@ -9,10 +9,9 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::Args;
 use serde::Serialize;
 
-use crate::cli::{Answer, answer, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
@@ -375,22 +374,22 @@ fn yes_no(answer: Option<bool>) -> &'static str {
     }
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
-    /// Answer in JSON, with every tick.
+    /// Outcome in JSON, with every tick.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
-    /// Answer as CSV, with every tick.
+    /// Outcome as CSV, with every tick.
     #[arg(long)]
     csv: bool,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;
@@ -399,6 +398,6 @@ impl Ask {
             () if self.csv => print_evaluate_csv(&report, output),
             () => print_evaluate(&report, output),
         })?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }

@@ -3,11 +3,12 @@
 //!
 //! In reading order:
 //!
-//! * [`cli`]: the command line. A command is one file: its arguments, its answer as data, and its printing.
+//! * [`Cli`]: the command line. A command is one file with its arguments, its answer as data and its printing, and a line
+//!   here. [`cli`] is what they have in common.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
-//! * [`verify`]: runs every tick again on its recorded input and compares the results bit for bit; explains one tick,
+//! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
 //!   holds a season of flights against a baseline, and proves the books of ground stations.
 //! * [`settings`]: other settings for a recorded flight, named as in its mission.
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
@@ -39,3 +40,158 @@ pub mod settings;
 mod several;
 pub mod table;
 pub mod verify;
+
+use std::io::Write as _;
+
+use anyhow::Result;
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use crate::cli::{Outcome, answer};
+
+/// Describes flight logs, runs their flights again, and compares them.
+///
+/// Answers go to standard output, warnings and errors to standard error.
+///
+/// Exit codes:
+///   0  success: the log is described, or every frame that could be read is identical
+///   1  verify: some frame differs, or with --strict not the whole flight was compared; with --baseline some flight
+///      got worse, lands no longer, diverged or is missing; with --book a book is broken, or its end is not proven;
+///      compare: more differs or is missing than is tolerated, or the verdicts differ;
+///      fit: NO-GO
+///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
+///      some frame (no frames, no profile, frames missing) and all others are identical;
+///      or a file would be overwritten and --force is not given
+///
+/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict (implied by
+/// --junit) and by compare.
+#[derive(Debug, Parser)]
+#[command(
+    name = "replay",
+    version,
+    about,
+    long_about,
+    verbatim_doc_comment,
+    after_help = "Example: replay verify flight.mcap"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Describes a log: grade, run, build, phases, verdict, ticks, channels, damage.
+    #[command(after_help = "Example: replay info flight.mcap")]
+    Info(info::Args),
+    /// Runs the flight computer of a log again and compares its decisions bit for bit.
+    ///
+    /// The flight computer is built from the profile in the log and run on the recorded inputs, from power-up or from where
+    /// the log begins. All fields of the output and the digest of the memory are compared; measured times are not. For a
+    /// divergence the report says how it grows, and whether the landing would end differently (simulated from the first
+    /// frame that differs).
+    ///
+    /// With --explain one recorded tick is solved again: cost, residuals, active constraints, warm against cold start,
+    /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again,
+    /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
+    /// stations are proven (who did what when), or the first broken link is named.
+    #[command(
+        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 2040\n  replay verify logs --baseline baseline.json --junit=season.xml\n  replay verify --book ground.mcap vehicle.mcap"
+    )]
+    Verify(verify::Args),
+    /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
+    #[command(after_help = "Example: replay evaluate flight.mcap --set powered.weights.theta=90@6.5")]
+    Evaluate(evaluate::Args),
+    /// Closed loop: flies the flight again in simulation from a chosen moment, with other settings.
+    ///
+    /// The flight is flown again from its start with the recorded draw up to that moment, because a log does not hold the
+    /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
+    /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
+    ///
+    /// With --vary flights are flown with many settings, which are ranked by the worst flight's margin. With --flip the
+    /// smallest change of one setting is looked for that turns landed into not landed, or back.
+    #[command(
+        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7\n  replay refly a.mcap --flip truth.impulse_scale --of-plant --lowest 0.9 --highest 1.1"
+    )]
+    Refly(refly::Args),
+    /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
+    ///
+    /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
+    #[command(after_help = "Example: replay compare old.mcap new.mcap")]
+    Compare(compare::Args),
+    /// Writes a flight as one HTML page with its pictures inside: no script, no network.
+    #[command(after_help = "Example: replay report flight.mcap")]
+    Report(report::Args),
+    /// Writes a log's content as CSV, Parquet, .tlog, a Rerun recording or frames for a board; makes a log of a .tlog.
+    ///
+    /// A log of a .tlog has telemetry only: nothing can be re-executed.
+    #[command(
+        after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
+    )]
+    Export(export::Args),
+    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
+    #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
+    Recover(recover::Args),
+    /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
+    ///
+    /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
+    /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is
+    /// compared with its motor's certified curve.
+    ///
+    /// With --day a motor lot, an airframe and a site are learnt from all flights so far, and mission and dispersions of the
+    /// next day are written. With --flights that day is simulated with motors that the lot may have, and the landing rate
+    /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
+    /// NO-GO (exit code 1) if not.
+    #[command(
+        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk2 --day day --flights 1000"
+    )]
+    Fit(fit::Args),
+    /// Prints a shell's completions.
+    #[command(after_help = "Example: replay completions bash")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Prints the manual page (roff).
+    #[command(after_help = "Example: replay man")]
+    Man,
+}
+
+impl Cli {
+    /// Answers the question.
+    ///
+    /// # Errors
+    /// There is no answer.
+    pub fn run(self) -> Result<Outcome> {
+        match self.command {
+            Command::Info(ask) => ask.run(),
+            Command::Verify(ask) => ask.run(),
+            Command::Evaluate(ask) => ask.run(),
+            Command::Refly(ask) => ask.run(),
+            Command::Compare(ask) => ask.run(),
+            Command::Report(ask) => ask.run(),
+            Command::Export(ask) => ask.run(),
+            Command::Recover(ask) => ask.run(),
+            Command::Fit(ask) => ask.run(),
+            Command::Completions { shell } => {
+                let mut script = Vec::new();
+                clap_complete::generate(shell, &mut Self::command(), "replay", &mut script);
+                answer(|output| output.write_all(&script))?;
+                Ok(Outcome::Given)
+            }
+            Command::Man => {
+                answer(|output| clap_mangen::Man::new(Self::command()).render(output))?;
+                Ok(Outcome::Given)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_of_every_command_are_sound() {
+        Cli::command().debug_assert();
+    }
+}

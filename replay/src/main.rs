@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use replay::cli::{self, Cli};
+use replay::{Cli, cli};
 
 /// Every exit code is decided here, and listed in the help of [`Cli`].
 fn main() -> ExitCode {

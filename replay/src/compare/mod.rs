@@ -16,7 +16,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use serde::Serialize;
 pub use series::Samples;
 pub use series::{Align, Anchors};
@@ -24,7 +24,7 @@ pub use series::{Flown, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
-use crate::cli::{Answer, answer, warn_of_cut, warn_of_damage};
+use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
 use crate::info::VerdictFacts;
 use crate::log::RecordingError;
 use crate::print::{
@@ -317,8 +317,8 @@ pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
     cases
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The flight to compare with.
     baseline: PathBuf,
     /// The other flights.
@@ -336,10 +336,10 @@ pub(crate) struct Ask {
     /// before their flight did. Anything left out is not tolerated.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
-    /// Answer in JSON.
+    /// Outcome in JSON.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
-    /// Answer in JUnit XML.
+    /// Outcome in JUnit XML.
     #[arg(long)]
     junit: bool,
 }
@@ -354,8 +354,8 @@ enum AlignOn {
     Time,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         let tolerances = self.tolerances.as_deref().map(read).transpose()?.unwrap_or_default();
         let baseline = open(&self.baseline)?;
         let mut comparisons = Vec::new();
@@ -375,7 +375,7 @@ impl Ask {
             () => print_compare(&comparisons, output),
         })?;
         let within = |comparison: &Comparison| comparison.failures.is_empty();
-        Ok(Answer::Decided { yes: comparisons.iter().all(within) })
+        Ok(Outcome::Decided { yes: comparisons.iter().all(within) })
     }
 }
 

@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 pub use frames::{FramesError, write_frames};
 pub use tables::{ExportedFile, TableFormat, export_tables};
 pub use tlog::{ExportedTlog, ImportError, ImportProgress, ImportedTlog, export_tlog, import_tlog};
 
-use crate::cli::{Answer, answer, say, warn_of_damage};
+use crate::cli::{Outcome, answer, say, warn_of_damage};
 use crate::log::{FlightLog, LogError};
 use crate::output::{Destination, Overwrite};
 use crate::print::print_json;
@@ -57,8 +57,8 @@ pub enum ExportError {
     },
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The log, an MCAP file, or the telemetry log of a ground station, a .tlog.
     file: PathBuf,
     /// The format; a .tlog becomes a log.
@@ -74,7 +74,7 @@ pub(crate) struct Ask {
     /// Replace existing files.
     #[arg(long)]
     force: bool,
-    /// Answer in JSON.
+    /// Outcome in JSON.
     #[arg(long)]
     json: bool,
 }
@@ -95,8 +95,8 @@ enum Format {
     Mcap,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         let is_tlog = self.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv, parquet, tlog, rrd or frames")?;
@@ -120,12 +120,12 @@ impl Ask {
         &self,
         written: &impl Serialize,
         words: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
-    ) -> Result<Answer> {
+    ) -> Result<Outcome> {
         answer(|output| if self.json { print_json(written, output) } else { words(output) })?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 
-    fn tables(&self, format: TableFormat, destination: Destination) -> Result<Answer> {
+    fn tables(&self, format: TableFormat, destination: Destination) -> Result<Outcome> {
         let mut log = FlightLog::open(&self.file)?;
         let files = export_tables(&mut log, format, destination)?;
         self.answer(&files, |output| {
@@ -134,10 +134,10 @@ impl Ask {
             })
         })?;
         warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 
-    fn tlog(&self, destination: Destination) -> Result<Answer> {
+    fn tlog(&self, destination: Destination) -> Result<Outcome> {
         let open = || FlightLog::open(&self.file);
         let written = export_tlog(&open, self.endpoint.as_deref(), destination)?;
         self.answer(&written, |output| {
@@ -146,10 +146,10 @@ impl Ask {
             writeln!(output, "{path}: {received} frames received and {sent} sent by the {}", written.endpoint)
         })?;
         warn_of_damage(&self.file.display().to_string(), written.damage.as_deref());
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 
-    fn log(&self, destination: Destination) -> Result<Answer> {
+    fn log(&self, destination: Destination) -> Result<Outcome> {
         let mut told = 0;
         let imported = import_tlog(&self.file, destination, &mut |progress| tell(progress, &mut told))?;
         self.answer(&imported, |output| {
@@ -168,7 +168,7 @@ impl Ask {
 
     /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
     /// beside this one.
-    fn rerun(&self, output: &Path) -> Result<Answer> {
+    fn rerun(&self, output: &Path) -> Result<Outcome> {
         let program =
             std::env::current_exe().context("where this program lies")?.with_file_name("replay-rerun");
         let (log, recording) = (self.file.display(), output.display());
@@ -186,7 +186,7 @@ impl Ask {
             .status()
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }
 

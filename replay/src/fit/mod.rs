@@ -30,7 +30,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use clap::Args;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use serde::{Deserialize, Serialize};
@@ -42,7 +41,7 @@ use self::day::Learnt;
 use self::least_squares::{Prior, Solution};
 pub use self::trace::{Frame, Trace, TraceError};
 use self::turning::Turning;
-use crate::cli::{Answer, answer, refuse_existing, say, warn_of_damage, write_new};
+use crate::cli::{Outcome, answer, refuse_existing, say, warn_of_damage, write_new};
 use crate::print::{counted, print_json, shown};
 use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
 
@@ -497,8 +496,8 @@ fn digits(value: f64, sigma: f64) -> String {
     format!("{value:.places$}")
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// Logs of vehicles (MCAP), tables of a test stand (CSV with time_s from the ignition command, and thrust_n), and earlier
     /// answers in JSON.
     #[arg(required = true)]
@@ -511,7 +510,7 @@ pub(crate) struct Ask {
     write_mission: Option<PathBuf>,
     #[command(flatten)]
     day: day::Arguments,
-    /// Answer in JSON.
+    /// Outcome in JSON.
     #[arg(long)]
     json: bool,
 }
@@ -522,8 +521,8 @@ struct Earlier {
     fits: Vec<Fit>,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         if self.write_mission.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
             bail!("--write-mission takes the log of one flight: its mission is changed");
         }
@@ -557,9 +556,9 @@ impl Ask {
         let report = FitReport { together: pooled(&fits), fits, day };
         answer(|output| if self.json { print_json(&report, output) } else { print_fit(&report, output) })?;
         Ok(match report.day.and_then(|day| day.go) {
-            Some(go) => Answer::Decided { yes: go },
-            None if refused => Answer::NotAll,
-            None => Answer::Given,
+            Some(go) => Outcome::Decided { yes: go },
+            None if refused => Outcome::NotAll,
+            None => Outcome::Given,
         })
     }
 

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 pub use self::counts::{ChannelFacts, FrameFacts, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
 use anyhow::Result;
-use clap::Args;
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1;
@@ -18,7 +17,7 @@ use sim::ending::FlightEnding;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, answer, say, warn_of_completeness};
+use crate::cli::{Outcome, answer, say, warn_of_completeness};
 use crate::log::{
     AttachmentFacts, BuildComparison, Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Flights, Found, Head,
     LogError, SummaryFacts, Verdicts, heard_message, summary_of,
@@ -660,18 +659,18 @@ fn utc(unix_ns: u64) -> String {
 /// Stands for standard input.
 const STDIN: &str = "-";
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The logs, MCAP files; - is standard input.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Answer in JSON: a description, or a list of descriptions for several logs.
+    /// Outcome in JSON: a description, or a list of descriptions for several logs.
     #[arg(long)]
     json: bool,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         let (mut described, mut refused) = (Vec::new(), false);
         for file in &self.files {
             match description(file) {
@@ -699,7 +698,7 @@ impl Ask {
         for info in described.iter().filter(|_| !said) {
             warn_of_completeness(&info.file, &info.completeness);
         }
-        Ok(if refused { Answer::NotAll } else { Answer::Given })
+        Ok(if refused { Outcome::NotAll } else { Outcome::Given })
     }
 }
 

@@ -13,13 +13,12 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use clap::Args;
 use mcap::records::op;
 use scan::{ChunkName, Good, Records};
 use serde::Serialize;
 use write::Rescue;
 
-use crate::cli::{Answer, answer};
+use crate::cli::{Outcome, answer};
 use crate::log::LogError;
 use crate::output::{Destination, Overwrite};
 use crate::print::{counted, print_json, shown};
@@ -293,8 +292,8 @@ pub fn print_recovery(recovery: &Recovery, output: &mut impl Write) -> io::Resul
     Ok(())
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The damaged log.
     file: PathBuf,
     /// The log to write.
@@ -302,13 +301,13 @@ pub(crate) struct Ask {
     /// Replace an existing file, but never the damaged log itself.
     #[arg(long)]
     force: bool,
-    /// Answer in JSON.
+    /// Outcome in JSON.
     #[arg(long)]
     json: bool,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
         let recovery = recover(&self.file, destination)?;
         answer(
@@ -316,6 +315,6 @@ impl Ask {
                 if self.json { print_json(&recovery, output) } else { print_recovery(&recovery, output) }
             },
         )?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::vary::{FlightOutcome, margin_words, not_reproduced};
 use super::{FlownHow, Prepared, ReflyError, ReflyOptions, StartAt};
-use crate::cli::{Answer, answer, stop_on_interrupt, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, stop_on_interrupt, warn_of_what_is_missing};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
 use crate::settings::Setting;
@@ -342,7 +342,7 @@ impl Arguments {
         self.flip.is_some()
     }
 
-    pub(super) fn run(&self, file: &Path, how: &FlownHow, json: bool) -> Result<Answer> {
+    pub(super) fn run(&self, file: &Path, how: &FlownHow, json: bool) -> Result<Outcome> {
         let (Some(path), Some(from), Some(to)) = (self.flip.clone(), self.lowest, self.highest) else {
             bail!("--flip needs --lowest and --highest");
         };
@@ -361,7 +361,7 @@ impl Arguments {
         let stop = stop_on_interrupt()?;
         let report = bisect(&recording, &options, &stop)?;
         answer(|output| if json { print_json(&report, output) } else { print_bisect(&report, output) })?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }
 

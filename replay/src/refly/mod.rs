@@ -24,7 +24,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use flight::rules::phase::Phase;
 pub use prepared::Prepared;
 use protocol::log::record::{Event, EventLevel, Record};
@@ -34,7 +34,7 @@ use serde::Serialize;
 use sim::sortie::SetUpError;
 use world::world::WorldError;
 
-use crate::cli::{Answer, answer, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};
 use crate::info::VerdictFacts;
 use crate::log::{Clock, ClockTime, NewLog, NewLogError, Recording, RecordingError};
@@ -484,8 +484,8 @@ pub(crate) fn print_verdicts(
     Ok(())
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The log, an MCAP file; with --vary one or more.
     #[arg(required = true)]
     files: Vec<PathBuf>,
@@ -511,13 +511,13 @@ pub(crate) struct Ask {
     vary: vary::Arguments,
     #[command(flatten)]
     flip: flip::Arguments,
-    /// Answer in JSON; with --vary, every point.
+    /// Outcome in JSON; with --vary, every point.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
 }
 
 /// How a flight is flown again, wherever it begins.
-#[derive(Debug, Args)]
+#[derive(Debug, clap::Args)]
 pub(crate) struct FlownHow {
     #[command(flatten)]
     pub(crate) settings: SettingArguments,
@@ -557,8 +557,8 @@ impl FlownHow {
     }
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         if self.vary.is_asked() {
             return self.vary.run(&self.files, &self.how, self.json);
         }
@@ -583,7 +583,7 @@ impl Ask {
             write_log(destination, &recording, &options, &report, &flight)?;
         }
         answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }
 

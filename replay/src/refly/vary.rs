@@ -17,7 +17,7 @@ use serde::Serialize;
 
 pub use super::jobs::{State, StateError, sweep};
 use super::{FlownHow, ReflyError, StartAt, can_be_flown};
-use crate::cli::{Answer, answer, jobs, say, show_progress, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, jobs, say, show_progress, warn_of_what_is_missing};
 use crate::digest::{START, digest};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
@@ -354,7 +354,7 @@ pub(super) struct Arguments {
     /// Points to show.
     #[arg(long, value_name = "N", default_value_t = 20)]
     top: usize,
-    /// Answer as CSV, with every point on every flight.
+    /// Outcome as CSV, with every point on every flight.
     #[arg(long)]
     csv: bool,
 }
@@ -367,7 +367,7 @@ impl Arguments {
             || self.state.is_some()
     }
 
-    pub(super) fn run(&self, files: &[PathBuf], how: &FlownHow, json: bool) -> Result<Answer> {
+    pub(super) fn run(&self, files: &[PathBuf], how: &FlownHow, json: bool) -> Result<Outcome> {
         ensure!(
             !(self.vary.is_empty() && self.vary_plant.is_empty()),
             "nothing to vary; give --vary powered.weights.theta=50:110:7 or the like"
@@ -401,7 +401,7 @@ impl Arguments {
             () if self.csv => print_sweep_csv(&report, output),
             () => print_sweep(&report, self.top, output),
         })?;
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 
     /// Identifies the sweep: content of the flights, points, options, and the build.

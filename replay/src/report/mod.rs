@@ -12,10 +12,9 @@ mod track;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use clap::Args;
 use track::Flight;
 
-use crate::cli::{Answer, answer, warn_of_completeness};
+use crate::cli::{Outcome, answer, warn_of_completeness};
 use crate::info::{Completeness, Info, info};
 use crate::log::{Recording, RecordingError};
 use crate::output::{Destination, NewFile, Overwrite, same_file};
@@ -62,8 +61,8 @@ fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     Ok((flight, info))
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     /// The page to write, or - for standard output; the log's name with .html if left out.
@@ -77,8 +76,8 @@ pub(crate) struct Ask {
     force: bool,
 }
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         use std::io::Write as _;
         let page = match &self.with {
             None => report(&self.file)?,
@@ -89,7 +88,7 @@ impl Ask {
         if path.as_os_str() == "-" {
             answer(|output| output.write_all(html.as_bytes()))?;
             warn_of_completeness(&page.name, &page.completeness);
-            return Ok(Answer::Given);
+            return Ok(Outcome::Given);
         }
         if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
             bail!("{}: is a log that is being read", path.display());
@@ -103,6 +102,6 @@ impl Ask {
             .with_context(|| format!("{}: cannot be written", path.display()))?;
         answer(|output| writeln!(output, "{}", path.display()))?;
         warn_of_completeness(&page.name, &page.completeness);
-        Ok(Answer::Given)
+        Ok(Outcome::Given)
     }
 }

@@ -18,7 +18,7 @@ use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_RX};
 use protocol::log::v1::{BookEntry, BookHead};
 use serde::Serialize;
 
-use crate::cli::{Answer, answer};
+use crate::cli::{Outcome, answer};
 use crate::print::{print_json, shown};
 
 /// A head as a station shows it at the end: the number of entries, and the beginning of the hash.
@@ -317,10 +317,10 @@ fn public_key(text: &str) -> Result<PublicKey, String> {
 }
 
 impl Arguments {
-    pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Answer> {
+    pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Outcome> {
         let trusted = Trusted { key: self.public_key, head: self.head };
         let found = audit_logs(files, &trusted)?;
         answer(|output| if json { print_json(&found, output) } else { print_audit(&found, output) })?;
-        Ok(if found.books.is_empty() { Answer::NotAll } else { Answer::Decided { yes: found.is_proven() } })
+        Ok(if found.books.is_empty() { Outcome::NotAll } else { Outcome::Decided { yes: found.is_proven() } })
     }
 }

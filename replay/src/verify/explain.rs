@@ -18,7 +18,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
-use crate::cli::{Answer, answer, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
 use crate::print::{print_json, shown};
@@ -391,10 +391,10 @@ fn print_path(report: &TickReport, output: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-pub(super) fn run(file: &Path, number: u64, json: bool) -> Result<Answer> {
+pub(super) fn run(file: &Path, number: u64, json: bool) -> Result<Outcome> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
     let report = tick(&recording, number)?;
     answer(|output| if json { print_json(&report, output) } else { print_tick(&report, output) })?;
-    Ok(Answer::Given)
+    Ok(Outcome::Given)
 }

@@ -29,7 +29,6 @@ use std::time::{Duration, Instant};
 use self::flight::FlightVerifier;
 pub use self::flight::{Consequence, Unread};
 use anyhow::{Result, bail};
-use clap::Args;
 use difference::Tally;
 pub use difference::{
     Divergence, FieldDifference, FieldValue, Growth, GrowthStep, differences, ulp_distance,
@@ -38,7 +37,7 @@ use protocol::log::reader::Damage;
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
-use crate::cli::{Answer, answer, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
 use crate::output::NewFile;
@@ -496,15 +495,15 @@ pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
     JunitCase { name: format!("verify {}", name_of(report)), outcome }
 }
 
-#[derive(Debug, Args)]
-pub(crate) struct Ask {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
     /// The logs, MCAP files, and directories of logs.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Answer in JSON: a report, or a list of reports for several logs.
+    /// Outcome in JSON: a report, or a list of reports for several logs.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
-    /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
+    /// Outcome in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
     junit: Option<PathBuf>,
     /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
@@ -528,8 +527,8 @@ pub(crate) struct Ask {
 /// The result for one log.
 type Verified<'a> = (&'a Path, Result<Vec<VerifyReport>, LogError>);
 
-impl Ask {
-    pub(crate) fn run(self) -> Result<Answer> {
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
@@ -552,7 +551,7 @@ impl Ask {
         self.verify(kind, junit)
     }
 
-    fn verify(&self, kind: Printed, junit: Option<NewFile>) -> Result<Answer> {
+    fn verify(&self, kind: Printed, junit: Option<NewFile>) -> Result<Outcome> {
         let mut files = Vec::new();
         for file in &self.files {
             if file.is_dir() { files.extend(season::logs_of(file)?) } else { files.push(file.clone()) }
@@ -596,7 +595,7 @@ impl Ask {
             (Printed::Json, reports) => print_json(&reports, output),
             (Printed::Text, reports) => reports.iter().try_for_each(|report| print_verify(report, output)),
         })?;
-        Ok(Answer::Verified { outcome: worst(&answers), strict })
+        Ok(Outcome::Verified { outcome: worst(&answers), strict })
     }
 }
 

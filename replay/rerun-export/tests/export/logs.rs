@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use flight_log::sortie::{frame, header, start, time_ns};
+use flight_log::sortie::{LastFrame, campaign_header, frame_and_phase, header, start, time_ns};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
+use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
@@ -22,7 +24,8 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
     let header = header("test", &recipe, 0, START_UNIX_NS);
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
     let mut flight = Sortie::new(&recipe, 0).unwrap();
-    log.write(&start(&flight), 0).unwrap();
+    log.write(&Record::ComputerStart(Box::new(start(&flight))), 0).unwrap();
+    let mut last = LastFrame::default();
     let event = Event {
         level: EventLevel::Warning,
         name: "vehicle".to_owned(),
@@ -30,8 +33,9 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
     };
     log.write(&Record::Event(event), 0).unwrap();
     for _ in 0..TICKS {
-        flight.step();
-        for record in frame(&flight) {
+        flight.step_with(&Outside::NOBODY, &mut last);
+        let phase = flight.computer().mode().phase;
+        for record in frame_and_phase(&flight, &mut last, phase) {
             if with_truth || !matches!(record, Record::TruthSample(_)) {
                 log.write(&record, time_ns(&flight)).unwrap();
             }
@@ -50,6 +54,18 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
     let verdict = v1::LandingVerdict { time_s, landed: true, limits: vec![limit], ..Default::default() };
     log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(time_s)).unwrap();
     log.finish().unwrap();
+}
+
+/// The first frames of a flight from apogee: its log's header, the start, and the frames.
+pub(crate) fn first_frames(count: usize) -> (LogHeader, ComputerStart, Vec<ComputerFrame>) {
+    let recipe = Recipe::built_in("mk2", "field").unwrap();
+    let mut flight = Sortie::new(&recipe, 0).unwrap();
+    let (start, mut last, mut frames) = (start(&flight), LastFrame::default(), Vec::new());
+    while frames.len() < count {
+        flight.step_with(&Outside::NOBODY, &mut last);
+        frames.push(*last.take().unwrap());
+    }
+    (campaign_header(&recipe, 0), start, frames)
 }
 
 fn nanoseconds(time_s: f64) -> u64 {
@@ -76,8 +92,9 @@ pub(crate) fn write_apogee_log(path: &Path) {
     let half = f64::sqrt(0.5);
     for frame in 0..TICKS {
         let time_s = 0.5 * frame as f64;
-        let mut tick = flight_v1::ComputerFrame::default();
-        tick.input.frame = frame + 1;
+        let mut tick = ComputerFrame::default();
+        // Frames have 5 ms.
+        tick.input.frame = (100 * frame).max(1);
         tick.input.time_s = time_s;
         tick.output.phase = u32::from(Phase::AeroDescent.index());
         log.write(&Record::ComputerFrame(Box::new(tick)), nanoseconds(time_s)).unwrap();

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use flight::rules::phase::Phase;
 use protocol::log::record::Record;
-use protocol::log::writer::{LogHeader, LogWriter};
-use replay::log::Recording as Log;
+use protocol::log::writer::LogWriter;
 use replay_rerun::{Overwrite, entity, export_file};
 
 use crate::flown::MK2;
+use crate::logs::first_frames;
 use crate::read_back::Recording;
 
 fn exported(log: &Path, rrd: &Path) -> Recording {
@@ -50,17 +50,11 @@ fn repeated_decisions_are_plotted_with_the_recorded_ones() {
 /// A record that differs from the controller's decision, followed by lost frames.
 #[test]
 fn the_text_says_where_the_rerun_differs_and_ends() {
-    let log = Log::open(&MK2.log).unwrap();
     let path = MK2.beside("forged.mcap");
-    let header = LogHeader {
-        profile_toml: Some(log.profile_toml().unwrap().to_owned()),
-        run: log.head.run.clone(),
-        ..LogHeader::default()
-    };
+    let (header, start, frames) = first_frames(40);
     let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
-    writer.write(&Record::ComputerStart(Box::new(log.start.unwrap())), 0).unwrap();
-    for tick in &log.frames[..40] {
-        let mut tick = tick.clone();
+    writer.write(&Record::ComputerStart(Box::new(start)), 0).unwrap();
+    for mut tick in frames {
         if tick.input.frame == 20 {
             tick.output.fins_rad[0] += 0.1;
         }

@@ -15,7 +15,7 @@ use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
-use super::{Checked, Flown, Found, Outcome, SeasonError};
+use super::{Checked, FlightResult, Flown, Found, SeasonError};
 use crate::digest::{START, digest, digest_of_file};
 use crate::info::VerdictFacts;
 use crate::log::{Entry, FlightLog, LogError, Recording};
@@ -27,10 +27,10 @@ use crate::verify::{Obstacle, Verification, verify};
 const NAMING_RECORDS: usize = 100;
 
 /// What this build makes of a flight. Whatever is wrong is part of the outcome.
-pub(super) fn fly(found: &Found) -> Outcome {
+pub(super) fn fly(found: &Found) -> FlightResult {
     match found.number {
         None => log(&found.path),
-        Some(number) => fly_campaign(&found.path, number).unwrap_or_else(|error| Outcome {
+        Some(number) => fly_campaign(&found.path, number).unwrap_or_else(|error| FlightResult {
             flight: None,
             checked: Checked::Unverified,
             flown: None,
@@ -39,7 +39,7 @@ pub(super) fn fly(found: &Found) -> Outcome {
     }
 }
 
-fn log(path: &Path) -> Outcome {
+fn log(path: &Path) -> FlightResult {
     let (checked, mut problem) = match verify(path) {
         // What cannot be read now may still be a flight.
         Err(error @ LogError::Read { .. }) => (Checked::Unverified, Some(words(error))),
@@ -81,7 +81,7 @@ fn log(path: &Path) -> Outcome {
             None
         }
     };
-    Outcome { flight: flight_of(path), checked, flown, problem }
+    FlightResult { flight: flight_of(path), checked, flown, problem }
 }
 
 /// Which flight a log holds: its run and the first records of its flight computer.
@@ -99,8 +99,8 @@ fn flight_of(path: &Path) -> Option<String> {
     (!records.is_empty()).then(|| name_of(run.chain(records.iter().map(Vec::as_slice))))
 }
 
-fn no_flight(why: String) -> Outcome {
-    Outcome { flight: None, checked: Checked::NoFlight, flown: None, problem: Some(why) }
+fn no_flight(why: String) -> FlightResult {
+    FlightResult { flight: None, checked: Checked::NoFlight, flown: None, problem: Some(why) }
 }
 
 /// An error and its causes.
@@ -148,7 +148,7 @@ pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SeasonError> {
 }
 
 /// Flies one flight of a campaign.
-fn fly_campaign(directory: &Path, number: u64) -> Result<Outcome, SeasonError> {
+fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SeasonError> {
     let recipe = recipe(directory)?;
     let row = rows(directory)?.into_iter().find(|row| row.number == number).ok_or_else(|| {
         SeasonError::Campaign { path: directory.join(ROWS), reason: format!("has no flight {number}") }
@@ -166,7 +166,7 @@ fn fly_campaign(directory: &Path, number: u64) -> Result<Outcome, SeasonError> {
     let verdict = sortie::verdict(&flight).as_ref().map(VerdictFacts::of);
     let (seed, number) = (recipe.seed.to_le_bytes(), number.to_le_bytes());
     let parts = [recipe.mission_toml.as_bytes(), recipe.dispersion_toml.as_bytes(), &seed, &number];
-    Ok(Outcome {
+    Ok(FlightResult {
         flight: Some(name_of(parts)),
         checked: if same { Checked::Identical } else { Checked::Diverged },
         flown: verdict.map(|verdict| Flown {
@@ -225,7 +225,7 @@ pub fn fly_all(
     state: &mut SeasonState,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(usize, usize),
-) -> io::Result<BTreeMap<String, Outcome>> {
+) -> io::Result<BTreeMap<String, FlightResult>> {
     let mut outcomes = BTreeMap::new();
     let mut missing = Vec::new();
     for found in flights {
@@ -263,7 +263,7 @@ pub fn fly_all(
 /// The outcomes known so far, by what was flown and by which build.
 #[derive(Debug, Default)]
 pub struct SeasonState {
-    known: BTreeMap<String, Outcome>,
+    known: BTreeMap<String, FlightResult>,
     file: Option<File>,
 }
 
@@ -271,7 +271,7 @@ pub struct SeasonState {
 #[derive(Serialize, Deserialize)]
 struct Line {
     key: String,
-    outcome: Outcome,
+    outcome: FlightResult,
 }
 
 /// How every line begins that is not empty.
@@ -306,11 +306,11 @@ impl SeasonState {
     }
 
     /// The outcome of this key, if it is known.
-    pub(super) fn outcome(&self, key: &str) -> Option<&Outcome> {
+    pub(super) fn outcome(&self, key: &str) -> Option<&FlightResult> {
         self.known.get(key)
     }
 
-    pub(super) fn note(&mut self, key: String, outcome: Outcome) -> io::Result<()> {
+    pub(super) fn note(&mut self, key: String, outcome: FlightResult) -> io::Result<()> {
         let line = Line { key, outcome };
         if let Some(file) = &mut self.file {
             writeln!(file, "{}", serde_json::to_string(&line)?)?;

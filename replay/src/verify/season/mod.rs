@@ -22,7 +22,7 @@ use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
 
 use super::Printed;
-use crate::cli::{Answer, answer, jobs, say, show_progress, stop_on_interrupt};
+use crate::cli::{Outcome, answer, jobs, say, show_progress, stop_on_interrupt};
 use crate::output::{Destination, NewFile, Overwrite};
 use crate::print::{JunitCase, JunitOutcome, counted, print_json, print_junit, shown, write_junit};
 
@@ -72,7 +72,7 @@ impl Flown {
 
 /// What this build makes of a flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct FlightResult {
     /// Which flight it is, by its content; `None` if the file has none, and in baselines of earlier releases.
     #[serde(default)]
     pub flight: Option<String>,
@@ -114,12 +114,12 @@ pub struct Baseline {
     format: u32,
     /// The build whose outcomes they are.
     build: BTreeMap<String, String>,
-    pub flights: BTreeMap<String, Outcome>,
+    pub flights: BTreeMap<String, FlightResult>,
 }
 
 impl Baseline {
     /// The outcomes of this build, without the files that hold no flight.
-    pub fn of(mut flights: BTreeMap<String, Outcome>) -> Self {
+    pub fn of(mut flights: BTreeMap<String, FlightResult>) -> Self {
         flights.retain(|_, outcome| outcome.checked != Checked::NoFlight);
         Self { format: FORMAT, build: build_info(), flights }
     }
@@ -210,9 +210,9 @@ pub struct Judged {
     /// The recorded decisions were made again and are not any more, whatever the margin.
     pub newly_diverged: bool,
     /// Accepted earlier.
-    pub before: Option<Outcome>,
+    pub before: Option<FlightResult>,
     /// Now.
-    pub now: Option<Outcome>,
+    pub now: Option<FlightResult>,
 }
 
 impl Judged {
@@ -226,9 +226,9 @@ impl Judged {
 }
 
 /// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same.
-pub fn judge(outcomes: &BTreeMap<String, Outcome>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
+pub fn judge(outcomes: &BTreeMap<String, FlightResult>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
     // Another flight under the name of one is no change of that one.
-    let same_flight = |name: &str, before: &Outcome| {
+    let same_flight = |name: &str, before: &FlightResult| {
         outcomes
             .get(name)
             .is_some_and(|now| before.flight.is_none() || now.flight.is_none() || now.flight == before.flight)
@@ -264,9 +264,9 @@ fn in_order(name: &str) -> (&str, u64) {
     numbered.unwrap_or((name, 0))
 }
 
-fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
+fn change(before: &FlightResult, now: &FlightResult, tolerance: f64) -> Change {
     // What was neither verified nor flown again did not land differently.
-    let unknown = |outcome: &Outcome| {
+    let unknown = |outcome: &FlightResult| {
         outcome.flown.is_none() && matches!(outcome.checked, Checked::Unverified | Checked::NoFlight)
     };
     match (unknown(before), unknown(now)) {
@@ -275,7 +275,7 @@ fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
         (true, true) if now.checked == Checked::NoFlight => return Change::NoFlight,
         _ => {}
     }
-    let landed = |outcome: &Outcome| outcome.flown.as_ref().is_some_and(|flown| flown.landed);
+    let landed = |outcome: &FlightResult| outcome.flown.as_ref().is_some_and(|flown| flown.landed);
     match (landed(before), landed(now)) {
         (true, false) => return Change::NoLongerLands,
         (false, true) => return Change::NowLands,
@@ -284,7 +284,7 @@ fn change(before: &Outcome, now: &Outcome, tolerance: f64) -> Change {
     if before.checked == Checked::Identical && now.checked == Checked::Unverified {
         return Change::Lost;
     }
-    let margin = |outcome: &Outcome| outcome.flown.as_ref().and_then(Flown::margin);
+    let margin = |outcome: &FlightResult| outcome.flown.as_ref().and_then(Flown::margin);
     match (margin(before), margin(now)) {
         (Some(_), None) => Change::Lost,
         (None, Some(_)) => Change::Better,
@@ -381,7 +381,7 @@ pub fn season_cases(flights: &[Judged], may_diverge: bool) -> Vec<JunitCase> {
         );
         let outcome = match (judged.fails(may_diverge), &judged.now) {
             (false, _) => JunitOutcome::Passed { said: format!("{}: {words}", judged.change.word()) },
-            (true, Some(Outcome { checked: Checked::Unverified, problem: Some(problem), .. })) => {
+            (true, Some(FlightResult { checked: Checked::Unverified, problem: Some(problem), .. })) => {
                 JunitOutcome::Error { message: problem.clone() }
             }
             (true, _) => JunitOutcome::Failed { message: judged.change.word().to_owned(), details: words },
@@ -392,7 +392,7 @@ pub fn season_cases(flights: &[Judged], may_diverge: bool) -> Vec<JunitCase> {
 }
 
 fn ending(judged: &Judged) -> String {
-    let of = |outcome: &Outcome| outcome.flown.as_ref().map(|flown| flown.ending.clone());
+    let of = |outcome: &FlightResult| outcome.flown.as_ref().map(|flown| flown.ending.clone());
     let now = judged.now.as_ref();
     let problem = now.and_then(|now| now.problem.clone());
     let ending = now
@@ -405,7 +405,7 @@ fn ending(judged: &Judged) -> String {
     }
 }
 
-fn margin(outcome: Option<&Outcome>) -> String {
+fn margin(outcome: Option<&FlightResult>) -> String {
     let margin = outcome.and_then(|outcome| outcome.flown.as_ref()).and_then(Flown::margin);
     margin.map_or_else(|| "-".to_owned(), |margin| format!("{margin:.3}"))
 }
@@ -440,7 +440,7 @@ impl Arguments {
         self.baseline.is_some()
     }
 
-    pub(super) fn run(&self, directory: &Path, kind: Printed, junit: Option<NewFile>) -> Result<Answer> {
+    pub(super) fn run(&self, directory: &Path, kind: Printed, junit: Option<NewFile>) -> Result<Outcome> {
         let baseline_path = self.baseline.as_deref().context("--baseline is missing")?;
         ensure!(
             self.tolerance >= 0.0 && self.tolerance.is_finite(),
@@ -490,14 +490,14 @@ impl Arguments {
         if self.accept && !interrupted {
             Baseline::of(outcomes).write(baseline_path)?;
             say(&format!("accepted: {}", baseline_path.display()));
-            return Ok(Answer::Given);
+            return Ok(Outcome::Given);
         }
-        Ok(if interrupted { Answer::NotAll } else { Answer::Decided { yes: passed } })
+        Ok(if interrupted { Outcome::NotAll } else { Outcome::Decided { yes: passed } })
     }
 }
 
 /// Refuses a directory whose logs hold no flight.
-fn some_flight(directory: &Path, outcomes: &BTreeMap<String, Outcome>) -> Result<(), SeasonError> {
+fn some_flight(directory: &Path, outcomes: &BTreeMap<String, FlightResult>) -> Result<(), SeasonError> {
     if outcomes.values().any(|outcome| outcome.checked != Checked::NoFlight) {
         return Ok(());
     }
@@ -520,12 +520,12 @@ pub(super) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
 mod tests {
     use super::*;
 
-    fn outcome(checked: Checked, landed: bool, margin: f64) -> Outcome {
+    fn outcome(checked: Checked, landed: bool, margin: f64) -> FlightResult {
         let flown = Flown { landed, ending: String::new(), margin: Some(format!("{margin:?}")) };
-        Outcome { flight: None, checked, flown: Some(flown), problem: None }
+        FlightResult { flight: None, checked, flown: Some(flown), problem: None }
     }
 
-    fn judged(before: Outcome, now: Outcome) -> Judged {
+    fn judged(before: FlightResult, now: FlightResult) -> Judged {
         let named = |outcome| BTreeMap::from([("a".to_owned(), outcome)]);
         judge(&named(now), &Baseline::of(named(before)), 0.02).remove(0)
     }
@@ -552,7 +552,7 @@ mod tests {
         assert_eq!(judged(crashed.clone(), outcome(Diverged, true, 0.1)).change, Change::NowLands);
         // What cannot be read did not land differently.
         for checked in [Unverified, Checked::NoFlight] {
-            let gone = Outcome { flight: None, checked, flown: None, problem: Some("empty".to_owned()) };
+            let gone = FlightResult { flight: None, checked, flown: None, problem: Some("empty".to_owned()) };
             for before in [&before, &crashed] {
                 let judged = judged(before.clone(), gone.clone());
                 assert_eq!((judged.change, judged.fails(true)), (Change::Lost, true), "{checked:?}");
@@ -578,7 +578,7 @@ mod tests {
         let without = |checked| {
             BTreeMap::from([(
                 "ground.mcap".to_owned(),
-                Outcome { flight: None, checked, flown: None, problem: None },
+                FlightResult { flight: None, checked, flown: None, problem: None },
             )])
         };
         for before in [BTreeMap::new(), without(Checked::Unverified)] {
@@ -592,7 +592,7 @@ mod tests {
     fn another_flight_under_the_name_of_one_is_new_and_that_one_is_missing() {
         let named = |flight: &str, landed| {
             let outcome = outcome(Checked::Identical, landed, 0.5);
-            BTreeMap::from([("a".to_owned(), Outcome { flight: Some(flight.to_owned()), ..outcome })])
+            BTreeMap::from([("a".to_owned(), FlightResult { flight: Some(flight.to_owned()), ..outcome })])
         };
         let judged = judge(&named("landed", true), &Baseline::of(named("crashed", false)), 0.02);
         let mut changes: Vec<_> = judged.iter().map(|judged| judged.change.word()).collect();
