@@ -15,9 +15,6 @@
 //!
 //! The crate `vehicles` reads the files that describe a vehicle, and the crate [`nmpc`] solves the landing problem.
 //!
-//! A chosen number says what it decides: `Halved and doubled: 132, 144` are the landings of 160 `real` flights of mk2 (seed 78)
-//! with half and with twice its value. 144 land with all numbers as they are; differences of up to 5 may be chance.
-//!
 //! Units are SI and radians; names carry units and frames. The frames are those of [`nmpc::dynamics`] in the plane and
 //! of [`vehicle::rigid`] in space.
 #![cfg_attr(not(test), no_std)]

@@ -18,7 +18,8 @@ use crate::computer::memory::remembers;
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
 
-/// A change of the wanted nozzle angle below this is not a reversal, rad. Halved and doubled: 145, 146.
+/// A change of the wanted nozzle angle below this is not a reversal, rad: it is noise, and much
+/// smaller than the play.
 const REVERSAL_RAD: f64 = 2e-4;
 
 /// The wanted direction and rotation of the nose.

@@ -21,7 +21,7 @@ use crate::vehicle::fins::{COS_30, FinModel, Moments, PITCH, ROLL, SIN_30, YAW};
 /// error.
 const ROUNDS: usize = 8;
 /// Smallest slope that a correction divides by, as a fraction of the slope of half-open fins: almost closed fins have a
-/// weak effect, and their lift can cancel the moment of their drag. Halved or doubled: no flight changes.
+/// weak effect, and their lift can cancel the moment of their drag.
 const SLOPE_FLOOR: f64 = 0.2;
 
 /// Less dynamic pressure counts as no air, Pa, because the results would overflow.

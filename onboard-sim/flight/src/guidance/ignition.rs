@@ -51,7 +51,7 @@ pub struct IgnitionOutlook {
 remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
 
 /// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
-/// 0.8 of its terminal speed. Halved or doubled: no flight changes.
+/// 0.8 of its terminal speed.
 const AHEAD_S: f64 = 0.25;
 const AHEAD_STEPS: u32 = 16;
 

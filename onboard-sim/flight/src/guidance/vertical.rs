@@ -17,10 +17,10 @@ use crate::computer::memory::remembers;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 
-/// Number of end times tried between the thrust's fall through the weight and the latest end. Halved and doubled: 146, 148.
+/// Number of end times tried between the thrust's fall through the weight and the latest end.
 const END_TIMES: usize = 4;
 
-/// Gain of the fin opening: fraction of the fins' travel per fraction of the band. Halved and doubled: 141, 144.
+/// Gain of the fin opening: fraction of the fins' travel per fraction of the band.
 const FIN_GAIN: f64 = 1.5;
 
 /// Fin opening, 0 to 1, that moves a vehicle from its place in the band to the wanted place.
@@ -228,7 +228,7 @@ const INTERVALS: usize = 40;
 const MET_M_S: f64 = 1e-4;
 /// Largest number of falls tried for a way of braking; about six are usual.
 const MOST_FALLS: usize = 24;
-/// A vehicle that moves upwards faster than this rises, m/s. Halved and doubled: 144, 144.
+/// A vehicle that moves upwards faster than this rises, m/s.
 const RISING_M_S: f64 = 0.05;
 
 /// The fraction of the thrust and the drag of one way of braking.

@@ -247,12 +247,12 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 // A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded angle may still be
 // stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
-/// A fin that has moved by this much is working, rad. Halved or doubled: no flight changes.
+/// A fin that has moved by this much is working, rad: it is more than the play of its linkage.
 const MOVED_RAD: f64 = 0.015;
 /// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
 const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
-/// A fin is stuck if its command has been far away for this long in total and it has not moved, s.
-/// Halved or doubled: no flight changes.
+/// A fin is stuck if its command has been far away for this long in total and it has not moved, s: more than ten times the
+/// delay of a servo.
 const STUCK_AFTER_S: f64 = 0.25;
 
 /// State of the watch over one fin.

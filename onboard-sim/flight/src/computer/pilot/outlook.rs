@@ -11,11 +11,11 @@ use crate::rules::gate::GateInput;
 use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 
-/// The commit height is the height that the parachute needs, times this. Halved and doubled: 144, 132.
+/// The commit height is the height that the parachute needs, times this: half as much again, because ejection and filling
+/// scatter.
 const COMMIT_MARGIN: f64 = 1.5;
 
 /// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at apogee.
-/// Halved or doubled: no flight changes.
 const FALL_MIN_M_S: f64 = 5.0;
 
 /// The forecast before ignition, renewed five or twenty times a second.
@@ -64,7 +64,7 @@ pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m
 }
 
 /// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40 m/s over g, and half as
-/// much again while it is slower. Halved or doubled: no flight changes.
+/// much again while it is slower.
 const TAKES_THE_WIND_S: f64 = 6.0;
 
 /// The apogee ahead of a coasting vehicle.
@@ -118,15 +118,15 @@ impl Pilot {
 
 // Releases the parachute while there is height for it, if the ignition gate will not open.
 
-/// A reason that has kept the gate shut for this long, s, will not go away before ignition. Halved or doubled: no flight changes.
+/// A reason that has kept the gate shut for this long, s, will not go away before ignition.
 const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s. Halved and doubled: 144, 143.
+/// The decision is taken this long before the room for the parachute ends, s: long enough to see that a refusal lasts.
 const BEFORE_S: f64 = 0.1;
 /// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
-/// them: such a vehicle tumbles, or does not know where it is. Halved and doubled: 59, 144.
+/// them: such a vehicle tumbles, or does not know where it is.
 const FAR_BEYOND: f64 = 2.0;
 /// A fin that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights. If the gate stays shut for
-/// longer than this after ignition was due, s, there is another reason. Halved or doubled: no flight changes.
+/// longer than this after ignition was due, s, there is another reason.
 const OVERDUE_S: f64 = 0.1;
 
 impl Pilot {

@@ -24,13 +24,13 @@ use crate::vehicle::mission::StartPoint;
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// A fin farther than this from its command has not reached it, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
-/// Below this thrust the gimbal cannot turn the vehicle, N. Halved or doubled: no flight changes.
+/// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
 /// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
-/// fins can set against it: all fins are opened then. Halved and doubled: 111, 139.
+/// fins can set against it: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
-/// Below this airspeed the air cannot turn the vehicle, m/s. Halved and doubled: 146, 144.
+/// Below this airspeed the air cannot turn the vehicle, m/s.
 const AIR_TURNS_M_S: f64 = 12.0;
 
 /// Whether the air comes so far from the side that only fully open fins turn the vehicle back.

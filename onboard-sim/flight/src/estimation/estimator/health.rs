@@ -167,10 +167,10 @@ pub(super) struct Surprise {
 
 remembers!(Surprise { mean });
 
-/// Weight of the newest value in the running mean of the normalised innovation squared. Halved and doubled: 144, 144.
+/// Weight of the newest value in the running mean of the normalised innovation squared: the mean remembers three
+/// fixes of three numbers.
 const NEWEST: f64 = 0.1;
 /// In a consistent filter a mean this large has a probability below 1e-6 per fix (the expected mean is 1).
-/// Halved and doubled: 142, 144.
 const TOO_MUCH: f64 = 5.0;
 
 impl Default for Surprise {
@@ -197,13 +197,12 @@ impl Surprise {
 // The first uses no barometer, only the estimated vertical velocity (inertial and satellite), satellite heights with
 // their slow offset, and the lidar. The second is the barometer's last sample without its estimated errors.
 
-/// An older barometer sample is not used, s. Halved or doubled: no flight changes.
+/// An older barometer sample is not used, s: a dozen samples are missing.
 const BAROMETER_KEEPS_S: f64 = 0.25;
-/// Correlation time of the vertical velocity's errors, s. Halved or doubled: no flight changes.
+/// Correlation time of the vertical velocity's errors, s: satellite velocities correct them in about that time.
 const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 
-/// Growth of the height's variance with each measurement that does not fit. Halved and doubled: 69, 144;
-/// halved, the variance shrinks instead.
+/// Growth of the height's variance with each measurement that does not fit; below 1 the variance would shrink.
 const DOUBT_FACTOR: f64 = 1.1;
 
 /// Heights of the centre of gravity above the pad, from two sources.

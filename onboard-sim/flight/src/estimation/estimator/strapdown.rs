@@ -12,7 +12,7 @@ use crate::vehicle::rigid::RigidState;
 
 /// The covariance is propagated once in this many frames, and before every correction.
 const FRAMES_BETWEEN: u32 = 2;
-/// Below this height the wind's power law is not used, m. Halved and doubled: 145, 145.
+/// Below this height the wind's power law is not used, m: it does not hold so near to the ground.
 const LOWEST_SHEAR_M: f64 = 2.0;
 
 /// The estimated state; its error is in the filter.

@@ -8,31 +8,30 @@ use super::strapdown::Since;
 use super::{Estimator, GnssFix};
 
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
-/// 20 in 0.2 s. Halved and doubled: 144, 143.
+/// 20 in 0.2 s.
 const ASKEW_SAMPLES: f64 = 20.0;
-/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height. Halved and doubled: 144, 43;
-/// doubled, no range is ever used.
+/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
+/// ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
-/// Standard deviations that the filter adds when satellite velocities do not fit on average.
-/// Halved or doubled: no flight changes.
+/// Standard deviations that the filter adds when satellite velocities do not fit on average: of the velocity. All four make
+/// room for what a fault of the inertial unit has done.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
-/// Halved or doubled: no flight changes.
+/// Of the attitude.
 const DOUBT_ATTITUDE_RAD: f64 = 0.04;
-/// Halved or doubled: no flight changes.
+/// Of the gyro's bias.
 const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
-/// Halved or doubled: no flight changes.
+/// Of the accelerometer's bias.
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
-/// After this many rejections in a row the filter assumes that the barometer has a new offset, with this standard
-/// deviation, m. Halved and doubled: 144, 144.
+/// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
 const BAROMETER_REJECTIONS: u32 = 25;
-/// Halved and doubled: 144, 144.
+/// Standard deviation of the new offset, m.
 const DOUBT_BAROMETER_M: f64 = 3.0;
 /// After this many rejected numbers in a row (three for each fix) the filter assumes that the estimated position is
-/// wrong, and adds this standard deviation, m. Halved or doubled: no flight changes.
+/// wrong.
 const POSITION_REJECTIONS: u32 = 9;
-/// Halved and doubled: 144, 144.
+/// The standard deviation that it then adds, m.
 const DOUBT_POSITION_M: f64 = 3.0;
-/// After this many rejected ranges in a row the filter assumes that the estimated height is wrong. Halved and doubled: 145, 144.
+/// After this many rejected ranges in a row the filter assumes that the estimated height is wrong.
 const LIDAR_REJECTIONS: u32 = 10;
 
 /// The result of a scalar correction.

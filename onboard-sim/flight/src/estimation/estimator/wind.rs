@@ -13,12 +13,11 @@ use crate::vehicle::airframe::{Airframe, MassProperties};
 use crate::vehicle::fins::{COS_30, PITCH, ROLL, SIN_30, YAW};
 use crate::vehicle::mission::Exhaust;
 
-/// Frames whose sideways force is averaged for one update. Halved and doubled: 147, 144.
+/// Frames whose sideways force is averaged for one update: 20 ms, in which a gust hardly changes.
 const FRAMES: u32 = 4;
-/// Below this dynamic pressure the force is not used, Pa. Halved and doubled: 148, 146.
+/// Below this dynamic pressure the force is not used, Pa: at 6 m/s it is small beside the accelerometer's errors.
 const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
 /// An error of the drag coefficients does not average out. It counts as noise with this correlation time, s.
-/// Halved and doubled: 146, 143.
 const COEFFICIENT_ERROR_LASTS_S: f64 = 2.0;
 
 /// The running mean of the sideways specific force, body y and z.

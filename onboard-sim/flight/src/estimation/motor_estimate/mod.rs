@@ -181,30 +181,27 @@ const AIR: usize = 3;
 const SHAPE: usize = 4;
 
 /// The igniter and the first pressure peak are not in the curve, so samples within this time after ignition are not
-/// used, s. Halved and doubled: 146, 142.
+/// used, s.
 const SPIKE_S: f64 = 0.06;
-/// Correlation time of roughness and shape errors, s: samples within it are not independent. Halved and doubled: 143, 144.
+/// Correlation time of roughness and shape errors, s: samples within it are not independent.
 const ROUGHNESS_LASTS_S: f64 = 0.1;
-/// Gusts along the nose and a lean against the wind change the air force by this fraction, with this correlation time,
-/// s. Halved and doubled: 148, 141.
+/// Gusts along the nose and a lean against the wind change the air force by this fraction.
 const GUST_SHARE: f64 = 0.03;
-/// Halved and doubled: 145, 143.
+/// Correlation time of that change, s.
 const GUST_LASTS_S: f64 = 0.5;
-/// Wander of the air scale in one second: the flow changes with speed, lean and exhaust. Halved and doubled: 146, 147.
+/// Wander of the air scale in one second: the flow changes with speed, lean and exhaust.
 const AIR_WALK_SQRT_S: f64 = 0.01;
-/// Below this air force the air scale is not estimated, N. Halved and doubled: 145, 145.
+/// Below this air force the air scale is not estimated, N: the accelerometer's noise is as large.
 const SMALLEST_AIR_N: f64 = 2.0;
-/// Below this fraction of the peak, in the tail-off, samples are not used. Halved or doubled: no flight changes.
+/// Below this fraction of the peak, in the tail-off, samples are not used.
 const TAIL_SHARE: f64 = 0.08;
 /// A sample that differs from its prediction by more than this many standard deviations is rejected.
-/// Halved and doubled: 146, 144.
 const GATE_SIGMAS: f64 = 5.0;
-/// Below this fraction of the predicted thrust, for this many frames in a row, the motor has burnt out.
-/// Halved or doubled: no flight changes.
+/// Below this fraction of the predicted thrust, for [`STARVED_FRAMES`] in a row, the motor has burnt out: no motor is so weak.
 const STARVED_SHARE: f64 = 0.3;
-/// Halved or doubled: no flight changes.
+/// 80 ms: a dip of the thrust is shorter.
 const STARVED_FRAMES: u32 = 16;
-/// Half the span over which the curve's slope is taken, s. Halved and doubled: 145, 145.
+/// Half the span over which the curve's slope is taken, s.
 const SLOPE_SPAN_S: f64 = 0.02;
 /// Limits of the scales.
 const IMPULSE_RANGE: [f64; 2] = [0.7, 1.3];
@@ -471,12 +468,11 @@ fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
 
 // Finds the instant of ignition with a resolution finer than a frame.
 
-/// The motor burns when the thrust is above this fraction of the peak in two frames in a row. Halved and doubled: 142, 147.
+/// The motor burns when the thrust is above this fraction of the peak in two frames in a row.
 const CAUGHT_SHARE: f64 = 0.1;
-/// Standard deviation of the instant, s. Halved and doubled: 145, 144.
+/// Standard deviation of the instant, s: about a frame.
 const IGNITION_SIGMA_S: f64 = 0.004;
 /// The curve's own rise to that fraction is searched up to this time, and in steps of this length, s.
-/// Halved or doubled: no flight changes.
 const RISE_S: f64 = 0.3;
 const RISE_STEP_S: f64 = 0.0005;
 

@@ -33,36 +33,33 @@ use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{FinalBox, SolverLimits};
 use crate::vehicle::rigid::RigidState;
 
-/// Longest and shortest horizons, intervals.
+/// Longest horizon, intervals: it sets the memory.
 const MOST_INTERVALS: usize = 60;
-/// Halved and doubled: 144, 129.
+/// Shortest horizon, intervals: with fewer a plan cannot lean and come upright again.
 const LEAST_INTERVALS: usize = 6;
 
-/// Homing across the plane ends this long before touchdown, s, and its distance is limited to this, m.
-/// Halved and doubled: 146, 146.
+/// Homing across the plane ends this long before touchdown, s: what leans later does not come upright in time.
 const HOMING_ENDS_S: f64 = 1.5;
-/// Halved and doubled: 146, 144.
+/// The distance for which it leans is limited to this, m.
 const HOMING_MOST_M: f64 = 6.0;
-/// Largest lean that corrects the velocity when a plan is flown to its end, rad. Halved and doubled: 144, 144.
+/// Largest lean that corrects the velocity when a plan is flown to its end, rad: 3 degrees,
+/// well within what the legs take.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
-/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take. 4 to 7 degrees
-/// land as many. Halved and doubled: 144, 143.
+/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take.
 const CONTACT_LEAN_RAD: f64 = 0.0873;
 
-/// Factor on the cost of tilt when a plan tilts too far. Halved and doubled: 148, 145. Leaving a vehicle that is high its far
-/// leans gained 13 of 1,000 `real` flights on the seeds it was chosen on, 8 of 4,000 on others, and an abort that lights the
-/// motor high then comes down hard even in a world without errors.
+/// Factor on the cost of tilt when a plan tilts too far. It holds for a vehicle that is high, too: with its far leans an abort
+/// that lights the motor high comes down hard even in a world without errors.
 const UPRIGHT_DEARER: f64 = 8.0;
 
-/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one. Halved and doubled: 132, 144.
+/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one.
 const SOFT_M_S: f64 = -0.7;
 
 /// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the upright law brakes just as well.
-/// Halved and doubled: 138, 146.
 const HARD_M_S: f64 = -1.2;
 
-/// A plan that still tilts further than this is not flown, rad. Halved and doubled: 123, 144.
+/// A plan that still tilts further than this is not flown, rad: its nose points below the horizon.
 const TILT_BELIEVED_RAD: f64 = 1.6;
 
 /// Velocity along the nose at the plan's touchdown, m/s; minus infinity without a plan.

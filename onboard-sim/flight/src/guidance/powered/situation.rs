@@ -116,11 +116,10 @@ impl Motor for Ahead<'_, '_> {
 // The vertical plane of a planned landing.
 
 /// If the correction (velocity and weighted distance) is smaller than this, the plane lies along the wind, m/s.
-/// Halved and doubled: 144, 143.
 const CHOOSING_SPEED_M_S: f64 = 1.0;
 
 /// Weight of the distance from the pad, as a velocity, when the plane is chosen, 1/s. It is the ratio of the terms
-/// `6 p / t^2` and `4 v / t` of the least-effort law in four seconds. Halved and doubled: 146, 143.
+/// `6 p / t^2` and `4 v / t` of the least-effort law in four seconds.
 const HOMING_PER_S: f64 = 0.375;
 
 /// The elevation of a direction, rad, from -pi/2 to 3 pi/2. It is continuous except straight down, where it jumps by a
