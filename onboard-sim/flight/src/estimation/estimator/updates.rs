@@ -24,15 +24,11 @@ const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
 /// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
 const BAROMETER_REJECTIONS: u32 = 25;
-/// Standard deviation of the new offset, m.
-const DOUBT_BAROMETER_M: f64 = 3.0;
-/// After this many rejected numbers in a row (three for each fix) the filter assumes that the estimated position is
-/// wrong.
-const POSITION_REJECTIONS: u32 = 9;
-/// The standard deviation that it then adds, m.
+/// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row the filter assumes that the
+/// estimated position is wrong.
+const POSITION_REJECTIONS: u32 = 10;
+/// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong, m.
 const DOUBT_POSITION_M: f64 = 3.0;
-/// After this many rejected ranges in a row the filter assumes that the estimated height is wrong.
-const LIDAR_REJECTIONS: u32 = 10;
 
 /// The result of a scalar correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,7 +105,7 @@ impl Estimator {
         }
         if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
             self.gates.barometer.rejected_in_a_row = 0;
-            self.covariance.widen(BAROMETER_OFFSET, DOUBT_BAROMETER_M * DOUBT_BAROMETER_M);
+            self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
         }
     }
 
@@ -224,7 +220,7 @@ impl Estimator {
             let late_m = self.nominal.lidar_late_s * climb_m_s;
             self.heights.take_lidar(&self.config, measured_m * nose.z + late_m, nose.z);
         }
-        if self.gates.lidar.rejected_in_a_row >= LIDAR_REJECTIONS {
+        if self.gates.lidar.rejected_in_a_row >= POSITION_REJECTIONS {
             self.gates.lidar.rejected_in_a_row = 0;
             self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
         }
