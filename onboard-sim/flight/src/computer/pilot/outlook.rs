@@ -120,14 +120,12 @@ impl Pilot {
 
 /// A reason that has kept the gate shut for this long, s, will not go away before ignition.
 const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s: long enough to see that a refusal lasts.
+/// The decision is taken this long before the room for the parachute ends, s. As long may a due ignition be refused: a fin
+/// that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights.
 const BEFORE_S: f64 = 0.1;
 /// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
 /// them: such a vehicle tumbles, or does not know where it is.
 const FAR_BEYOND: f64 = 2.0;
-/// A fin that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights. If the gate stays shut for
-/// longer than this after ignition was due, s, there is another reason.
-const OVERDUE_S: f64 = 0.1;
 
 impl Pilot {
     /// The event that the gate will not open any more, as soon as waiting gains nothing.
@@ -169,7 +167,7 @@ impl Pilot {
             (lasts && (refused || last_room))
                 || (refused
                     && last_room
-                    && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= OVERDUE_S)))
+                    && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= BEFORE_S)))
                 || too_low
         };
         // Any lower, the parachute reaches the ground before it is ejected.
