@@ -11,7 +11,7 @@ use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
-use crate::guidance::descent::DescentSituation;
+use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::gate::{GateInput, gate_checks};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
@@ -30,15 +30,13 @@ const STEERING_THRUST_N: f64 = 3.0;
 /// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
 /// fins can set against it: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
-/// Below this airspeed the air cannot turn the vehicle, m/s.
-const AIR_TURNS_M_S: f64 = 12.0;
 
 /// Whether the air comes so far from the side that only fully open fins turn the vehicle back.
 fn lies_across_the_air(estimate: &Estimate) -> bool {
     let through_air = estimate.velocity_through_air_m_s();
     let airspeed_m_s = through_air.norm();
     let along_m_s = -through_air.dot(&estimate.state.nose_in_world());
-    airspeed_m_s > AIR_TURNS_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
+    airspeed_m_s > LEAST_AIRSPEED_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
 }
 
 /// What the estimator may use before apogee. The booster's drag and masses are not those of the vehicle, so the air
