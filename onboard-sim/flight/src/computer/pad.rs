@@ -197,7 +197,8 @@ pub(super) fn as_measured(sensed: &Sensed) -> Measurements {
 
 /// Fins and gimbal are moved by this much, rad.
 const MOVED_RAD: f64 = 0.05;
-/// An actuator farther than this from its command counts as not answering, rad.
+/// An actuator farther than this from its command counts as not answering, rad; one that has moved by this much answers. It is
+/// more than the play of a linkage.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
 /// The self-test has failed if it has not passed this long after power-up, s.
 const LIMIT_S: f64 = 3.0;

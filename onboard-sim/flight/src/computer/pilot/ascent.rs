@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::Sensed;
 use crate::computer::memory::remembers;
 use crate::computer::news::Severity;
+use crate::computer::pad::ANSWERING_RAD;
 use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Event, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -247,8 +248,6 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 // A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded angle may still be
 // stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
-/// A fin that has moved by this much is working, rad: it is more than the play of its linkage.
-const MOVED_RAD: f64 = 0.015;
 /// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
 const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
 /// A fin is stuck if its command has been far away for this long in total and it has not moved, s: more than ten times the
@@ -277,7 +276,7 @@ impl FinWatch {
     /// Takes a frame: measured and commanded angles of the fins, rad.
     pub(super) fn look(&mut self, found_rad: &[f64; 4], told_rad: &[f64; 4], frame_s: f64) {
         for ((fin, found_rad), told_rad) in self.fins.iter_mut().zip(found_rad).zip(told_rad) {
-            if (found_rad - fin.rests_at_rad).abs() > MOVED_RAD {
+            if (found_rad - fin.rests_at_rad).abs() > ANSWERING_RAD {
                 *fin = Watched { rests_at_rad: *found_rad, called_for_s: 0.0 };
             } else if (told_rad - found_rad).abs() > FAR_RAD {
                 fin.called_for_s += frame_s;
