@@ -380,7 +380,7 @@ pub(crate) struct Args {
     file: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
-    /// Outcome in JSON, with every tick.
+    /// Answer in JSON, with every tick.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
     /// Outcome as CSV, with every tick.

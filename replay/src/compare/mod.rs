@@ -336,10 +336,10 @@ pub(crate) struct Args {
     /// before their flight did. Anything left out is not tolerated.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
-    /// Outcome in JSON.
+    /// Answer in JSON.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
-    /// Outcome in JUnit XML.
+    /// Answer in JUnit XML.
     #[arg(long)]
     junit: bool,
 }

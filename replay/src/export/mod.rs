@@ -74,7 +74,7 @@ pub(crate) struct Args {
     /// Replace existing files.
     #[arg(long)]
     force: bool,
-    /// Outcome in JSON.
+    /// Answer in JSON.
     #[arg(long)]
     json: bool,
 }

@@ -510,7 +510,7 @@ pub(crate) struct Args {
     write_mission: Option<PathBuf>,
     #[command(flatten)]
     day: day::Arguments,
-    /// Outcome in JSON.
+    /// Answer in JSON.
     #[arg(long)]
     json: bool,
 }

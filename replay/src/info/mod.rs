@@ -664,7 +664,7 @@ pub(crate) struct Args {
     /// The logs, MCAP files; - is standard input.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Outcome in JSON: a description, or a list of descriptions for several logs.
+    /// Answer in JSON: a description, or a list of descriptions for several logs.
     #[arg(long)]
     json: bool,
 }

@@ -301,7 +301,7 @@ pub(crate) struct Args {
     /// Replace an existing file, but never the damaged log itself.
     #[arg(long)]
     force: bool,
-    /// Outcome in JSON.
+    /// Answer in JSON.
     #[arg(long)]
     json: bool,
 }

@@ -511,7 +511,7 @@ pub(crate) struct Args {
     vary: vary::Arguments,
     #[command(flatten)]
     flip: flip::Arguments,
-    /// Outcome in JSON; with --vary, every point.
+    /// Answer in JSON; with --vary, every point.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
 }

@@ -500,10 +500,10 @@ pub(crate) struct Args {
     /// The logs, MCAP files, and directories of logs.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Outcome in JSON: a report, or a list of reports for several logs.
+    /// Answer in JSON: a report, or a list of reports for several logs.
     #[arg(long, conflicts_with = "junit")]
     json: bool,
-    /// Outcome in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
+    /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
     junit: Option<PathBuf>,
     /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
