@@ -198,7 +198,7 @@ fn the_log_holds_the_start_every_frame_and_how_well_the_estimate_knew_itself() {
 /// As from a board: the truth is in the log alone.
 #[test]
 fn the_crew_sees_where_the_servos_say_that_they_are() {
-    let mut rocket = in_phase(&flight_of("field", &[]), Phase::Powered);
+    let mut rocket = in_phase(&flight_of("real", &[]), Phase::Powered);
     let mut apart = 0;
     for _ in 0..200 {
         rocket.advance();
