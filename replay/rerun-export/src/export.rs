@@ -223,11 +223,16 @@ impl<'a> Export<'a> {
 
     /// A frame of the flight computer; its values are plotted with the truth.
     fn frame(&mut self, frame: &LoggedFrame, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
+        let in_flight = frame.tick.zip(frame.flight_time_s());
+        if let Some((tick, time_s)) = in_flight {
+            self.times.learn(time_s, log_time_ns);
+            self.times.tick(tick);
+            self.times.at_vehicle_time(self.recording, time_s);
+        }
         let flown = self.run_again(|again| again.frame(&frame.record, record))?;
-        let Some((tick, time_s)) = frame.tick.zip(frame.flight_time_s()) else { return Ok(()) };
-        self.times.learn(time_s, log_time_ns);
-        self.times.tick(tick);
-        self.times.at_vehicle_time(self.recording, time_s);
+        if in_flight.is_none() {
+            return Ok(());
+        }
         self.done.ticks += 1;
         self.phase(frame.record.output.phase)?;
         self.plots.level(frame.record.output.level)?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::logs::{folder, write_log};
+use crate::logs::{folder, in_the_third_chunk, write_log};
 
 /// Exit code and output.
 fn run(arguments: &[&Path]) -> (Option<i32>, String) {
@@ -34,7 +34,7 @@ fn damage_is_a_warning_and_no_log_is_an_error() {
     let (folder, log, rrd) = folder();
     write_log(&log, true);
     let bytes = std::fs::read(&log).unwrap();
-    std::fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(&log, &bytes[..in_the_third_chunk(&bytes)]).unwrap();
     let (code, said) = run(&[&log, Path::new("-o"), &rrd]);
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("flight.mcap is damaged: ends after"), "{said}");

@@ -6,7 +6,7 @@ use replay_rerun::{
     ExportError, Overwrite, Towards, entity, export_file, export_file_with, follow_file, send_file,
 };
 
-use crate::logs::{TICKS, folder, write_apogee_log, write_log, write_telemetry_log};
+use crate::logs::{TICKS, folder, in_the_third_chunk, write_apogee_log, write_log, write_telemetry_log};
 use crate::read_back::Recording;
 
 /// A log that grows by a tenth each time its reader waits has the recording of the whole log, and its layout is there before
@@ -49,7 +49,7 @@ fn a_log_that_stops_growing_is_recorded_as_far_as_it_goes() {
     let (_folder, log, rrd) = folder();
     write_log(&log, true);
     let bytes = std::fs::read(&log).unwrap();
-    std::fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(&log, &bytes[..in_the_third_chunk(&bytes)]).unwrap();
     let followed = follow_file(&log, Towards::File(&rrd, Overwrite::Never), || false).unwrap();
     assert!(followed.damage.is_some() && followed.ticks < TICKS, "{followed:?}");
     assert_eq!(Recording::read(&rrd).rows("plots/fins_mean_deg/replayed"), followed.ticks as usize);

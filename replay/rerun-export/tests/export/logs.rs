@@ -68,6 +68,21 @@ pub(crate) fn first_frames(count: usize) -> (LogHeader, ComputerStart, Vec<Compu
     (campaign_header(&recipe, 0), start, frames)
 }
 
+/// A place in a log's third chunk, where it may be cut.
+pub(crate) fn in_the_third_chunk(log: &[u8]) -> usize {
+    const MAGIC_BYTES: usize = 8;
+    const CHUNK: u8 = 6;
+    let (mut at, mut chunks) = (MAGIC_BYTES, 0);
+    loop {
+        let length = u64::from_le_bytes(log[at + 1..at + 9].try_into().unwrap()) as usize;
+        chunks += usize::from(log[at] == CHUNK);
+        if chunks == 3 {
+            return at + length / 2;
+        }
+        at += 9 + length;
+    }
+}
+
 fn nanoseconds(time_s: f64) -> u64 {
     (time_s * 1e9).round() as u64
 }
