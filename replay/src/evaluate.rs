@@ -383,7 +383,7 @@ pub(crate) struct Args {
     /// Answer in JSON, with every tick.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
-    /// Outcome as CSV, with every tick.
+    /// Answer as CSV, with every tick.
     #[arg(long)]
     csv: bool,
 }

@@ -11,7 +11,8 @@ pub trait Board {
 
     /// Waits for the end of the frame, 5 ms after the last one, and reads everything: gyro and accelerometer in every frame,
     /// barometer, satellites and lidar if they have something new; gimbal and fins as commanded if their servos do not say
-    /// where they are. Number and time of the frame are set by the loop. `None`: the flight is over.
+    /// where they are. [`Input`] says what each value is; its number and its time are set by the loop. `None`: the
+    /// flight is over.
     ///
     /// # Errors
     /// A device without which nothing can be decided has failed: the loop ends.

@@ -54,7 +54,8 @@ fn main() {
     let mut unchanged = BTreeMap::new();
     for at in 0..rows.len() {
         let row = &mut rows[at];
-        if if asked.is_empty() { row.halved.is_empty() } else { !asked.contains(&row.constant) } {
+        let wanted = if asked.is_empty() { !row.halved.is_empty() } else { asked.contains(&row.constant) };
+        if !wanted {
             continue;
         }
         let file = row.file.strip_prefix("onboard-sim/vehicles/missions/");

@@ -1,5 +1,4 @@
-//! The flight computer of a log, run again on its recorded frames. A replay and a board use the same
-//! code.
+//! The flight computer of a log, run again on its recorded frames. A replay and a board use the same code.
 
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Output, flight_time_s};

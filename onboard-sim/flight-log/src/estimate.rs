@@ -218,13 +218,13 @@ pub(crate) fn list<const N: usize>(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use proptest::prelude::*;
     use prost::Message as _;
 
     /// Any bit pattern: NaN payloads, both zeros, infinities, subnormals.
-    fn any_bits() -> impl Strategy<Value = f64> {
+    pub(crate) fn any_bits() -> impl Strategy<Value = f64> {
         prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(0.0), Just(-0.0), Just(f64::NAN)]
     }
 

@@ -363,9 +363,7 @@ mod tests {
     use proptest::prelude::*;
     use prost::Message as _;
 
-    fn any_bits() -> impl Strategy<Value = f64> {
-        prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(0.0), Just(-0.0), Just(f64::NAN)]
-    }
+    use crate::estimate::tests::any_bits;
 
     fn any_uplink() -> impl Strategy<Value = Uplink> {
         prop_oneof![

@@ -14,7 +14,7 @@ pub(crate) struct Again {
     /// The first frame with a different result.
     pub(crate) first_different: Option<u64>,
     /// Frames run again, and how many of them were identical bit for bit.
-    pub(crate) ticks: u64,
+    pub(crate) frames: u64,
     pub(crate) identical: u64,
     /// Why it was not run to the end, if so.
     pub(crate) obstacle: Option<String>,
@@ -80,19 +80,21 @@ impl Again {
 
     /// The result in words; `None` if there was nothing to run again.
     pub(crate) fn words(&self) -> Option<String> {
-        let Self { ticks, identical, obstacle, .. } = self;
+        let Self { frames, identical, obstacle, .. } = self;
         let ended =
             obstacle.as_ref().map(|reason| format!("; not run to the end: {reason}")).unwrap_or_default();
-        (*ticks > 0 || obstacle.is_some()).then(|| {
-            format!("run again by this build, {identical} of {ticks} ticks are identical bit for bit{ended}")
+        (*frames > 0 || obstacle.is_some()).then(|| {
+            format!(
+                "run again by this build, {identical} of {frames} frames are identical bit for bit{ended}"
+            )
         })
     }
 
-    fn compare(&mut self, tick: u64, identical: bool) {
-        self.ticks += 1;
+    fn compare(&mut self, frame: u64, identical: bool) {
+        self.frames += 1;
         self.identical += u64::from(identical);
         if !identical {
-            self.first_different.get_or_insert(tick);
+            self.first_different.get_or_insert(frame);
         }
     }
 

@@ -256,8 +256,8 @@ impl<'a> Export<'a> {
     ) -> RecordingStreamResult<Option<T>> {
         let before = (self.again.first_different, self.again.obstacle.is_some());
         let again = run(&mut self.again);
-        if let (None, Some(tick)) = (before.0, self.again.first_different) {
-            words::replay(self.recording, &format!("tick {tick}, run again, differs from the record"))?;
+        if let (None, Some(frame)) = (before.0, self.again.first_different) {
+            words::replay(self.recording, &format!("frame {frame}, run again, differs from the record"))?;
         }
         if let (false, Some(reason)) = (before.1, &self.again.obstacle) {
             words::replay(self.recording, &format!("from here on nothing is run again: {reason}"))?;

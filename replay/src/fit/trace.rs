@@ -161,15 +161,7 @@ impl Trace {
                     let phase =
                         phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
                     let read = read.input();
-                    let input = PilotInput {
-                        frame: number,
-                        time_s: read.time_s,
-                        sensed: read.sensed,
-                        fins_rad: read.fins_rad,
-                        contact: read.contact,
-                        igniter_continuity: read.igniter_continuity,
-                        booster_attached: read.booster_attached,
-                    };
+                    let input = PilotInput::of(&read, 0);
                     let believed =
                         estimate_from_log(&estimate, number).map_err(|error| unknown(error.to_string()))?;
                     if trace.is_none() {

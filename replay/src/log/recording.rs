@@ -85,6 +85,8 @@ pub struct Recording {
     pub head: Head,
     /// The start record of the flight computer at its release, where its frames and their times begin.
     pub start: Option<ComputerStart>,
+    /// The log has the power-up: the digests of its frames cover what the computer remembers of the pad.
+    pub from_power_up: bool,
     /// Its frames in flight, in file order: numbers and times count from the release.
     pub frames: Vec<ComputerFrame>,
     /// Number of frames before the first lost one.
@@ -159,12 +161,9 @@ impl Recording {
                         recording.frames.push(tick);
                     }
                 }
-                Entry::ComputerStart(_)
-                | Entry::Estimate(_)
-                | Entry::Verdict(_)
-                | Entry::RawFrame
-                | Entry::Operator
-                | Entry::Other => {}
+                Entry::ComputerStart(start) => recording.from_power_up |= !start.released,
+                Entry::Estimate(_) | Entry::Verdict(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {
+                }
             }
             recording.check_length()?;
         }

@@ -60,7 +60,7 @@ impl<'a> Prepared<'a> {
                 && let Some(then) = recorded_frame(&frames[..place], rerun.flight.frame())
             {
                 reached.frames += 1;
-                if is_same_flight(&now, then) {
+                if is_same_flight(&now, then, !recording.from_power_up) {
                     reached.identical += 1;
                 } else {
                     reached.first_different.get_or_insert(then.input.frame);
@@ -360,9 +360,9 @@ fn is_down(tick: &ComputerFrame) -> bool {
     matches!(phase_of(&tick.output), Some(Phase::Touchdown | Phase::Safed))
 }
 
-/// Whether two frames are of the same flight: what was felt, and what was decided. What only a crew or a log's disk makes
-/// different does not count.
-fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame) -> bool {
+/// Whether two frames are of the same flight: what was felt, what was decided, and what is remembered, unless that covers a
+/// pad. What only a crew or a log's disk makes different does not count.
+fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let felt = |frame: &ComputerFrame| {
         let ComputerInput {
             measured, known, fins_rad, contact, igniter_continuity, booster_attached, ..
@@ -377,7 +377,8 @@ fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame) -> bool {
             ..ComputerInput::default()
         };
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
-        ComputerFrame { input, output, state_digest: 0 }.encode_to_vec()
+        let state_digest = if same_memory { frame.state_digest } else { 0 };
+        ComputerFrame { input, output, state_digest }.encode_to_vec()
     };
     felt(now) == felt(then)
 }

@@ -354,7 +354,7 @@ pub(super) struct Arguments {
     /// Points to show.
     #[arg(long, value_name = "N", default_value_t = 20)]
     top: usize,
-    /// Outcome as CSV, with every point on every flight.
+    /// Answer as CSV, with every point on every flight.
     #[arg(long)]
     csv: bool,
 }

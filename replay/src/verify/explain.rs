@@ -103,7 +103,7 @@ pub struct TickReport {
     pub recorded_gimbal_rad: Vec<f64>,
     /// The gimbal commands of this build, rad.
     pub gimbal_rad: Vec<f64>,
-    /// Whether the whole output is equal to the recorded one, bit for bit.
+    /// Whether the whole output is equal to the recorded one, bit for bit; and the memory, unless it covers the pad.
     pub identical: bool,
     /// The solve as in flight; `None` if this tick solved nothing.
     pub warm: Option<Solved>,
@@ -146,8 +146,8 @@ pub struct PathPoint {
 /// See [`TickError`].
 pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
     let (start, frames) = recording.replayable_frames()?;
-    let mut controller =
-        LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
+    let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
+    let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
     let place = frames.iter().position(|tick| tick.input.frame == number).ok_or_else(|| {
         let bound = |tick: Option<&ComputerFrame>| tick.map_or(0, |tick| tick.input.frame);
         TickError::NoTick {
@@ -184,7 +184,7 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
         level: level_of(&again.output).map_or("unknown", ControlLevel::name),
         recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
         gimbal_rad: again.output.gimbal_rad.clone(),
-        identical: again.output.encode_to_vec() == recorded.output.encode_to_vec(),
+        identical: again.encode_to_vec() == recorded.encode_to_vec(),
         warm: warm.map(solved_facts),
         cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
         nearest_solved: nearest(

@@ -37,6 +37,7 @@ use self::pad_check::PadCheck;
 use self::pilot::{BoosterCommands, Pilot, PilotInput, PilotOutput, Sensed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
+use crate::estimation::estimator::Estimate;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::{PredictedLanding, Uplink};
@@ -109,16 +110,16 @@ impl Computer {
         if self.table.mode().phase.on_pad() {
             self.pad.feel(&input.sensed);
         }
-        let in_flight = self.release.map(|release| PilotInput::of(input, release));
-        if let Some(flown) = &in_flight {
-            self.pilot.look(&mut self.table, flown);
-            self.flown = in_flight;
-        }
+        let in_flight = self.release.map(|release| {
+            let flown = *self.flown.insert(PilotInput::of(input, release.frame));
+            let estimate = self.pilot.look(&mut self.table, &flown);
+            (flown, estimate)
+        });
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
-        let planned = if let Some(flown) = &in_flight {
-            self.fly(flown)
+        let planned = if let Some((flown, estimate)) = &in_flight {
+            self.fly(flown, estimate)
         } else {
             self.wait_on_the_pad(input);
             false
@@ -170,8 +171,9 @@ impl Computer {
     }
 
     /// The rest of a frame in the air, or on the ground after the flight. Returns whether it planned.
-    fn fly(&mut self, input: &PilotInput) -> bool {
-        let PilotOutput { gimbal_rad, fins_rad, level, booster } = self.pilot.fly(&mut self.table, input);
+    fn fly(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
+        let PilotOutput { gimbal_rad, fins_rad, level, booster } =
+            self.pilot.fly(&mut self.table, input, estimate);
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {

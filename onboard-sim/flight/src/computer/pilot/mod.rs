@@ -16,7 +16,7 @@ use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
 use self::known::{Burning, Known};
 pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
 use crate::computer::memory::remembers;
-use crate::computer::{Input, Release, flight_time_s};
+use crate::computer::{Input, flight_time_s};
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
@@ -24,7 +24,6 @@ use crate::guidance::baseline::{Baseline, Law};
 use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
 use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
-use crate::vehicle::atmosphere::Air;
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
@@ -62,8 +61,9 @@ pub struct PilotInput {
 }
 
 impl PilotInput {
-    pub(super) fn of(input: &Input<'_>, release: Release) -> Self {
-        let frame = input.frame.saturating_sub(release.frame);
+    /// The pilot's part of an input; `released` is the number of the frame in which the vehicle was released.
+    pub fn of(input: &Input<'_>, released: u64) -> Self {
+        let frame = input.frame.saturating_sub(released);
         Self {
             frame,
             time_s: flight_time_s(frame),
@@ -301,8 +301,7 @@ impl Pilot {
         let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
         let estimate = self.estimate.as_ref()?;
         // As in the frame itself, `Pilot::fly`.
-        let density_kg_m3 =
-            Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3;
+        let density_kg_m3 = self.density_kg_m3(estimate);
         let mass = self.known.mass_now(Some(burning_s));
         let lands_here = mode.interlocks.lands_here;
         let burning = Burning { burning_s, mass, density_kg_m3, lands_here };

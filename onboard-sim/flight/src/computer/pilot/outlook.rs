@@ -9,7 +9,7 @@ use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
 use crate::rules::gate::GateInput;
 use crate::rules::phase::{Event, Mode, Phase};
-use crate::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// The commit height is the height that the parachute needs, times this: half as much again, because ejection and filling
 /// scatter.
@@ -105,10 +105,9 @@ impl Pilot {
     /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, positive downwards;
     /// `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {
-        let state = self.estimate.as_ref()?.state;
-        let known = &self.known;
-        let density_kg_m3 = Air::at_height_m(known.mission.pad_altitude_m + state.position_m.z).density_kg_m3;
-        let column = known.column(density_kg_m3, known.mission.soft_tilt_deg);
+        let estimate = self.estimate.as_ref()?;
+        let (known, state) = (&self.known, &estimate.state);
+        let column = known.column(self.density_kg_m3(estimate), known.mission.soft_tilt_deg);
         let fins_m2 = known.motor.air_scale() * known.largest_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
@@ -207,12 +206,12 @@ mod tests {
 
     /// One frame, in which the crew may abort.
     fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &PilotInput, abort: bool) -> [f64; 4] {
-        pilot.look(table, input);
+        let estimate = pilot.look(table, input);
         if abort {
             let event = pilot.abort_event(table.mode(), Some(input));
             pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
         }
-        pilot.fly(table, input).fins_rad
+        pilot.fly(table, input, &estimate).fins_rad
     }
 
     /// Whether an abort in the very next frame releases the parachute.

@@ -55,7 +55,7 @@ fn on_the_way_up(
 impl Pilot {
     /// The first part of a frame, before the crew is answered: estimate, motor, ascent, outlook. Every event goes through
     /// the `table`.
-    pub(in crate::computer) fn look(&mut self, table: &mut PhaseTable, input: &PilotInput) {
+    pub(in crate::computer) fn look(&mut self, table: &mut PhaseTable, input: &PilotInput) -> Estimate {
         let estimate = self.sense(table.mode().phase, input);
         self.estimate = Some(estimate);
         let density_kg_m3 = self.density_kg_m3(&estimate);
@@ -73,17 +73,19 @@ impl Pilot {
             self.look_ahead(&estimate, density_kg_m3);
         }
         self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
+        estimate
     }
 
-    /// The second part of a frame: move through the phases, plan, point fins and gimbal.
-    pub(in crate::computer) fn fly(&mut self, table: &mut PhaseTable, input: &PilotInput) -> PilotOutput {
+    /// The second part of a frame, with what was estimated in the first: move through the phases, plan, point fins and gimbal.
+    pub(in crate::computer) fn fly(
+        &mut self,
+        table: &mut PhaseTable,
+        input: &PilotInput,
+        estimate: &Estimate,
+    ) -> PilotOutput {
         let time_s = input.time_s;
-        // Where nobody has looked, the last commands hold.
-        let Some(estimate) = self.estimate else {
-            return self.pointing(table.mode(), ControlLevel::Idle);
-        };
-        let density_kg_m3 = self.density_kg_m3(&estimate);
-        self.move_through_phases(table, input, &estimate);
+        let density_kg_m3 = self.density_kg_m3(estimate);
+        self.move_through_phases(table, input, estimate);
         let mode = *table.mode();
         let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
 
@@ -93,34 +95,25 @@ impl Pilot {
         let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3, lands_here });
         let flying = mode.phase.in_landing_burn();
         let burning = situation.as_ref().filter(|_| flying);
-        let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, &estimate));
+        let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, estimate));
         if let Some((gimbal_rad, fins_rad)) = by_baseline {
             (self.gimbal_rad, self.fins_rad) = (gimbal_rad, fins_rad);
         } else {
             self.gimbal_rad = match burning {
                 Some(burning) => {
                     if planning {
-                        self.plan(time_s, &estimate, burning, &input.fins_rad);
+                        self.plan(time_s, estimate, burning, &input.fins_rad);
                     }
                     self.fin_share = self.powered.fin_share(time_s).unwrap_or(self.fin_share);
-                    self.gimbal(time_s, &estimate, burning, &input.fins_rad)
+                    self.gimbal(time_s, estimate, burning, &input.fins_rad)
                 }
                 None => match situation.as_ref().filter(|_| self.balances(&mode)) {
-                    Some(burning) => self.turned_towards(&Aim::upright(), &estimate, burning),
+                    Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
                     None => [0.0; 2],
                 },
             };
-            self.fins_rad = self.fins(&mode, &estimate, &mass, density_kg_m3, burning.is_some());
+            self.fins_rad = self.fins(&mode, estimate, &mass, density_kg_m3, burning.is_some());
         }
-        let level = match flying {
-            true if by_baseline.is_some() => ControlLevel::Stabiliser,
-            true => self.powered.report().level,
-            false => ControlLevel::Idle,
-        };
-        self.pointing(&mode, level)
-    }
-
-    fn pointing(&self, mode: &Mode, level: ControlLevel) -> PilotOutput {
         PilotOutput {
             gimbal_rad: self.gimbal_rad,
             fins_rad: self.fins_rad,
@@ -128,11 +121,16 @@ impl Pilot {
                 ignite: mode.phase == Phase::Boost && !self.ascent.has_lifted_off(),
                 separate: self.ascent.separates(),
             },
-            level,
+            level: match flying {
+                true if by_baseline.is_some() => ControlLevel::Stabiliser,
+                true => self.powered.report().level,
+                false => ControlLevel::Idle,
+            },
         }
     }
 
-    fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
+    /// Of the air at the estimated height, kg/m3.
+    pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
         Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
     }
 
