@@ -39,11 +39,9 @@ impl SensorWatch {
 
     /// The facts at a frame; `None` where no sensors are modelled.
     pub fn facts(&self, frame: u64) -> Option<SensorFacts> {
-        let last = self.last.as_ref()?;
         let within = |at: Option<u64>, frames: u64| at.is_some_and(|at| frame.saturating_sub(at) <= frames);
         Some(SensorFacts {
-            gyro_rad_s: last.imu.gyro_rad_s.into(),
-            specific_force_m_s2: last.imu.specific_force_m_s2.into(),
+            last: self.last?,
             pressure_altitude_m: self.pressure_altitude_m,
             barometer: within(self.barometer, BAROMETER_FRAMES),
             gnss: within(self.gnss, GNSS_FRAMES),

@@ -7,6 +7,7 @@ use alloc::vec::Vec;
 use flight::computer::crew::People;
 use flight::computer::pilot::ApogeeAhead;
 use flight::computer::{AbortEffect, Commander, Computer, LogState};
+use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
@@ -306,10 +307,8 @@ pub struct EstimatorFacts {
 /// What the sensors said last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorFacts {
-    /// Rotation rate, body, rad/s.
-    pub gyro_rad_s: [f64; 3],
-    /// Acceleration less gravity, body, m/s^2.
-    pub specific_force_m_s2: [f64; 3],
+    /// The last frame's.
+    pub last: Measurements,
     /// Pressure height, m, when it last reported.
     pub pressure_altitude_m: f64,
     /// The barometer reports.

@@ -288,8 +288,9 @@ fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
         | U::HIGHRES_IMU_UPDATED_YGYRO
         | U::HIGHRES_IMU_UPDATED_ZGYRO;
     fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, sensors.barometer);
-    let [xacc, yacc, zacc] = sensors.specific_force_m_s2.map(|force| force as f32);
-    let [xgyro, ygyro, zgyro] = sensors.gyro_rad_s.map(|rate| rate as f32);
+    let imu = &sensors.last.imu;
+    let [xacc, yacc, zacc] = <[f64; 3]>::from(imu.specific_force_m_s2).map(|force| force as f32);
+    let [xgyro, ygyro, zgyro] = <[f64; 3]>::from(imu.gyro_rad_s).map(|rate| rate as f32);
     Some(MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
         time_usec: (1e6 * snapshot.time_s) as u64,
         xacc,
