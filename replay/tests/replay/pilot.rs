@@ -58,10 +58,8 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         };
         let falling_m = believed.position_m.z - 0.5 * 9.81 * time_s * time_s;
         let measured = Measurements {
-            imu,
             pressure_altitude_m: frame.is_multiple_of(4).then_some(falling_m),
-            gnss: None,
-            lidar_range_m: None,
+            ..Measurements::of_imu(imu)
         };
         let input = Input {
             frame,

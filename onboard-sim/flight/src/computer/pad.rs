@@ -181,15 +181,15 @@ pub(super) fn as_measured(sensed: &Sensed) -> Measurements {
         Sensed::Known(estimate) => estimate,
     };
     let state = &estimate.state;
+    let imu = ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: estimate.specific_force_m_s2 };
     Measurements {
-        imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: estimate.specific_force_m_s2 },
         pressure_altitude_m: Some(state.position_m.z),
         gnss: Some(GnssFix {
             position_m: state.position_m,
             velocity_m_s: state.velocity_m_s,
             valid_at_s: estimate.time_s,
         }),
-        lidar_range_m: None,
+        ..Measurements::of_imu(imu)
     }
 }
 

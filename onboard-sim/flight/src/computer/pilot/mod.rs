@@ -450,11 +450,10 @@ pub(super) mod sample {
             gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
             specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
         };
-        let measured = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
         PilotInput {
             frame,
             time_s: 0.005 * frame as f64,
-            sensed: Sensed::Measured(measured),
+            sensed: Sensed::Measured(Measurements::of_imu(imu)),
             fins_rad: [0.0; 4],
             contact: false,
             igniter_continuity: true,

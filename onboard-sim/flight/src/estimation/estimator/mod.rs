@@ -400,3 +400,10 @@ pub struct Measurements {
     /// Distance to the ground along body `-x` from the lidar, m.
     pub lidar_range_m: Option<f64>,
 }
+
+impl Measurements {
+    /// Of a frame in which no other sensor reported.
+    pub fn of_imu(imu: ImuSample) -> Self {
+        Self { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None }
+    }
+}

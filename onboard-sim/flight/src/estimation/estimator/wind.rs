@@ -257,8 +257,7 @@ mod tests {
             state.velocity_m_s +=
                 FRAME_S * (state.world_from_body * felt_m_s2 - Vector3::z() * STANDARD_GRAVITY_M_S2);
             let imu = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: felt_m_s2 };
-            let seen = Measurements { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None };
-            estimator.step(&seen, &vehicle);
+            estimator.step(&Measurements::of_imu(imu), &vehicle);
         }
         estimator.estimate().wind_m_s
     }
