@@ -159,7 +159,7 @@ pub fn closing(
 
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
     let mut text = String::from("landing verdict, against the vehicle's limits\n");
-    for row in limit_rows(&verdict.touchdown, model.vehicle.limits.as_ref()) {
+    for row in limit_rows(&verdict.touchdown, model.vehicle.limits().as_ref()) {
         let word = if row.kept { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(

@@ -103,7 +103,7 @@ pub fn is_unheard(vehicle: &Vehicle, now: Duration) -> bool {
 }
 
 fn acceleration_error_m_s2(vehicle: &Vehicle, phase: TdPhase, basis: Basis) -> f64 {
-    let chute = vehicle.descent.as_ref().map(|descent| descent.value.chute);
+    let chute = vehicle.descent().map(|descent| descent.value.chute);
     match phase {
         TdPhase::TD_PHASE_BOOST => LIFTED_ERROR_M_S2,
         _ if basis == Basis::FreeFall => OPENING_ERROR_M_S2,
@@ -229,9 +229,11 @@ impl LastMotion {
         // An unknown position stays unknown; an unknown velocity is taken as zero.
         let known = |value: f64| if value.is_finite() { value } else { 0.0 };
         let velocity_m_s = [motion.vx_m_s, motion.vy_m_s, motion.climb_m_s].map(known);
-        let descent = vehicle.descent.as_ref().map(|descent| &descent.value);
-        let wind_m_s =
-            descent.map_or([0.0; 3], |d| [f64::from(d.wind_x_m_s), f64::from(d.wind_y_m_s), 0.0]).map(known);
+        let descent = vehicle.descent().map(|descent| descent.value);
+        let wind_m_s = descent
+            .as_ref()
+            .map_or([0.0; 3], |d| [f64::from(d.wind_x_m_s), f64::from(d.wind_y_m_s), 0.0])
+            .map(known);
         let change = vehicle.trend.mean_change();
         let thrust = matches!(phase, TdPhase::TD_PHASE_POWERED | TdPhase::TD_PHASE_BOOST);
         let forces = match change {
@@ -351,7 +353,7 @@ fn size(vector: &NorthEastUp) -> f64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use protocol::dialect::{TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdLimit};
+    use protocol::dialect::{MavMessage, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdLimit};
 
     use crate::model::{GRAVITY_M_S2, Heartbeat, Motion, Prediction, Sample, Touchdown};
 
@@ -476,7 +478,7 @@ mod tests {
     fn the_planned_burn_brakes_and_the_circle_covers_a_fall_without_it() {
         let mut vehicle = moving(TdPhase::TD_PHASE_LAND_ARMED, [0.0, 0.0, -40.0], Some([0.0; 3]));
         let descent = TD_DESCENT_DATA { chosen_height_m: 50.0, ..TD_DESCENT_DATA::default() };
-        vehicle.descent = Some(Sample::new(descent, SEEN));
+        vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
         let phase = TdPhase::TD_PHASE_LAND_ARMED;
         let mut status = TD_FLIGHT_STATUS_DATA { phase, ..TD_FLIGHT_STATUS_DATA::default() };
         status.interlocks = protocol::dialect::TdInterlock::TD_INTERLOCK_ARMED;
@@ -507,7 +509,7 @@ mod tests {
             let [wind_x_m_s, wind_y_m_s] = wind.map(|part| part as f32);
             let descent =
                 TD_DESCENT_DATA { wind_x_m_s, wind_y_m_s, chosen_height_m: f32::NAN, ..TD_DESCENT_DATA::default() };
-            vehicle.descent = Some(Sample::new(descent, SEEN));
+            vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
             let found = after(&vehicle, seconds);
             let expected_m = (100.0 - down_m_s * seconds).max(0.0);
             prop_assert!((found.altitude_m - expected_m).abs() < 1e-3, "{found:?}");
@@ -541,7 +543,7 @@ mod tests {
             let phase = crate::model::telemetry::phase_from_number(phase).unwrap();
             let mut vehicle = moving(phase, velocity, acceleration);
             let descent = TD_DESCENT_DATA { chosen_height_m, ..TD_DESCENT_DATA::default() };
-            vehicle.descent = Some(Sample::new(descent, SEEN));
+            vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
             let at = |seconds: f64| predict_position(&vehicle, SEEN + Duration::from_secs_f64(seconds));
             if let (Some(sooner), Some(later)) = (at(seconds), at(seconds + 0.5)) {
                 prop_assert!(later.x_m.is_finite() && later.y_m.is_finite() && later.altitude_m.is_finite());

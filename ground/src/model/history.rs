@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TD_CONTROLLER_DATA, TdPhase};
 
 use super::{
     FlownPath, Model, Vehicle, every_second, is_flight,
@@ -69,7 +69,9 @@ impl History {
                 raise(&mut maxima.gimbal_rad, axis.measured_rad.abs());
             }
         }
-        if let Some(controller) = vehicle.controller.as_ref().filter(|controller| !controller.is_stale(now)) {
+        if let Some(controller) =
+            vehicle.told::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
+        {
             raise(&mut maxima.solve_time_s, f64::from(controller.value.solve_time_us) * 1e-6);
             let mut less = maxima.margin_min_s.map(|margin| -margin);
             raise(&mut less, -f64::from(controller.value.deadline_margin_us) * 1e-6);

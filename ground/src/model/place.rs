@@ -172,12 +172,12 @@ impl Model {
     /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
     /// anywhere inside the fence of its mission. `None` if it has told no fence.
     pub fn meant_to_come_down(&self) -> Option<Spot> {
-        let fence_m = f64::from(self.vehicle.limits.as_ref()?.x_m);
-        let predicted = self.vehicle.descent.as_ref().map(|descent| &descent.value);
+        let fence_m = f64::from(self.vehicle.limits()?.x_m);
+        let predicted = self.vehicle.descent().map(|descent| descent.value);
         let known =
             |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);
         let spot = Spot {
-            north_m: known(predicted.map(|descent| descent.touchdown_x_m)),
+            north_m: known(predicted.as_ref().map(|descent| descent.touchdown_x_m)),
             east_m: known(predicted.map(|descent| descent.touchdown_y_m)),
             error_m: fence_m,
         };

@@ -117,7 +117,7 @@ fn fin(vehicle: &Vehicle, number: usize) -> Option<Sample<f64>> {
 }
 
 fn solver(model: &Model, pick: fn(&TD_CONTROLLER_DATA) -> f64) -> Option<Sample<f64>> {
-    model.vehicle.controller.as_ref().map(|c| Sample::new(pick(&c.value), c.received_at))
+    model.vehicle.told::<TD_CONTROLLER_DATA>().map(|c| Sample::new(pick(&c.value), c.received_at))
 }
 
 #[cfg(test)]

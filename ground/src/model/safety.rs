@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLatch,
-    TdLimit, TdMotor, TdPhase,
+    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdAbortEffect, TdChute, TdHold,
+    TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
 };
 use protocol::log::record::EventLevel;
 
@@ -145,7 +145,7 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
 
 /// The operator who held the countdown, or whose silence did.
 fn held_by(vehicle: &Vehicle) -> Option<String> {
-    let number = vehicle.crew.as_ref().map(|crew| crew.value.held_by)?;
+    let number = vehicle.told::<TD_CREW_DATA>().map(|crew| crew.value.held_by)?;
     let (role, name) = vehicle.operators.get(&number)?;
     Some(format!("{} {name}", role_name(*role)))
 }
@@ -243,7 +243,7 @@ impl Ending {
         let verdict = vehicle.verdict.map(|verdict| verdict.value);
         let speed_m_s = verdict.map(|verdict| libm::hypot(verdict.touchdown.u_m_s, verdict.touchdown.w_m_s));
         match (self, verdict) {
-            (Self::Landed, _) if vehicle.limits.as_ref().is_some_and(are_of_legs) => {
+            (Self::Landed, _) if vehicle.limits().as_ref().is_some_and(are_of_legs) => {
                 " inside every limit of the legs".to_owned()
             }
             (Self::Landed, _) => " inside every limit".to_owned(),
@@ -263,7 +263,7 @@ impl Ending {
 
 /// Whether its parachute was open when last told.
 fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
-    vehicle.descent.as_ref().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
+    vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
 }
 
 /// Whether it fell silent in flight so long ago that it must have come down.
@@ -402,7 +402,7 @@ pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
     if !before_ignition {
         return None;
     }
-    let descent = model.vehicle.descent.as_ref()?;
+    let descent = model.vehicle.descent()?;
     let d = &descent.value;
     let one_way = model.link.round_trip.map_or(ONE_WAY_UNMEASURED, |round_trip| round_trip / 2);
     // Since the vehicle sent its report, and until the command arrives.

@@ -28,6 +28,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         }
         MessageBoot::Former => return false,
     }
+    vehicle.keep(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => {
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
@@ -66,8 +67,6 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             };
             vehicle.gimbal = Some(Sample::new(gimbal, now));
         }
-        MavMessage::TD_DESCENT(data) => vehicle.descent = Some(Sample::new(data.clone(), now)),
-        MavMessage::TD_CONTROLLER(data) => vehicle.controller = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
             let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
             let touchdown = touchdown(state, data.limits_violated);
@@ -80,14 +79,12 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             let touchdown = touchdown(state, data.limits_violated);
             vehicle.verdict = Some(Sample::new(Verdict { landed: data.landed == 1, touchdown }, now));
         }
-        MavMessage::TD_CREW(data) => vehicle.crew = Some(Sample::new(data.clone(), now)),
         MavMessage::TD_OPERATOR(data) => {
             vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
         }
         MavMessage::TD_MISSION(data) => {
             vehicle.mission = Some((MissionHash(data.hash), name(&data.name[..])));
         }
-        MavMessage::TD_TOUCHDOWN_LIMITS(data) => vehicle.limits = Some(data.clone()),
         MavMessage::EXTENDED_SYS_STATE(data) => {
             let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;
             vehicle.on_ground = Some(Sample::new(on_ground, now));
@@ -282,8 +279,10 @@ mod tests {
         let mut vehicle = Vehicle::default();
         apply(&mut vehicle, &status(1), NOW);
         apply(&mut vehicle, &at_pitch(90.0), NOW);
+        let told = |vehicle: &Vehicle| vehicle.told().map(|told| MavMessage::ATTITUDE_QUATERNION(told.value));
+        assert_eq!(told(&vehicle), Some(at_pitch(90.0)));
         assert!(apply(&mut vehicle, &status(2), NOW));
-        assert!(vehicle.attitude.is_none() && vehicle.boot.number() == Some(2));
+        assert!(vehicle.attitude.is_none() && vehicle.boot.number() == Some(2) && told(&vehicle).is_none());
         let late = 3 * NOW;
         assert!(!apply(&mut vehicle, &status(1), late));
         assert_eq!(vehicle.status.map(|status| status.received_at), Some(NOW));

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use mavlink::{MavlinkVersion, Message as _, MessageData};
 use protocol::dialect::{
-    PARAM_VALUE_DATA, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase, TdRole,
+    MavMessage, PARAM_VALUE_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TdInterlock, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
 
@@ -107,6 +108,8 @@ pub struct Verdict {
 /// The last value of everything that the vehicle reports.
 #[derive(Debug, Clone, Default)]
 pub struct Vehicle {
+    /// The payload of the last message of each id, for [`Vehicle::told`].
+    pub(super) told: BTreeMap<u32, Sample<Vec<u8>>>,
     pub heartbeat: Option<Sample<Heartbeat>>,
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
     pub attitude: Option<Sample<Attitude>>,
@@ -115,16 +118,10 @@ pub struct Vehicle {
     pub hud: Option<Sample<Motion>>,
     pub fins: Option<Sample<[Deflection; 4]>>,
     pub gimbal: Option<Sample<Gimbal>>,
-    pub descent: Option<Sample<TD_DESCENT_DATA>>,
-    pub controller: Option<Sample<TD_CONTROLLER_DATA>>,
     pub prediction: Option<Sample<Prediction>>,
     /// `TD_PREDICTED_PATH`: x and altitude, m.
     pub path: Option<Sample<Vec<(f64, f64)>>>,
     pub verdict: Option<Sample<Verdict>>,
-    /// `TD_TOUCHDOWN_LIMITS`: what counts as a landing for this vehicle.
-    pub limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
-    /// `TD_CREW`: who commands, what is asked and what is waited for; `None` without operators.
-    pub crew: Option<Sample<TD_CREW_DATA>>,
     /// `TD_OPERATOR`: role and name, by the number of the key.
     pub operators: BTreeMap<u8, (TdRole, String)>,
     /// `TD_MISSION`: the hash and the name of what it flies.
@@ -153,6 +150,29 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
+    /// The last message of this type. What is converted or put together from several is a field above.
+    pub fn told<M: MessageData>(&self) -> Option<Sample<M>> {
+        let payload = self.told.get(&M::ID)?;
+        let message = M::deser(MavlinkVersion::V2, &payload.value).ok()?;
+        Some(Sample::new(message, payload.received_at))
+    }
+
+    /// Where the landing motor is to be lit, and what is steered by until then.
+    pub fn descent(&self) -> Option<Sample<TD_DESCENT_DATA>> {
+        self.told()
+    }
+
+    /// What counts as a landing for this vehicle.
+    pub fn limits(&self) -> Option<TD_TOUCHDOWN_LIMITS_DATA> {
+        self.told().map(|limits| limits.value)
+    }
+
+    pub(super) fn keep(&mut self, message: &MavMessage, now: Duration) {
+        let mut payload = [0; 255];
+        let len = message.ser(MavlinkVersion::V2, &mut payload);
+        self.told.insert(message.message_id(), Sample::new(payload[..len].to_vec(), now));
+    }
+
     /// The phase, from the newer of its two sources.
     pub fn phase(&self) -> Option<Sample<TdPhase>> {
         let status = self.status.as_ref().map(|status| Sample::new(status.value.phase, status.received_at));
@@ -262,7 +282,7 @@ impl Vehicle {
 
     /// A number of `TD_DESCENT`, while it is known.
     pub fn of_descent(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
-        let descent = self.descent.as_ref()?;
+        let descent = self.descent()?;
         let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
         Some(sample).filter(|sample| sample.value.is_finite())
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdCheck, TdControlLevel, TdInterlock, TdPhase};
+use protocol::dialect::{TD_CONTROLLER_DATA, TdCheck, TdControlLevel, TdInterlock, TdPhase};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 
@@ -185,7 +185,9 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if !powered || vehicle.verdict.is_some() {
         return;
     }
-    if let Some(controller) = vehicle.controller.as_ref().filter(|controller| !controller.is_stale(now)) {
+    if let Some(controller) =
+        vehicle.told::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
+    {
         if controller.value.deadline_margin_us < 0 {
             found.push((AlarmKind::DeadlineMissed, "controller DEADLINE MISSED".to_owned()));
         }

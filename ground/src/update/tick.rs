@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TIMESYNC_DATA,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA,
+    TIMESYNC_DATA,
 };
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
@@ -167,7 +168,8 @@ fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
     let attitude = vehicle.attitude.map(|attitude| attitude.value);
     let body = vehicle.body_speed().map(|speed| speed.value);
     let status = vehicle.status.as_ref().map(|status| &status.value);
-    let controller = vehicle.controller.as_ref().map(|controller| &controller.value);
+    let controller = vehicle.told::<TD_CONTROLLER_DATA>();
+    let controller = controller.as_ref().map(|controller| &controller.value);
     let gimbal = vehicle.gimbal.map(|gimbal| gimbal.value.pitch);
     let fins = vehicle.fins.map_or_else(Vec::new, |fins| fins.value.to_vec());
     let angles = |pick: fn(&Deflection) -> f64| fins.iter().map(pick).collect();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TdAct, TdHold, TdPhase};
+use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TdAct, TdHold, TdPhase};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
@@ -198,7 +198,8 @@ pub(super) struct CrewTold {
 
 impl CrewTold {
     pub(super) fn of(model: &Model) -> Self {
-        let crew = model.vehicle.crew.as_ref().map(|crew| &crew.value);
+        let crew = model.vehicle.told::<TD_CREW_DATA>();
+        let crew = crew.as_ref().map(|crew| &crew.value);
         Self {
             people: crew.map_or(0, |crew| crew.people),
             ask: crew

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus};
+use protocol::dialect::{
+    TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus,
+};
 use ratatui::text::{Line, Span};
 
 use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
@@ -41,7 +43,8 @@ pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
 
 /// The panel's rows.
 pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let controller = model.vehicle.controller.as_ref();
+    let told = model.vehicle.told::<TD_CONTROLLER_DATA>();
+    let controller = told.as_ref();
     let number = |value: Option<f64>| {
         value
             .zip(controller.map(|controller| controller.received_at))
@@ -129,7 +132,7 @@ pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
 /// The rows of the gimbal's two planes: command and measured angle, and a bar with both.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let gimbal = model.vehicle.gimbal;
-    let limit = model.vehicle.limits.as_ref().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
+    let limit = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
     let plane = |name, pick: fn(&Gimbal) -> Deflection| {
         plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
@@ -189,7 +192,7 @@ pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static 
     if let Some(verdict) = model.vehicle.verdict {
         let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
         rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
-        let by_legs = model.vehicle.limits.as_ref().is_some_and(are_of_legs);
+        let by_legs = model.vehicle.limits().as_ref().is_some_and(are_of_legs);
         return (if by_legs { "Verdict by the legs" } else { "Verdict" }, rows);
     }
     let Some(prediction) = model.vehicle.prediction else {
@@ -222,8 +225,8 @@ pub fn touchdown_panel_with_bars(
     let vehicle = &model.vehicle;
     let judged = vehicle.verdict.map(|verdict| verdict.value.touchdown);
     let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
-    let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits.as_ref()) else { return (title, rows) };
-    let limits = limit_rows(&touchdown, Some(limits));
+    let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits()) else { return (title, rows) };
+    let limits = limit_rows(&touchdown, Some(&limits));
     let widest = rows.iter().take(limits.len()).map(Line::width).max().unwrap_or(0);
     let room = columns.saturating_sub(widest);
     if room >= LIMIT_BAR_COLUMNS_MIN {
@@ -254,7 +257,7 @@ fn limit_lines(
     mark: &'static str,
     role: TextRole,
 ) -> Vec<Line<'static>> {
-    let rows = limit_rows(touchdown, model.vehicle.limits.as_ref());
+    let rows = limit_rows(touchdown, model.vehicle.limits().as_ref());
     let line = |row: &LimitRow| {
         let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         Line::from(vec![

@@ -96,7 +96,7 @@ pub fn draw_side_view(
         predict_position(vehicle, now).map(|at| (from.sees([at.x_m, at.y_m, at.altitude_m]), at.error_m));
     let reckoned: Vec<(f64, f64)> = lost.iter().map(|(at, _)| *at).collect();
     let points: Vec<(f64, f64)> = [&flown, predicted, &reckoned].concat();
-    let limit_m = vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m));
+    let limit_m = vehicle.limits().map(|limits| f64::from(limits.x_m));
     let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
     let view = Bounds::around(&points, limit_m, area);
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
@@ -226,8 +226,7 @@ pub fn draw_top_view(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
     let lost = predict_position(vehicle, now);
-    let fence_m =
-        vehicle.limits.as_ref().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
+    let fence_m = vehicle.limits().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
     let furthest = flown.iter().map(|(east, north)| east.abs().max(north.abs()));
     let furthest = furthest
         .chain(down.map(|at| at.east_m.abs().max(at.north_m.abs()) + at.radius_m))
@@ -278,11 +277,8 @@ pub fn draw_top_view(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
 
 /// Where the wind blows to, as an arrow, and its speed.
 fn wind(model: &Model) -> String {
-    let known = model
-        .vehicle
-        .descent
-        .as_ref()
-        .map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
+    let known =
+        model.vehicle.descent().map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
     let Some((north, east)) = known.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
         return String::new();
     };

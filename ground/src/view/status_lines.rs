@@ -40,7 +40,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
             let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
             let left_s = climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64());
             let attached =
-                vehicle.descent.as_ref().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
+                vehicle.descent().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
             let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
             Some((format!("{before}apogee{}", within(left_s)), after.to_owned()))
         }
@@ -64,7 +64,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
         let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
         return ("the ground".to_owned(), format!(": the motor will NOT be lit{why}"));
     }
-    let descent = vehicle.descent.as_ref();
+    let descent = vehicle.descent();
     let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
     let chosen_m =
         descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
@@ -77,7 +77,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
 fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String) {
     let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
-    let Some(descent) = vehicle.descent.as_ref().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
+    let Some(descent) = vehicle.descent().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
         return ("chute opens".to_owned(), format!(": fired, still falling fast{motor}"));
     };
     let sinks_m_s = -f64::from(descent.value.vertical_speed_m_s);

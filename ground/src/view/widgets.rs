@@ -100,7 +100,8 @@ pub fn gauge_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> V
     if rows < 3 {
         return Vec::new();
     }
-    let descent = model.vehicle.descent.as_ref();
+    let descent = model.vehicle.descent();
+    let descent = descent.as_ref();
     // If the motor will not be lit there is no ignition band.
     let to_light = descent.filter(|_| model.vehicle.may_light());
     let finite = |height: f64| Some(height).filter(|height| height.is_finite() && *height >= 0.0);

@@ -116,8 +116,7 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
         for (at, frame) in flight {
             let now = at;
             drop(update(&mut model, Msg::Frame(frame), now));
-            let open =
-                model.vehicle.descent.as_ref().is_some_and(|d| d.value.chute == TdChute::TD_CHUTE_OPEN);
+            let open = model.vehicle.descent().is_some_and(|d| d.value.chute == TdChute::TD_CHUTE_OPEN);
             if !open || !model.vehicle.in_flight() || now >= down {
                 continue;
             }

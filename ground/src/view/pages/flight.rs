@@ -142,14 +142,14 @@ fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 }
 
 fn booster(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = model.vehicle.descent.as_ref() else { return no_state("booster", theme) };
+    let Some(descent) = model.vehicle.descent() else { return no_state("booster", theme) };
     let role = match descent.value.booster {
         TdBooster::TD_BOOSTER_SEPARATING => TextRole::Caution,
         TdBooster::TD_BOOSTER_SEPARATED => TextRole::Good,
         TdBooster::TD_BOOSTER_NONE | TdBooster::TD_BOOSTER_ATTACHED => TextRole::Plain,
     };
     let text = words::lower_case(&descent.value.booster, "TD_BOOSTER_");
-    state_row("booster", descent, &text, role, theme, now)
+    state_row("booster", &descent, &text, role, theme, now)
 }
 
 fn no_state(label: &str, theme: Theme) -> Line<'static> {
@@ -191,7 +191,7 @@ fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(band_word(model, theme, now));
     lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
     lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
-    lines.push(band(model.vehicle.descent.as_ref(), theme, now));
+    lines.push(band(model.vehicle.descent().as_ref(), theme, now));
     lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
     lines.push(chute(model, theme, now));
     lines.push(row(theme, "distance", of_motion(Motion::distance_m), 1, "m", now));
@@ -220,10 +220,10 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
         return theme.line(" NO BURN: motor inhibited", TextRole::Alarm);
     }
-    let Some(descent) = model.vehicle.descent.as_ref() else {
+    let Some(descent) = model.vehicle.descent() else {
         return theme.line(" ignition band: no data", TextRole::Caution);
     };
-    let (mark, stale) = age_mark(descent, now);
+    let (mark, stale) = age_mark(&descent, now);
     let d = &descent.value;
     let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
@@ -253,12 +253,12 @@ fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
 }
 
 fn chute(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = model.vehicle.descent.as_ref() else { return no_state("chute", theme) };
+    let Some(descent) = model.vehicle.descent() else { return no_state("chute", theme) };
     let role = match descent.value.chute {
         TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => TextRole::Caution,
         _ => TextRole::Plain,
     };
-    state_row("chute", descent, &words::lower_case(&descent.value.chute, "TD_CHUTE_"), role, theme, now)
+    state_row("chute", &descent, &words::lower_case(&descent.value.chute, "TD_CHUTE_"), role, theme, now)
 }
 
 /// The wind's speed, and the direction that it comes from, as in weather reports: 0 is north, 90 is east.

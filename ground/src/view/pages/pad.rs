@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdCheck, TdInterlock, TdPhase};
+use protocol::dialect::{TD_CONTROLLER_DATA, TdCheck, TdInterlock, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
@@ -221,9 +221,11 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
                 vehicle.fins.map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
             number(error, 1, "deg")
         }
-        TdCheck::TD_CHECK_CONTROLLER_WARM => vehicle.controller.as_ref().map_or_else(String::new, |c| {
-            words::lower_case(&c.value.solver_status, "TD_SOLVER_STATUS_").chars().take(10).collect()
-        }),
+        TdCheck::TD_CHECK_CONTROLLER_WARM => {
+            vehicle.told::<TD_CONTROLLER_DATA>().map_or_else(String::new, |c| {
+                words::lower_case(&c.value.solver_status, "TD_SOLVER_STATUS_").chars().take(10).collect()
+            })
+        }
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => vehicle.prediction.map_or_else(String::new, |prediction| {
             prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
         }),

@@ -250,7 +250,7 @@ fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         line("down north", of(|d| d.touchdown_x_m), 1, "m"),
         line("down east", of(|d| d.touchdown_y_m), 1, "m"),
     ];
-    if model.vehicle.descent.is_none() {
+    if model.vehicle.descent().is_none() {
         rows.insert(0, theme.line(" no data", TextRole::Caution));
     }
     rows
