@@ -122,7 +122,7 @@ impl Standard {
 const STORAGE: Standard = standard::<STORAGE_INFORMATION_DATA>("RATE_STORAGE", 0.1).cut_to(27);
 
 /// The periodic messages. If the budget runs short, the last ones are dropped first.
-pub const STANDARD: [Standard; 29] = [
+pub const STANDARD: &[Standard] = &[
     standard::<HEARTBEAT_DATA>("RATE_HEARTBEAT", 1.0),
     standard::<TD_FLIGHT_STATUS_DATA>("RATE_FLIGHT_STAT", 5.0),
     // More often whenever something changes.
@@ -519,5 +519,22 @@ impl CheckTeller {
         let often = check.is_running() || self.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
         Some(telemetry::pad_check(check, place, vehicle.time_s()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::dialect::message_name;
+
+    /// The dialect of a board has these messages and ours alone.
+    #[test]
+    fn every_standard_message_is_one_that_a_board_knows() {
+        let known: Vec<&str> =
+            include_str!("../../../protocol/dialect/of_a_vehicle.txt").split_whitespace().collect();
+        for standard in STANDARD {
+            let name = message_name(standard.message_id).expect("a message of the dialect");
+            assert!(name.starts_with("TD_") || known.contains(&name), "{name} is not in of_a_vehicle.txt");
+        }
     }
 }

@@ -18,14 +18,16 @@ use mavlink::types::CharArray;
 #[expect(deprecated, reason = "only [`protocol_version`] uses it")]
 use protocol::dialect::PROTOCOL_VERSION_DATA;
 use protocol::dialect::{
-    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, AVAILABLE_MODES_DATA,
-    BATTERY_STATUS_DATA, CURRENT_MODE_DATA, EXTENDED_SYS_STATE_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
-    MavAutopilot, MavBatteryFault, MavLandedState, MavMessage, MavModeFlag, MavModeProperty,
-    MavProtocolCapability, MavStandardMode, MavState, MavSysStatusSensor, MavSysStatusSensorExtended,
-    MavType, MavVtolState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA, StorageStatus, StorageType,
-    StorageUsageFlag, TD_CONTROLLER_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    TdCheck, VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA,
+    AVAILABLE_MODES_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA,
+    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA,
+    HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavBatteryFault, MavLandedState, MavMessage,
+    MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState, MavSysStatusSensor,
+    MavSysStatusSensorExtended, MavType, MavVtolState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
+    SYSTEM_TIME_DATA, StorageStatus, StorageType, StorageUsageFlag, TD_CONTROLLER_DATA, TD_CREW_DATA,
+    TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    TD_TOUCHDOWN_PREDICTION_DATA, TdCheck, VFR_HUD_DATA,
 };
 use protocol::identity::GIT_COMMIT;
 use protocol::mission::MissionHash;
@@ -58,10 +60,21 @@ pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option
         TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
         TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
         TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
-        _ => ours::crew(message_id, snapshot)
-            .or_else(|| motion::descent_and_sensors(message_id, snapshot))
-            .or_else(|| power(message_id, snapshot))
-            .or_else(|| motion::message(message_id, snapshot)),
+        TD_CREW_DATA::ID => ours::crew(snapshot),
+        TD_OPERATOR_DATA::ID => ours::operator(snapshot),
+        // It matters before the flight only, and there it costs no position.
+        TD_MISSION_DATA::ID => snapshot.phase.on_pad().then(|| ours::mission(snapshot)),
+        TD_DESCENT_DATA::ID => motion::descent(snapshot),
+        ESTIMATOR_STATUS_DATA::ID => motion::estimator(snapshot),
+        HIGHRES_IMU_DATA::ID => motion::imu(snapshot),
+        BATTERY_STATUS_DATA::ID => Some(battery(snapshot)),
+        STORAGE_INFORMATION_DATA::ID => storage(snapshot),
+        ATTITUDE_DATA::ID => Some(motion::attitude(snapshot)),
+        GLOBAL_POSITION_INT_DATA::ID => Some(motion::position(snapshot)),
+        HOME_POSITION_DATA::ID => Some(motion::home(snapshot)),
+        GPS_RAW_INT_DATA::ID => Some(motion::gps(snapshot)),
+        SYSTEM_TIME_DATA::ID => Some(motion::system_time(snapshot)),
+        _ => None,
     }
 }
 
@@ -272,14 +285,6 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 }
 
 // Battery and storage.
-
-fn power(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
-    match message_id {
-        BATTERY_STATUS_DATA::ID => Some(battery(snapshot)),
-        STORAGE_INFORMATION_DATA::ID => storage(snapshot),
-        _ => None,
-    }
-}
 
 /// What SYS_STATUS says to be there.
 fn present(snapshot: &Snapshot) -> MavSysStatusSensor {

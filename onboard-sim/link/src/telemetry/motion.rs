@@ -3,7 +3,6 @@
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
-use mavlink::MessageData as _;
 use protocol::dialect::{
     ATTITUDE_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA,
     GpsFixType, HIGHRES_IMU_DATA, HOME_POSITION_DATA, HighresImuUpdatedFlags, MavMessage, MavSysStatusSensor,
@@ -16,18 +15,6 @@ use crate::snapshot::{Booster, Chute, DescentFacts, Snapshot};
 /// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees from upright) single
 /// precision cannot separate them.
 const UPRIGHT_SINE: f64 = 0.999_99;
-
-/// The message of this id, or `None` for any other id.
-pub(super) fn message(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
-    match message_id {
-        ATTITUDE_DATA::ID => Some(attitude(snapshot)),
-        GLOBAL_POSITION_INT_DATA::ID => Some(position(snapshot)),
-        HOME_POSITION_DATA::ID => Some(home(snapshot)),
-        GPS_RAW_INT_DATA::ID => Some(gps(snapshot)),
-        SYSTEM_TIME_DATA::ID => Some(system_time(snapshot)),
-        _ => None,
-    }
-}
 
 /// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, roll and yaw are the same
 /// rotation, and all of it counts as yaw.
@@ -64,7 +51,7 @@ pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
     if heading_deg < 0.0 { heading_deg + 360.0 } else { heading_deg }
 }
 
-fn attitude(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn attitude(snapshot: &Snapshot) -> MavMessage {
     let [roll, pitch, yaw] = roll_pitch_yaw_rad(&snapshot.motion.ned_from_body).map(|angle| angle as f32);
     let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE(ATTITUDE_DATA {
@@ -88,7 +75,7 @@ fn millimetres(length_m: f64) -> i32 {
     libm::round(1000.0 * length_m) as i32
 }
 
-fn position(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn position(snapshot: &Snapshot) -> MavMessage {
     let [north_m, east_m, down_m] = snapshot.motion.position_m;
     let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
     let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
@@ -106,7 +93,7 @@ fn position(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// The pad. The slope of the ground and the approach direction are unknown.
-fn home(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn home(snapshot: &Snapshot) -> MavMessage {
     let (latitude, longitude) = degrees_e7(snapshot, 0.0, 0.0);
     MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude,
@@ -125,7 +112,7 @@ fn home(snapshot: &Snapshot) -> MavMessage {
 
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
 /// kept. A vehicle without sensors has no receiver.
-fn gps(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn gps(snapshot: &Snapshot) -> MavMessage {
     let [north_m, east_m, down_m] = snapshot.motion.position_m;
     let [north_m_s, east_m_s, _] = snapshot.motion.velocity_m_s;
     let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
@@ -161,21 +148,11 @@ fn gps(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// No clock on board knows the time of day, so the field is zero, as the standard requires.
-fn system_time(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn system_time(snapshot: &Snapshot) -> MavMessage {
     MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(snapshot.time_s) })
 }
 
 // Messages of the rocket in space only: descent, estimator, sensors.
-
-/// The message of this id, or `None` if the vehicle has no such message or no data for it.
-pub(super) fn descent_and_sensors(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
-    match message_id {
-        TD_DESCENT_DATA::ID => descent(snapshot),
-        ESTIMATOR_STATUS_DATA::ID => estimator(snapshot),
-        HIGHRES_IMU_DATA::ID => imu(snapshot),
-        _ => None,
-    }
-}
 
 /// The sensors that exist, and those that are silent. The lidar works only close to the ground, so its silence means
 /// nothing.
@@ -193,7 +170,7 @@ pub(super) fn sensors(snapshot: &Snapshot) -> (MavSysStatusSensor, MavSysStatusS
     (present, silent)
 }
 
-fn descent(snapshot: &Snapshot) -> Option<MavMessage> {
+pub(super) fn descent(snapshot: &Snapshot) -> Option<MavMessage> {
     let descent = snapshot.descent.as_ref()?;
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
     let [wind_x_m_s, wind_y_m_s] = descent.wind_m_s.map(|speed| speed as f32);
@@ -242,7 +219,7 @@ fn on_the_way_up(descent: &DescentFacts, read: impl Fn(&ApogeeAhead) -> f64) -> 
 }
 
 /// The outputs that are valid, by the estimator's own doubts; its test ratios are not kept and are sent as unknown.
-fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
+pub(super) fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     let estimator = snapshot.estimator.as_ref()?;
     let (velocity, horizontal, vertical) = (
@@ -278,7 +255,7 @@ fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
 }
 
 /// There is no magnetometer and no thermometer: their fields are not marked as updated.
-fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
+pub(super) fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
     use HighresImuUpdatedFlags as U;
     let sensors = snapshot.sensors.as_ref()?;
     let mut fields_updated = U::HIGHRES_IMU_UPDATED_XACC

@@ -6,7 +6,6 @@ use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::two_person::Act;
-use mavlink::MessageData as _;
 use mavlink::types::CharArray;
 use num_traits::FromPrimitive as _;
 use protocol::dialect::{
@@ -18,7 +17,7 @@ use protocol::dialect::{
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
-use crate::snapshot::{CrewFacts, PATH_POINTS, Snapshot};
+use crate::snapshot::{PATH_POINTS, Snapshot};
 
 pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
@@ -239,27 +238,18 @@ pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
 
 // Who commands, what is asked, and which mission flies.
 
-pub(super) fn crew(message_id: u32, snapshot: &Snapshot) -> Option<MavMessage> {
-    match message_id {
-        TD_CREW_DATA::ID => snapshot.crew.as_ref().map(|crew| state(crew, snapshot.time_s)),
-        TD_OPERATOR_DATA::ID => snapshot.crew.as_ref().and_then(|crew| operator(crew, snapshot.time_s)),
-        // It matters before the flight only, and there it costs no position.
-        TD_MISSION_DATA::ID => snapshot.phase.on_pad().then(|| mission(snapshot)),
-        _ => None,
-    }
-}
-
-fn mission(snapshot: &Snapshot) -> MavMessage {
+pub(super) fn mission(snapshot: &Snapshot) -> MavMessage {
     let name = characters(&snapshot.mission.name);
     MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name })
 }
 
-fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
+pub(super) fn crew(snapshot: &Snapshot) -> Option<MavMessage> {
+    let crew = snapshot.crew.as_ref()?;
     let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
     let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
     let commander = crew.commander.map(|(station, _)| station);
-    MavMessage::TD_CREW(TD_CREW_DATA {
-        time_boot_ms: boot_ms(time_s),
+    Some(MavMessage::TD_CREW(TD_CREW_DATA {
+        time_boot_ms: boot_ms(snapshot.time_s),
         ask_number: crew.ask.map_or(0, |(_, number, ..)| number),
         ask_left_ms: crew.ask.map_or(0, |(.., left_s)| ms(left_s)),
         tap_left_ms: crew.tap.map_or(0, |(_, left_s)| ms(left_s)),
@@ -278,16 +268,17 @@ fn state(crew: &CrewFacts, time_s: f64) -> MavMessage {
         commanding_system: commander.map_or(0, |station| station.system),
         commanding_component: commander.map_or(0, |station| station.component),
         held_by: number(crew.held_by),
-    })
+    }))
 }
 
 /// Operators per second.
 const TURNS_PER_S: f64 = 0.5;
 
 /// Each operator in turn.
-fn operator(crew: &CrewFacts, time_s: f64) -> Option<MavMessage> {
+pub(super) fn operator(snapshot: &Snapshot) -> Option<MavMessage> {
+    let crew = snapshot.crew.as_ref()?;
     let count = crew.operators.len().max(1);
-    let operator = crew.operators.get((TURNS_PER_S * time_s) as usize % count)?;
+    let operator = crew.operators.get((TURNS_PER_S * snapshot.time_s) as usize % count)?;
     let role = match operator.role {
         Role::Observer => TdRole::TD_ROLE_OBSERVER,
         Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,

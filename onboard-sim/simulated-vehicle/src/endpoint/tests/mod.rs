@@ -152,7 +152,7 @@ fn the_standard_rates_fit_the_radio_and_are_kept() {
     assert!(streams.fit(), "{} B/s", streams.bytes_s());
     let mut wire = Wire::new();
     let sent = wire.run(10.0);
-    for standard in &STANDARD {
+    for standard in STANDARD {
         // In flight only, and the verdict after it.
         if IN_FLIGHT.contains(&standard.message_id) {
             continue;
