@@ -50,6 +50,15 @@ pub struct IgnitionOutlook {
 
 remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
 
+impl IgnitionOutlook {
+    /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin
+    /// below the chosen height; `onset_m` is where it would begin.
+    pub fn overdue_s(&self, onset_m: f64) -> Option<f64> {
+        let below_m = self.chosen_m? - onset_m;
+        (below_m >= 0.0).then(|| below_m / (-self.onset_vertical_m_s).max(1.0))
+    }
+}
+
 /// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
 /// 0.8 of its terminal speed.
 const AHEAD_S: f64 = 0.25;

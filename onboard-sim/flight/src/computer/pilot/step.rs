@@ -329,12 +329,8 @@ impl Pilot {
         self.outlook.ignition.onset_height_m - (self.outlook.height_m - self.feet_height_m(estimate))
     }
 
-    /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin
-    /// below the chosen height.
     pub(super) fn ignition_overdue_s(&self, estimate: &Estimate) -> Option<f64> {
-        let ignition = &self.outlook.ignition;
-        let below_m = ignition.chosen_m? - self.onset_m(estimate);
-        (below_m >= 0.0).then(|| below_m / (-ignition.onset_vertical_m_s).max(1.0))
+        self.outlook.ignition.overdue_s(self.onset_m(estimate))
     }
 
     /// The event that an abort is now, from the findings of the last frame, if there was one.
