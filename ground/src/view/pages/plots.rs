@@ -183,8 +183,7 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page of all values: flight, descent, controller with its residuals, actuators, link.
 
-/// Rows of the controller's panel and of the fins', with their titles.
-const CONTROLLER_ROWS: u16 = 9;
+/// Rows of the fins' panel, with its title.
 const FIN_ROWS: u16 = 5;
 /// The columns of every panel on a larger screen.
 const PANEL_COLUMNS: u16 = 30;
@@ -199,13 +198,14 @@ pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         (area, Rect::default())
     };
     let [left, middle, right] = side_by_side(panels, [Fill(1); 3]);
-    let half = Length(CONTROLLER_ROWS);
+    let controller = panels::controller_rows(model, theme, now);
+    let half = Length(1 + controller.len() as u16);
     let [flight_area, below_flight] = stacked(left, [half, Fill(1)]);
     let [controller_area, below_controller] = stacked(middle, [half, Fill(1)]);
     let (title, rows) = panels::flight_panel(model, theme, now);
     panel(title, &rows, theme, frame, flight_area);
     panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, below_flight);
-    panel("Controller (NMPC)", &panels::controller_rows(model, theme, now), theme, frame, controller_area);
+    panel("Controller (NMPC)", &controller, theme, frame, controller_area);
     panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, below_controller);
     panel("Descent", &descent_rows(model, theme, now), theme, frame, right);
     if roomy {
