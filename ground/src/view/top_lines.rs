@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::command::result_words;
 use protocol::identity::Address;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
@@ -340,13 +341,11 @@ pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Lin
     ])
 }
 
+/// The result in words that leave room for the rest of the line.
 fn refusal(result: u8) -> &'static str {
     match result {
         1 => "not now",
-        2 => "denied",
-        3 => "unsupported",
-        4 => "failed",
-        6 => "cancelled",
+        2..=6 => result_words(result),
         _ => "unknown",
     }
 }
