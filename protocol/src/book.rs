@@ -3,6 +3,11 @@
 //! Every entry holds the hash of the entry before it, so a later change of an entry breaks the chain there. Whoever
 //! changes an entry and computes all later hashes anew gets another head, which they cannot sign. The vehicle keeps the
 //! signed heads it was sent, so a book that was cut is shorter than what the vehicle knows of it.
+//!
+//! The way of an entry: the ground's `update` enters a line for a key, a command, an answer, a signature of the checklist or a
+//! word of the vehicle. Its `app` adds the time of day; here it is numbered and hashed, and it goes to `/book` of the station's
+//! log. At most every 2 s the head is signed, recorded (`/book/head`) and sent to the vehicle until the vehicle confirms it. The
+//! frame is in the vehicle's log before the confirmation leaves. `replay verify --book` compares all of them ([`audit`]).
 
 use std::fmt;
 

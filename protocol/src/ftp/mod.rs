@@ -8,6 +8,12 @@
 //! * [`part`]: what is remembered of an unfinished download;
 //! * [`crc`]: the checksum of a whole file.
 //!
+//! A log is fetched after the flight, and recording goes on meanwhile. The recorder sets a mark; what was written up to it does
+//! not change any more, and the file is offered up to there, with the end of a log behind it. Packets are frames like any other:
+//! signed, counted, in the log (without the piece of the file that they carry). A link that reads gets a lane of its own, which
+//! takes one piece at a time when it has room. When the ground has all pieces, the checksums are compared, and the file gets its
+//! name.
+//!
 //! Nothing here reads a file, a clock or a link. Protocol: <https://mavlink.io/en/services/ftp.html>.
 
 pub mod download;

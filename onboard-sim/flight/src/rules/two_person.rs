@@ -6,8 +6,14 @@
 //! An ask has a number, and a confirmation names it: two people who ask at the same moment have not confirmed each
 //! other, and a confirmation that was meant for an earlier ask, or is sent again later, confirms nothing. From the
 //! agreed start to the release the one who confirmed it taps a key (or the one who asked, if the other is in command: it
-//! takes two in the countdown, too); without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of a key, so the taps stand for the hand on a dead-man's switch, which amateur
-//! launch sites ask of a second person.
+//! takes two in the countdown, too); without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of
+//! a key, so the taps stand for the hand on a dead-man's switch, which amateur launch sites ask of a second person.
+//!
+//! The way of an ask: a station sends the command, signed with its operator's own key. `protocol::signing` checks the frame with
+//! the key that its link id names, and the vehicle's endpoint takes the operator from there; it refuses what names another boot,
+//! what is for everybody, and what comes from ids under which two stations are heard. `computer::requests` asks here; the number
+//! goes back in the answer and in TD_CREW, and the other operator's command names it. How many people it takes is in every
+//! frame's input, so a replay decides the same.
 
 use core::fmt;
 
