@@ -116,9 +116,10 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
         if read == 0 {
             break;
         }
+        let mut answer = |bytes: &[u8]| answers.extend_from_slice(bytes);
         let flown = match &mut radio {
-            None => board.take(&arrived[..read], &mut (), &mut (), &mut answers),
-            Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answers),
+            None => board.take(&arrived[..read], &mut (), &mut (), &mut answer),
+            Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answer),
         };
         // A world waits for it. One that has ended its flight may have gone before an answer that it asked for again.
         match to_world.write_all(&answers).and_then(|()| to_world.flush()) {

@@ -3,9 +3,6 @@
 //! `saved-1` are its memory that outlasts a reset: where a recorded flight's computer was dead, this program resets its processor
 //! and goes on from them.
 
-extern crate alloc;
-
-use alloc::vec::Vec;
 use core::ffi::CStr;
 use core::fmt::Write as _;
 use core::mem::MaybeUninit;
@@ -112,15 +109,19 @@ fn fly(
     (frames, answers): (&mut File, &mut File),
     costs: &mut Costs,
 ) -> io::Result<Result<(), FlyError>> {
-    let (mut radio, mut arrived, mut out) = (Serial::default(), [0; 512], Vec::new());
+    let (mut radio, mut arrived, mut written) = (Serial::default(), [0; 512], Ok(()));
     loop {
         let read = frames.read(&mut arrived)?;
         if read == 0 {
             return Ok(Ok(()));
         }
-        let flown = board.take(&arrived[..read], &mut radio, costs, &mut out);
-        answers.write_all(&out)?;
-        out.clear();
+        let mut answer = |bytes: &[u8]| {
+            if written.is_ok() {
+                written = answers.write_all(bytes);
+            }
+        };
+        let flown = board.take(&arrived[..read], &mut radio, costs, &mut answer);
+        core::mem::replace(&mut written, Ok(()))?;
         if flown.is_err() {
             return Ok(flown);
         }

@@ -77,8 +77,8 @@ impl Board {
         &self.reader
     }
 
-    /// Takes bytes that have arrived, flies the frames in them, and puts the answers into `out`. If the flight's first frame says
-    /// who the board is on the air, the crew is heard over the radio.
+    /// Takes bytes that have arrived, flies the frames in them, and gives each answer to `answer` before the next frame, which
+    /// may reset the machine. If the flight's first frame says who the board is on the air, the crew is heard over the radio.
     ///
     /// # Errors
     /// See [`FlyError`]; every frame before the error was answered.
@@ -87,7 +87,7 @@ impl Board {
         bytes: &[u8],
         radio: &mut impl Radio,
         watch: &mut impl Watch,
-        out: &mut Vec<u8>,
+        answer: &mut impl FnMut(&[u8]),
     ) -> Result<(), FlyError> {
         self.reader.push(bytes);
         while let Some(mut frame) = self.reader.next_record::<Frame>() {
@@ -97,7 +97,7 @@ impl Board {
                 watch.is_set_up();
             }
             let flying = self.flying.as_mut().ok_or(FlyError::Empty)?;
-            self.frames += u64::from(flying.fly(&frame.input, radio, watch, out)?);
+            self.frames += u64::from(flying.fly(&frame.input, radio, watch, answer)?);
         }
         Ok(())
     }
@@ -114,11 +114,11 @@ impl Flying {
         input: &ComputerInput,
         radio: &mut impl Radio,
         watch: &mut impl Watch,
-        out: &mut Vec<u8>,
+        answer: &mut impl FnMut(&[u8]),
     ) -> Result<bool, FlyError> {
         let number = input.frame;
-        if let Some((_, answer)) = self.answered.as_ref().filter(|(answered, _)| *answered == number) {
-            out.extend(answer);
+        if let Some((_, bytes)) = self.answered.as_ref().filter(|(answered, _)| *answered == number) {
+            answer(bytes);
             return Ok(false);
         }
         match self.saved.take_if(|saved| saved.frame() < number) {
@@ -139,7 +139,7 @@ impl Flying {
         watch.ended(number, &output);
         let computer = computer.computer();
         let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
-        let answer = Answer {
+        let decided = Answer {
             frame: number,
             output: output_to_log(&output, computer),
             state_digest: computer.digest(),
@@ -147,8 +147,8 @@ impl Flying {
         };
         watch.save(&self.computer.computer().saved());
         let mut bytes = Vec::new();
-        put(&answer, &mut bytes);
-        out.extend(&bytes);
+        put(&decided, &mut bytes);
+        answer(&bytes);
         self.answered = Some((number, bytes));
         Ok(true)
     }

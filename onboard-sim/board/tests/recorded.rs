@@ -1,8 +1,10 @@
 //! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a stream is said.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::cell::Cell;
+
 use board::port;
-use board::recorded::{Board, FlyError};
+use board::recorded::{Board, FlyError, Watch};
 use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Reader, put};
 use flight::computer::Commands;
 use flight::computer::news::News;
@@ -22,7 +24,7 @@ const NEWS_BYTES_MAX: u64 = 2048;
 fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
     let (mut board, mut out, mut flown) = (Board::default(), Vec::new(), Ok(()));
     for arrived in bytes.chunks(61) {
-        flown = board.take(arrived, &mut (), &mut (), &mut out);
+        flown = board.take(arrived, &mut (), &mut (), &mut |bytes: &[u8]| out.extend_from_slice(bytes));
         if flown.is_err() {
             break;
         }
@@ -119,6 +121,35 @@ fn a_bad_wire_changes_no_answer() {
     let expected: Vec<Answer> =
         frames.iter().flat_map(|frame| [answer_to(frame), answer_to(frame)]).collect();
     assert_eq!(answers, expected);
+}
+
+/// How many answers were given when the computer was reset before a frame.
+struct Resets<'a> {
+    answered: &'a Cell<usize>,
+    found: Vec<(u64, usize)>,
+}
+
+impl Watch for Resets<'_> {
+    fn reset(&mut self, before: u64) {
+        self.found.push((before, self.answered.get()));
+    }
+}
+
+/// A reset loses what has not left the machine.
+#[test]
+fn every_frame_before_a_reset_is_answered_before_it() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let mut begin = Some(begin(&sortie));
+    let mut frames = flown(&mut sortie);
+    frames.truncate(200);
+    frames.drain(100..120);
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let answered = Cell::new(0);
+    let mut resets = Resets { answered: &answered, found: Vec::new() };
+    Board::default()
+        .take(&bytes, &mut (), &mut resets, &mut |_: &[u8]| answered.set(answered.get() + 1))
+        .unwrap();
+    assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
 }
 
 /// A board that senses what was recorded, and notes its commands.
