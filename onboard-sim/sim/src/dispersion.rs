@@ -61,6 +61,10 @@ pub struct Mismatch {
     /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations are larger than fast
     /// ones; the impulse stays.
     pub thrust_shape_share: f64,
+    /// Probability that the motor chuffs: it burns for 0.1 s, goes out for 0.2 s, and burns on.
+    pub chuff_share: f64,
+    /// Time in which the thrust rises to its curve's, s.
+    pub thrust_rise_s: [f64; 2],
     /// Fraction of the body's axial drag that the exhaust takes away.
     pub plume_body_loss: [f64; 2],
     /// Fraction of the fins' drag that the exhaust takes away.
@@ -73,6 +77,8 @@ pub struct Mismatch {
     pub crossflow_share: f64,
     /// Moments of inertia, as a fraction.
     pub inertia_share: f64,
+    /// Lean of the principal axis of inertia against the body's axis, each way, degrees.
+    pub principal_axis_deg: f64,
     /// Centre of gravity along the axis, m.
     pub cg_along_m: f64,
     /// Thrust off the axis, m, in each direction.
@@ -101,14 +107,16 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("harsh", include_str!("dispersions/harsh.toml")),
     ("real", include_str!("dispersions/real.toml")),
     ("real-harsh", include_str!("dispersions/real-harsh.toml")),
+    ("wild", include_str!("dispersions/wild.toml")),
 ];
 
 /// The set behind every number that a person acts on, if no other is asked for: the one with an error in everything.
 pub const DEFAULT: &str = "real";
 
-/// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one and twice its errors.
+/// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one, twice its errors, and
+/// it with more.
 pub fn may_be_kinder(name: &str) -> bool {
-    !["real", "real-harsh"].contains(&name)
+    !["real", "real-harsh", "wild"].contains(&name)
 }
 
 /// Why a set cannot be used.

@@ -140,6 +140,9 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
     })
 }
 
+/// How long a chuffing motor burns, and how long it is out before it burns on, s.
+const CHUFF_S: [f64; 2] = [0.1, 0.2];
+
 /// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
 /// generator of their own: a set without them draws what it always drew.
 fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
@@ -171,6 +174,9 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
     let wind_exponent = (truth.wind_exponent + sigma.wind_exponent * chance.normal()).clamp(0.0, 0.5);
     let wind_veer_rad_m = sigma.wind_veer_deg_100m.to_radians() / 100.0 * chance.normal();
     let ground_rise = [(); 2].map(|()| libm::tan(sigma.ground_slope_deg.to_radians()) * chance.normal());
+    let principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
+    let chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
+    let thrust_rise_s = chance.between(sigma.thrust_rise_s);
     Truth {
         thrust_shape,
         plume_body_loss,
@@ -188,6 +194,9 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
         wind_exponent,
         wind_veer_rad_m,
         ground_rise,
+        principal_axis_rad,
+        chuff_s,
+        thrust_rise_s,
         ..*truth
     }
 }

@@ -37,7 +37,7 @@ pub(crate) struct CampaignArguments {
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Number of flights; they are numbered from 0.

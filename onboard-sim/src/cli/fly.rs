@@ -70,7 +70,7 @@ pub(crate) struct FlyArguments {
     /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file [default: field].
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file [default: field].
     #[arg(long, value_name = "NAME|FILE")]
     dispersion: Option<String>,
     /// Mean wind 10 m above the ground, m/s, instead of the set's.

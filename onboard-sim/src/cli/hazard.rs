@@ -26,7 +26,7 @@ pub(crate) struct HazardArguments {
     /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Mean winds 10 m above the ground, m/s.

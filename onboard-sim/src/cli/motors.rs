@@ -266,7 +266,7 @@ struct Choices {
     /// Highest start, m: the best one up to this. By default the apogee of the mission.
     #[arg(long, value_name = "M", conflicts_with = "height")]
     highest: Option<f64>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.

@@ -11,6 +11,8 @@ pub(crate) struct Inertia {
     pub(crate) mass_kg: f64,
     pub(crate) pitch_kg_m2: f64,
     pub(crate) roll_kg_m2: f64,
+    /// Lean of the principal axis against the body's, about body y and z, rad.
+    pub(crate) principal_rad: [f64; 2],
 }
 
 /// The force and moment on the body at a state and a fraction of the step (0, 1/2 or 1).
@@ -91,8 +93,18 @@ fn moved(state: &RigidState, rates: &Rates, step_s: f64) -> RigidState {
     }
 }
 
-/// Euler's equations for a body symmetric about x.
+/// Euler's equations for a body symmetric about its principal axis.
 fn angular_acceleration(inertia: &Inertia, rate: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
+    if inertia.principal_rad.iter().all(|lean| *lean == 0.0) {
+        return about_principal_axis(inertia, rate, moment);
+    }
+    let [about_y, about_z] = inertia.principal_rad;
+    let body_from_principal = Rotation3::from_scaled_axis(Vector3::new(0.0, about_y, about_z));
+    let [rate, moment] = [rate, moment].map(|vector| body_from_principal.inverse_transform_vector(vector));
+    body_from_principal * about_principal_axis(inertia, &rate, &moment)
+}
+
+fn about_principal_axis(inertia: &Inertia, rate: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
     let difference = inertia.pitch_kg_m2 - inertia.roll_kg_m2;
     Vector3::new(
         moment.x / inertia.roll_kg_m2,
@@ -116,7 +128,7 @@ mod tests {
     /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates rotate at (1 - I_x/I) p.
     #[test]
     fn val_euler_torque_free_precession() {
-        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02 };
+        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
         let mut state = RigidState::upright(50.0);
         state.rate_rad_s = Vector3::new(6.0, 0.4, 0.0);
         let momentum = |state: &RigidState| {
@@ -133,9 +145,32 @@ mod tests {
         assert!((momentum(&state) - before).norm() < 1e-10, "angular momentum in the world");
     }
 
+    /// The same top, built in askew: it turns as one that is aligned and seen from axes askew.
+    #[test]
+    fn val_euler_a_body_askew_keeps_its_momentum_and_its_energy() {
+        let askew = [0.05, -0.03];
+        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: askew };
+        let body_from_principal = Rotation3::from_scaled_axis(Vector3::new(0.0, askew[0], askew[1]));
+        let diagonal = Vector3::new(0.02, 0.12, 0.12);
+        let momentum = |rate: &Vector3<f64>| {
+            body_from_principal * (body_from_principal.inverse() * rate).component_mul(&diagonal)
+        };
+        let mut state = RigidState::upright(50.0);
+        state.rate_rad_s = Vector3::new(6.0, 0.4, 0.0);
+        let before = state.world_from_body * momentum(&state.rate_rad_s);
+        let energy_j = 0.5 * state.rate_rad_s.dot(&momentum(&state.rate_rad_s));
+        for _ in 0..2000 {
+            state = rk4_step(&state, &inertia, &Nothing, 0.0, 1e-3).0;
+        }
+        assert!((state.world_from_body * momentum(&state.rate_rad_s) - before).norm() < 1e-9);
+        assert!((0.5 * state.rate_rad_s.dot(&momentum(&state.rate_rad_s)) - energy_j).abs() < 1e-9);
+        // Its spin is not constant, as that of an aligned top is.
+        assert!((state.rate_rad_s.x - 6.0).abs() > 1e-3, "{}", state.rate_rad_s);
+    }
+
     #[test]
     fn val_galilei_free_fall() {
-        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02 };
+        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
         let mut state = RigidState::upright(50.0);
         state.velocity_m_s.x = 3.0;
         for _ in 0..1000 {

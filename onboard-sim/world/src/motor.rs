@@ -76,6 +76,8 @@ impl TrueBurn {
 pub(crate) struct Motor {
     burn: TrueBurn,
     ignition_delay_s: f64,
+    chuff_s: [f64; 2],
+    thrust_rise_s: f64,
     /// Time of the ignition command, s.
     commanded_s: Option<f64>,
     no_light: bool,
@@ -87,6 +89,8 @@ impl Motor {
         Self {
             burn: TrueBurn::new(curve, truth),
             ignition_delay_s: truth.ignition_delay_s,
+            chuff_s: truth.chuff_s,
+            thrust_rise_s: truth.thrust_rise_s,
             commanded_s: None,
             no_light: false,
             out_after_s: f64::INFINITY,
@@ -109,7 +113,13 @@ impl Motor {
             after.ignition_delay_s + (self.ignition_delay_s - before.ignition_delay_s)
         };
         let burn = TrueBurn { impulse_scale, ..after.burn.clone() };
-        Self { burn, ignition_delay_s, ..self.clone() }
+        Self {
+            burn,
+            ignition_delay_s,
+            chuff_s: after.chuff_s,
+            thrust_rise_s: after.thrust_rise_s,
+            ..self.clone()
+        }
     }
 
     /// Fires the igniter; only the first command counts.
@@ -130,12 +140,34 @@ impl Motor {
     /// Thrust at a time, N.
     pub(crate) fn thrust_n(&self, time_s: f64) -> f64 {
         let burning_s = self.burning_s(time_s);
-        if burning_s >= self.out_after_s { 0.0 } else { self.burn.thrust_n(burning_s) }
+        if burning_s >= self.out_after_s {
+            return 0.0;
+        }
+        let (curve_s, rate) = self.on_the_curve(burning_s);
+        rate * self.burn.thrust_n(curve_s)
+    }
+
+    /// A chuff and a slow rise burn the propellant later, and none is lost: how far the burn has come along its curve, s,
+    /// and how fast it goes along it.
+    fn on_the_curve(&self, burning_s: f64) -> (f64, f64) {
+        let [burns_s, out_s] = self.chuff_s;
+        if (burns_s..burns_s + out_s).contains(&burning_s) {
+            return (self.risen(burns_s).0, 0.0);
+        }
+        self.risen(if burning_s < burns_s { burning_s } else { burning_s - out_s })
+    }
+
+    fn risen(&self, burning_s: f64) -> (f64, f64) {
+        let rise_s = self.thrust_rise_s;
+        if burning_s <= 0.0 || burning_s >= rise_s {
+            return (if burning_s <= 0.0 { burning_s } else { burning_s - 0.5 * rise_s }, 1.0);
+        }
+        (0.5 * burning_s * burning_s / rise_s, burning_s / rise_s)
     }
 
     /// Propellant burnt up to a time, kg. After an early burn-out the unburnt rest is not counted.
     pub(crate) fn burnt_kg(&self, time_s: f64) -> f64 {
-        self.burn.burnt_kg(self.burning_s(time_s).min(self.out_after_s))
+        self.burn.burnt_kg(self.on_the_curve(self.burning_s(time_s).min(self.out_after_s)).0)
     }
 
     /// Propellant burnt for each newton second, kg.
@@ -188,6 +220,31 @@ mod tests {
         assert!((impulse_n_s - 1.1 * 120.0).abs() < 1e-3, "{impulse_n_s}");
         assert!((motor.burnt_kg(20.0) - 0.12).abs() < 1e-12);
         assert!((motor.flow_kg_n_s() * 1.1 * 120.0 - 0.12).abs() < 1e-12);
+    }
+
+    /// A motor that chuffs for 0.1 s and is out for 0.2 s, and one whose thrust rises in 0.25 s.
+    #[test]
+    fn val_hand_a_bad_start_delays_the_burn_and_loses_no_impulse() {
+        let begun = |truth: Truth| motor(&Truth { ignition_delay_s: 0.0, ..truth });
+        let (good, chuffs, rises) = (
+            begun(Truth::default()),
+            begun(Truth { chuff_s: [0.1, 0.2], ..Truth::default() }),
+            begun(Truth { thrust_rise_s: 0.25, ..Truth::default() }),
+        );
+        for since_s in [0.05, 0.0999] {
+            assert!((chuffs.thrust_n(10.0 + since_s) - good.thrust_n(10.0 + since_s)).abs() < 1e-12);
+        }
+        assert!(chuffs.thrust_n(10.2) == 0.0 && (chuffs.burnt_kg(10.2) - good.burnt_kg(10.1)).abs() < 1e-12);
+        for since_s in [0.31, 1.0, 3.5] {
+            assert!((chuffs.thrust_n(10.0 + since_s) - good.thrust_n(9.8 + since_s)).abs() < 1e-9);
+            assert!((rises.thrust_n(10.0 + since_s) - good.thrust_n(9.875 + since_s)).abs() < 1e-9);
+        }
+        for motor in [&good, &chuffs, &rises] {
+            let impulse_n_s: f64 =
+                (0..5000).map(|i| motor.thrust_n(10.0005 + 1e-3 * f64::from(i)) * 1e-3).sum();
+            assert!((impulse_n_s - 120.0).abs() < 0.02, "{impulse_n_s}");
+            assert!((motor.burnt_kg(20.0) - 0.12).abs() < 1e-12);
+        }
     }
 
     #[test]

@@ -13,6 +13,10 @@ pub struct Truth {
     pub burn_time_scale: f64,
     /// Time from the ignition command to the first thrust, s.
     pub ignition_delay_s: f64,
+    /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
+    pub chuff_s: [f64; 2],
+    /// Time in which the thrust rises to the curve's, s.
+    pub thrust_rise_s: f64,
     /// Thrust direction with the gimbal at its centre, as gimbal angles (pitch, yaw), rad.
     pub thrust_misalignment_rad: [f64; 2],
     /// Offset of the thrust from the axis, along body (y, z), m.
@@ -45,6 +49,8 @@ pub struct Truth {
     pub crossflow_scale: f64,
     /// True moments of inertia over those of the data, beside `mass_scale`.
     pub inertia_scale: f64,
+    /// Lean of the principal axis of inertia against the body's axis, about body y and z, rad.
+    pub principal_axis_rad: [f64; 2],
     /// Turn of the nozzle over the turn of its servo.
     pub gimbal_gain: f64,
     /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
@@ -109,6 +115,8 @@ impl Default for Truth {
             impulse_scale: 1.0,
             burn_time_scale: 1.0,
             ignition_delay_s: 0.15,
+            chuff_s: [0.0; 2],
+            thrust_rise_s: 0.0,
             thrust_misalignment_rad: [0.0; 2],
             thrust_offset_m: [0.0; 2],
             mass_scale: 1.0,
@@ -126,6 +134,7 @@ impl Default for Truth {
             fin_drag_scale: 1.0,
             crossflow_scale: 1.0,
             inertia_scale: 1.0,
+            principal_axis_rad: [0.0; 2],
             gimbal_gain: 1.0,
             gimbal_slop_rad: 0.0,
             fin_offset_rad: [0.0; 4],

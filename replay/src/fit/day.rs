@@ -461,7 +461,7 @@ pub(super) struct Arguments {
     /// the same vehicle and motor are converted.
     #[arg(long, value_name = "NAME|FILE")]
     mission: Option<String>,
-    /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh) or TOML file.
+    /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
     #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
     prior: String,
     /// Seed of the simulated flights.

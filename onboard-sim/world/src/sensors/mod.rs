@@ -33,6 +33,8 @@ pub struct SensorTruth {
     pub specific_force_m_s2: Vector3<f64>,
     /// Speed through the air, m/s.
     pub airspeed_m_s: f64,
+    /// The part of it across the axis, m/s.
+    pub airspeed_across_m_s: f64,
     /// Height of the centre of gravity over the feet when upright, m.
     pub cg_over_feet_m: f64,
     /// Angular acceleration, body axes, rad/s^2.
@@ -48,7 +50,7 @@ pub struct SensorTruth {
 }
 
 impl SensorTruth {
-    /// The truth over level ground, without rotation's acceleration, exhaust or parachute: state, specific force, m/s^2,
+    /// The truth over level ground, without rotation's acceleration, flow across the axis, exhaust or parachute: state, specific force, m/s^2,
     /// airspeed, m/s, and the centre of gravity's height over the feet, m.
     pub fn of_motion(
         state: &RigidState,
@@ -60,6 +62,7 @@ impl SensorTruth {
             state: *state,
             specific_force_m_s2: *specific_force_m_s2,
             airspeed_m_s,
+            airspeed_across_m_s: 0.0,
             cg_over_feet_m,
             angular_acceleration_rad_s2: Vector3::zeros(),
             ground_m: 0.0,
@@ -71,8 +74,10 @@ impl SensorTruth {
 
     /// The truth of a world.
     pub fn of(world: &World) -> Self {
+        let in_body = world.state().world_from_body.inverse_transform_vector(&world.air_velocity_m_s());
         Self {
             state: *world.state(),
+            airspeed_across_m_s: libm::hypot(in_body.y, in_body.z),
             specific_force_m_s2: *world.specific_force_m_s2(),
             airspeed_m_s: world.air_velocity_m_s().norm(),
             cg_over_feet_m: world.cg_above_feet_m(),
@@ -271,6 +276,7 @@ impl Sensors {
         let rectified_m_s2 = if burning { self.flaws.burning_bias_m_s2 } else { Vector3::zeros() };
         let felt_m_s2 = self.flaws.unit_from_body * mean(&mut self.force_sum_m_s2);
         let force = felt_m_s2.component_mul(&self.accelerometer_scale)
+            + self.flaws.cross_axis * felt_m_s2
             + rectified_m_s2
             + shaken_m_s2
             + self.errors.accelerometer_bias_m_s2
@@ -300,8 +306,10 @@ impl Sensors {
         let ejection_m = truth
             .ejected_for_s
             .map_or(0.0, |for_s| self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S));
+        let across_m_s = truth.airspeed_across_m_s;
+        let suction_m = self.flaws.barometer_crossflow * across_m_s * across_m_s / (2.0 * GRAVITY_M_S2);
         Some(
-            then_m + self.errors.barometer_offset_m + plume_m + ejection_m
+            then_m + self.errors.barometer_offset_m + plume_m + ejection_m + suction_m
                 - self.errors.barometer_ram * speed_height_m
                 + barometer.noise_m * self.barometer_noise.next(),
         )
@@ -317,9 +325,11 @@ impl Sensors {
         }
         let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
         let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
+        let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
+        let then = moved_back(truth, older_s);
         let mut fix = GnssFix {
-            position_m: truth.state.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
-            velocity_m_s: truth.state.velocity_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
+            position_m: then.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
+            velocity_m_s: then.velocity_m_s + slow_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
             valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
         };
         let (fate, off_m) = self.flaws.of_fix(&self.params);
@@ -344,14 +354,17 @@ impl Sensors {
         }
         let noise_m = lidar.noise_m * self.lidar_noise.next();
         let (fate, anywhere) = self.flaws.of_range(&self.params);
-        let tilt_rad = truth.state.tilt_rad();
+        let along_beam = truth.state.world_from_body * self.flaws.beam;
+        let tilt_rad = RigidState { world_from_body: along_beam, ..truth.state }.tilt_rad();
         if tilt_rad > lidar.tilt_max_deg.to_radians() {
             return None;
         }
         // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
         // distance from it.
-        let then_m =
-            truth.state.position_m.z - truth.ground_m - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
+        let then_m = truth.state.position_m.z
+            - truth.ground_m
+            - self.flaws.grass_m
+            - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
         let slant_m = then_m / libm::cos(tilt_rad);
         let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
         // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
@@ -365,6 +378,17 @@ impl Sensors {
             Fate::Outlier => Some(lidar.range_min_m + anywhere * (lidar.range_max_m - lidar.range_min_m)),
             Fate::Arrives => (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m),
         }
+    }
+}
+
+/// The motion some time ago, s, under the present acceleration.
+fn moved_back(truth: &SensorTruth, older_s: f64) -> RigidState {
+    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
+    acceleration_m_s2.z -= GRAVITY_M_S2;
+    RigidState {
+        position_m: truth.state.position_m - truth.state.velocity_m_s * older_s,
+        velocity_m_s: truth.state.velocity_m_s - acceleration_m_s2 * older_s,
+        ..truth.state
     }
 }
 

@@ -3,11 +3,11 @@
 
 use flight::estimation::estimator::{GRAVITY_M_S2, StartUncertainty};
 use flight::vehicle::rigid::RigidState;
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 
-use super::SensorParams;
+use super::{MS_S, SensorParams};
 
 /// Standard normal numbers by Box and Muller, on `libm` so that they are the same on every machine.
 #[derive(Debug, Clone)]
@@ -75,6 +75,7 @@ const DRAWN_STREAM: u64 = 5;
 const VIBRATION_STREAM: u64 = 6;
 const GNSS_STREAM: u64 = 7;
 const LIDAR_STREAM: u64 = 8;
+const SATELLITE_STREAM: u64 = 9;
 
 /// How fast the pressure of the ejection charge leaks out through the vents, s.
 pub(super) const EJECTION_LASTS_S: f64 = 0.3;
@@ -103,15 +104,27 @@ pub(super) struct Flaws {
     pub(super) lidar_late_s: f64,
     pub(super) continuity_lost: bool,
     pub(super) fin_feedback_rad: [f64; 4],
+    /// What each accelerometer axis feels of each other axis.
+    pub(super) cross_axis: Matrix3<f64>,
+    /// Suction of the flow across the axis, divided by its dynamic pressure.
+    pub(super) barometer_crossflow: f64,
+    /// From the vehicle's axes to those of the lidar's beam.
+    pub(super) beam: UnitQuaternion<f64>,
+    pub(super) grass_m: f64,
+    velocity_wander: [Wander; 3],
     vibration: Normal,
     gnss: Normal,
     lidar: Normal,
+    satellites: Normal,
 }
 
 impl Flaws {
     pub(super) fn draw(params: &SensorParams, seed: u64) -> Self {
         let mut drawn = Normal::new(seed, DRAWN_STREAM);
-        let (imu, barometer) = (&params.imu, &params.barometer);
+        let mut satellites = Normal::new(seed, SATELLITE_STREAM);
+        let (imu, barometer, gnss) = (&params.imu, &params.barometer, &params.gnss);
+        let lidar = &params.lidar;
+        let between = |[least, most]: [f64; 2], share: f64| least + (most - least) * share;
         Self {
             unit_from_body: Rotation3::from_scaled_axis(drawn.next3() * imu.mounting_deg.to_radians()),
             unit_m: drawn.next3() * imu.off_cg_m,
@@ -125,10 +138,34 @@ impl Flaws {
             fin_feedback_rad: core::array::from_fn(|_| {
                 params.switches.fin_feedback_deg.to_radians() * drawn.next()
             }),
+            cross_axis: Matrix3::from_fn(|row, column| {
+                let share = imu.accelerometer_cross_axis_share * drawn.next();
+                if row == column { 0.0 } else { share }
+            }),
+            barometer_crossflow: between(barometer.crossflow, drawn.unit()),
+            beam: UnitQuaternion::from_scaled_axis(
+                Vector3::new(0.0, drawn.next(), drawn.next()) * lidar.beam_deg.to_radians(),
+            ),
+            grass_m: between(lidar.grass_m, drawn.unit()),
+            velocity_wander: [(); 3].map(|()| {
+                Wander::new(gnss.velocity_wander_m_s, gnss.velocity_wander_correlation_s, &mut satellites)
+            }),
             vibration: Normal::new(seed, VIBRATION_STREAM),
             gnss: Normal::new(seed, GNSS_STREAM),
             lidar: Normal::new(seed, LIDAR_STREAM),
+            satellites,
         }
+    }
+
+    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its wandering velocity error,
+    /// m/s.
+    pub(super) fn of_satellites(&mut self, params: &SensorParams) -> (f64, Vector3<f64>) {
+        let gnss = &params.gnss;
+        for axis in &mut self.velocity_wander {
+            axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.satellites);
+        }
+        let older_s = gnss.age_jitter_s * self.satellites.next();
+        (older_s, Vector3::from_fn(|axis, _| self.velocity_wander[axis].value))
     }
 
     /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2.

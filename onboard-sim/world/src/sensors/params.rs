@@ -34,6 +34,8 @@ pub struct ImuParams {
     pub accelerometer_bias_mg: f64,
     /// Scale error of each accelerometer axis, as a fraction.
     pub accelerometer_scale_share: f64,
+    /// What each accelerometer axis feels of each other axis, as a fraction.
+    pub accelerometer_cross_axis_share: f64,
     /// Largest specific force measured, g.
     pub accelerometer_range_g: f64,
     /// Vibration while the motor burns, rms of one frame's sample, each axis, g.
@@ -61,6 +63,8 @@ pub struct BarometerParams {
     pub offset_walk_m_sqrt_s: f64,
     /// Ram coefficient: the pressure error divided by the dynamic pressure.
     pub ram_coefficient: f64,
+    /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and highest.
+    pub crossflow: [f64; 2],
     /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
     pub late_s: f64,
     /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
@@ -93,6 +97,11 @@ pub struct GnssParams {
     pub zeroed_before_s: f64,
     /// Error of the fixes' time tags, the same for all of a flight, s.
     pub time_tag_s: f64,
+    /// Error of each fix's time tag beside that, s.
+    pub age_jitter_s: f64,
+    /// Wandering velocity error, each axis, m/s, and its correlation time, s.
+    pub velocity_wander_m_s: f64,
+    pub velocity_wander_correlation_s: f64,
     /// Probability that a fix is lost.
     pub dropout_share: f64,
     /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
@@ -118,6 +127,10 @@ pub struct LidarParams {
     pub ahead_of_feet_m: f64,
     /// Below this height of the feet there is no echo while the motor burns, m: dust.
     pub blind_below_m: f64,
+    /// Lean of the beam against the axis, each way, degrees.
+    pub beam_deg: f64,
+    /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on the ground.
+    pub grass_m: [f64; 2],
     /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
     pub late_s: f64,
     /// Probability that a range is lost.
@@ -155,6 +168,7 @@ impl Default for ImuParams {
             accelerometer_noise_mg_sqrt_hz: 0.65,
             accelerometer_bias_mg: 3.0,
             accelerometer_scale_share: 0.001,
+            accelerometer_cross_axis_share: 0.0,
             accelerometer_range_g: 16.0,
             vibration_g: 0.0,
             vibration_deg_s: 0.0,
@@ -173,6 +187,7 @@ impl Default for BarometerParams {
             offset_m: 0.3,
             offset_walk_m_sqrt_s: 0.03,
             ram_coefficient: 0.05,
+            crossflow: [0.0; 2],
             late_s: 0.0,
             plume_m: 0.0,
             ejection_m: 0.0,
@@ -193,6 +208,9 @@ impl Default for GnssParams {
             wander_correlation_s: 200.0,
             zeroed_before_s: 20.0,
             time_tag_s: 0.0,
+            age_jitter_s: 0.0,
+            velocity_wander_m_s: 0.0,
+            velocity_wander_correlation_s: 60.0,
             dropout_share: 0.0,
             outlier_share: 0.0,
             outlier_m: 0.0,
@@ -210,6 +228,8 @@ impl Default for LidarParams {
             tilt_max_deg: 45.0,
             ahead_of_feet_m: 0.15,
             blind_below_m: 0.0,
+            beam_deg: 0.0,
+            grass_m: [0.0; 2],
             late_s: 0.0,
             dropout_share: 0.0,
             outlier_share: 0.0,
@@ -241,17 +261,25 @@ impl SensorParams {
             ("imu.accelerometer_noise_mg_sqrt_hz", imu.accelerometer_noise_mg_sqrt_hz),
             ("imu.accelerometer_bias_mg", imu.accelerometer_bias_mg),
             ("imu.accelerometer_scale_share", imu.accelerometer_scale_share),
+            ("imu.accelerometer_cross_axis_share", imu.accelerometer_cross_axis_share),
             ("imu.vibration_g", imu.vibration_g),
             ("imu.vibration_deg_s", imu.vibration_deg_s),
             ("imu.vibration_bias_mg", imu.vibration_bias_mg),
             ("imu.mounting_deg", imu.mounting_deg),
             ("imu.off_cg_m", imu.off_cg_m),
+            ("barometer.crossflow, lowest", baro.crossflow[0]),
+            ("barometer.crossflow, highest", baro.crossflow[1]),
             ("barometer.late_s", baro.late_s),
             ("barometer.plume_m", baro.plume_m),
             ("barometer.ejection_m", baro.ejection_m),
             ("gnss.time_tag_s", gnss.time_tag_s),
+            ("gnss.age_jitter_s", gnss.age_jitter_s),
+            ("gnss.velocity_wander_m_s", gnss.velocity_wander_m_s),
             ("gnss.outlier_m", gnss.outlier_m),
             ("lidar.blind_below_m", lidar.blind_below_m),
+            ("lidar.beam_deg", lidar.beam_deg),
+            ("lidar.grass_m, lowest", lidar.grass_m[0]),
+            ("lidar.grass_m, highest", lidar.grass_m[1]),
             ("lidar.late_s", lidar.late_s),
             ("switches.fin_feedback_deg", switches.fin_feedback_deg),
             ("barometer.noise_m", baro.noise_m),
@@ -277,6 +305,7 @@ impl SensorParams {
             ("imu.gyro_range_deg_s", imu.gyro_range_deg_s),
             ("imu.accelerometer_range_g", imu.accelerometer_range_g),
             ("gnss.wander_correlation_s", gnss.wander_correlation_s),
+            ("gnss.velocity_wander_correlation_s", gnss.velocity_wander_correlation_s),
             ("lidar.range_max_m", lidar.range_max_m),
         ];
         for (field, found) in sizes {

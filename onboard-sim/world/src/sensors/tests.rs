@@ -224,3 +224,59 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
     one_frame(&mut sensors, &truth);
     assert!(sensors.contact(true), "after 15 ms");
 }
+
+/// The last measurement of each sensor after 0.4 s: with the same noise for the same seed, whatever the parameters.
+fn last_of_each(params: &SensorParams, truth: &SensorTruth) -> Measurements {
+    let mut sensors = Sensors::new(params, 5, 0.0).unwrap();
+    let frames = (0..400).filter_map(|_| sensors.observe(truth, &SensorFaults::default()));
+    frames
+        .reduce(|last, now| Measurements {
+            imu: now.imu,
+            pressure_altitude_m: now.pressure_altitude_m.or(last.pressure_altitude_m),
+            gnss: now.gnss.or(last.gnss),
+            lidar_range_m: now.lidar_range_m.or(last.lidar_range_m),
+        })
+        .unwrap()
+}
+
+#[test]
+fn val_hand_a_flow_across_the_axis_raises_the_barometers_height() {
+    let truth = SensorTruth { airspeed_across_m_s: 10.0, ..falling(40.0, 100.0) };
+    let quiet = quiet();
+    let barometer = BarometerParams { crossflow: [0.55; 2], ..quiet.barometer };
+    let raised_m = last_of_each(&SensorParams { barometer, ..quiet }, &truth).pressure_altitude_m.unwrap()
+        - last_of_each(&quiet, &truth).pressure_altitude_m.unwrap();
+    // 0.55 times 10^2 / (2 times 9.80665).
+    assert!((raised_m - 2.804_219).abs() < 1e-6, "{raised_m}");
+}
+
+/// A fix that is older than its tag says is off by the motion since: in the fall by 40 m/s, and its velocity by gravity less
+/// drag.
+#[test]
+fn a_fix_of_unknown_age_is_off_along_the_motion() {
+    let truth = falling(40.0, 100.0);
+    let quiet = quiet();
+    let gnss = GnssParams { age_jitter_s: 0.02, ..quiet.gnss };
+    let fix = last_of_each(&SensorParams { gnss, ..quiet }, &truth).gnss.unwrap();
+    let good = last_of_each(&quiet, &truth).gnss.unwrap();
+    let (moved_m, gained_m_s) = (fix.position_m - good.position_m, fix.velocity_m_s - good.velocity_m_s);
+    let older_s = moved_m.z / 40.0;
+    assert!(older_s.abs() > 1e-4 && older_s.abs() < 0.1, "{older_s}");
+    assert!(moved_m.xy().norm() < 1e-12);
+    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
+    acceleration_m_s2.z -= GRAVITY_M_S2;
+    assert!((gained_m_s + acceleration_m_s2 * older_s).norm() < 1e-12, "{gained_m_s}");
+}
+
+#[test]
+fn a_beam_meets_the_grass_and_leans_as_its_holder_does() {
+    let truth = falling(1.0, 5.0);
+    let quiet = quiet();
+    let range =
+        |lidar: LidarParams| last_of_each(&SensorParams { lidar, ..quiet }, &truth).lidar_range_m.unwrap();
+    let good_m = range(quiet.lidar);
+    assert!((good_m - range(LidarParams { grass_m: [0.15; 2], ..quiet.lidar }) - 0.15).abs() < 1e-12);
+    // A beam that leans meets level ground further away; with 10 degrees each way it leans by less than 45.
+    let leaning_m = range(LidarParams { beam_deg: 10.0, ..quiet.lidar });
+    assert!(leaning_m > good_m + 1e-3 && leaning_m < good_m + 5.0, "{leaning_m}");
+}

@@ -259,6 +259,7 @@ impl World {
             mass_kg: self.mass.mass_kg,
             pitch_kg_m2: self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale,
             roll_kg_m2: self.mass.roll_inertia_kg_m2 * self.truth.inertia_scale,
+            principal_rad: self.truth.principal_axis_rad,
         };
         let (state, specific_force_m_s2) =
             body::rk4_step(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s);

@@ -279,7 +279,7 @@ impl Stack {
             .map(|(part_kg, at_m, own_kg_m2)| own_kg_m2 + part_kg * (at_m.x - cg_m.x) * (at_m.x - cg_m.x))
             .sum();
         let roll_kg_m2 = vehicle.roll_inertia_kg_m2 + booster.roll_inertia_kg_m2;
-        StackMass { inertia: Inertia { mass_kg, pitch_kg_m2, roll_kg_m2 }, cg_m }
+        StackMass { inertia: Inertia { mass_kg, pitch_kg_m2, roll_kg_m2, principal_rad: [0.0; 2] }, cg_m }
     }
 
     /// Adds the forces of nose and fins.
