@@ -115,7 +115,7 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     let recorder = open_log(cli.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let (mut station, mut model, mut wire) =
-        match start(cli, config, interactive, operator, (clock, demo_options, recorder)).await {
+        match Box::pin(start(cli, config, interactive, operator, (clock, demo_options, recorder))).await {
             Ok(started) => started,
             Err(error) => {
                 log_guard.discard();

@@ -37,6 +37,9 @@ pub struct EstimatorConfig {
     pub barometer_offset_walk_m_sqrt_s: f64,
     /// Wander of the ram coefficient, in one second.
     pub barometer_ram_walk_sqrt_s: f64,
+    /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A port on a cylinder feels
+    /// +1 to -1.1 of it, by its place; the mean over a ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
+    pub barometer_suction: f64,
     /// White noise of a satellite position, horizontal, m.
     pub gnss_horizontal_m: f64,
     /// White noise of a satellite position, vertical, m.
@@ -45,6 +48,9 @@ pub struct EstimatorConfig {
     pub gnss_velocity_m_s: f64,
     /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the tags.
     pub gnss_time_tag_s: f64,
+    /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes before the flight: from then
+    /// on the fixes show it.
+    pub gnss_age_jitter_s: f64,
     /// Wander of the satellite position's offset, horizontal, m in one second.
     pub gnss_horizontal_walk_m_sqrt_s: f64,
     /// Wander of the satellite position's offset, vertical, m in one second.
@@ -101,10 +107,12 @@ impl Default for EstimatorConfig {
             barometer_late_s: 0.0,
             barometer_offset_walk_m_sqrt_s: 0.03,
             barometer_ram_walk_sqrt_s: 0.001,
+            barometer_suction: 0.0,
             gnss_horizontal_m: 0.2,
             gnss_vertical_m: 0.3,
             gnss_velocity_m_s: 0.05,
             gnss_time_tag_s: 0.0,
+            gnss_age_jitter_s: 0.0,
             gnss_horizontal_walk_m_sqrt_s: 0.15,
             gnss_vertical_walk_m_sqrt_s: 0.25,
             lidar_m: 0.06,
@@ -166,6 +174,8 @@ impl EstimatorConfig {
             ("ground_slope_deg", self.ground_slope_deg),
             ("mounting_deg", self.mounting_deg),
             ("gnss_time_tag_s", self.gnss_time_tag_s),
+            ("barometer_suction", self.barometer_suction),
+            ("gnss_age_jitter_s", self.gnss_age_jitter_s),
             ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),
             ("burning_accelerometer_mg_sqrt_hz", self.burning_accelerometer_mg_sqrt_hz),
             ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),

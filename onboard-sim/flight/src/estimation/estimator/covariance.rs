@@ -5,14 +5,15 @@
 //! wind (15..17, world x and y, m/s), barometer offset (17, m), ram coefficient (18), offset of the satellite position
 //! (19..22, world, m), error of the satellite fixes' time tags (22, s),
 //! age of a barometer sample (23, s), age of a lidar sample (24, s),
-//! slope of the ground (25..27, rise along world x and y).
+//! slope of the ground (25..27, rise along world x and y), suction coefficient of the flow across the axis at the barometer
+//! (27).
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::computer::memory::remembers;
 
 /// Length of the error state.
-pub(super) const N: usize = 27;
+pub(super) const N: usize = 28;
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -26,6 +27,7 @@ pub(super) const GNSS_TIME_TAG: usize = 22;
 pub(super) const BAROMETER_LATE: usize = 23;
 pub(super) const LIDAR_LATE: usize = 24;
 pub(super) const SLOPE: usize = 25;
+pub(super) const BAROMETER_SUCTION: usize = 27;
 
 /// A row of the covariance, and any other vector over the error state.
 pub(super) type Row = [f64; N];

@@ -281,10 +281,17 @@ impl HeightChannel {
         self.barometer_age_s = 0.0;
     }
 
-    /// Takes a satellite height, and the distance that the vehicle has climbed since the fix was valid.
-    pub(super) fn take_gnss(&mut self, config: &EstimatorConfig, height_m: f64, climbed_since_m: f64) {
+    /// Takes a satellite height, the distance that the vehicle has climbed since the fix was valid, and the variance
+    /// that its unknown age adds, m^2.
+    pub(super) fn take_gnss(
+        &mut self,
+        config: &EstimatorConfig,
+        height_m: f64,
+        climbed_since_m: f64,
+        aged_m2: f64,
+    ) {
         let innovation_m = height_m - (self.height_m - climbed_since_m + self.offset_m);
-        let noise = config.gnss_vertical_m * config.gnss_vertical_m;
+        let noise = config.gnss_vertical_m * config.gnss_vertical_m + aged_m2;
         self.update(config, innovation_m, [1.0, 1.0], noise);
     }
 
@@ -369,7 +376,7 @@ mod tests {
         // The truth is 8 m, the channel has 9 m, and the satellites' offset is 1.2 m.
         let mut channel = HeightChannel::new(9.0, 0.8, 1.0);
         for _ in 0..3 {
-            channel.take_gnss(&config, 9.2, 0.0);
+            channel.take_gnss(&config, 9.2, 0.0, 0.0);
         }
         for _ in 0..50 {
             channel.take_lidar(&config, 8.0, 1.0);

@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 27 numbers, is corrected by scalar measurements: barometer with offset, age and ram
+//! every frame. The error of the state, 28 numbers, is corrected by scalar measurements: barometer with offset, age and ram
 //! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
@@ -29,12 +29,13 @@ use serde::{Deserialize, Serialize};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 use self::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, Covariance, GNSS_OFFSET,
-    GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
+    Covariance, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
 };
 pub use self::health::{Doubt, GateCounters, Gates, Health, HeightSources};
 use self::health::{HeightChannel, Surprise};
 use self::strapdown::{History, Noise, Nominal, Pending};
+use self::updates::FixAge;
 use self::wind::Sideways;
 pub use self::wind::VehicleNow;
 use crate::computer::memory::remembers;
@@ -152,6 +153,7 @@ pub struct Estimator {
     sideways: Sideways,
     gates: Gates,
     surprise: Surprise,
+    fix_age: FixAge,
     last_imu: ImuSample,
     rate_rad_s: Vector3<f64>,
     specific_force_m_s2: Vector3<f64>,
@@ -163,7 +165,7 @@ pub struct Estimator {
 
 // Configuration, noise and the initial uncertainty come from the mission.
 remembers!(Estimator {
-    start_s, frames, nominal, covariance, pending, history, heights, sideways, gates, surprise, last_imu, rate_rad_s,
+    start_s, frames, nominal, covariance, pending, history, heights, sideways, gates, surprise, fix_age, last_imu, rate_rad_s,
     specific_force_m_s2, last_good, restarts, restarted_at_s, surprised_at_s,
 } but { config, noise, start });
 
@@ -185,6 +187,7 @@ impl Estimator {
             sideways: Sideways::default(),
             gates: Gates::default(),
             surprise: Surprise::default(),
+            fix_age: FixAge::new(config),
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
             rate_rad_s: state.rate_rad_s,
             specific_force_m_s2: Vector3::zeros(),
@@ -348,7 +351,8 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[GNSS_TIME_TAG] = config.gnss_time_tag_s;
     sigmas[BAROMETER_LATE] = config.barometer_late_s;
     sigmas[LIDAR_LATE] = config.lidar_late_s;
-    sigmas[SLOPE..].fill(libm::tan(config.ground_slope_deg.to_radians()));
+    sigmas[SLOPE..BAROMETER_SUCTION].fill(libm::tan(config.ground_slope_deg.to_radians()));
+    sigmas[BAROMETER_SUCTION] = config.barometer_suction;
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
 }
 

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
-    GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
+    GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::computer::memory::remembers;
@@ -32,6 +32,7 @@ pub(super) struct Nominal {
     pub(super) lidar_late_s: f64,
     /// Rise of the ground along world x and y.
     pub(super) slope: Vector2<f64>,
+    pub(super) barometer_suction: f64,
 }
 
 remembers!(Nominal {
@@ -48,6 +49,7 @@ remembers!(Nominal {
     barometer_late_s,
     lidar_late_s,
     slope,
+    barometer_suction,
 });
 
 impl Nominal {
@@ -66,6 +68,7 @@ impl Nominal {
             barometer_late_s: 0.0,
             lidar_late_s: 0.0,
             slope: Vector2::zeros(),
+            barometer_suction: 0.0,
         }
     }
 
@@ -85,6 +88,7 @@ impl Nominal {
         self.barometer_late_s += error[BAROMETER_LATE];
         self.lidar_late_s += error[LIDAR_LATE];
         self.slope += Vector2::new(error[SLOPE], error[SLOPE + 1]);
+        self.barometer_suction += error[BAROMETER_SUCTION];
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -103,6 +107,7 @@ impl Nominal {
                 &self.gnss_time_tag_s,
                 &self.barometer_late_s,
                 &self.lidar_late_s,
+                &self.barometer_suction,
             ])
             .all(|value| value.is_finite())
     }

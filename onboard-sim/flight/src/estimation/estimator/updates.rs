@@ -1,11 +1,12 @@
 //! Corrections by barometer, satellites and lidar, one scalar after the other.
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, GNSS_OFFSET,
-    GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, POSITION, SLOPE, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
+    GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, POSITION, SLOPE, VELOCITY, WIND,
 };
 use super::strapdown::Since;
-use super::{Estimator, GnssFix};
+use super::{Estimator, EstimatorConfig, GnssFix};
+use crate::computer::memory::remembers;
 
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
 /// 20 in 0.2 s.
@@ -30,11 +31,53 @@ const POSITION_REJECTIONS: u32 = 10;
 /// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong, m.
 const DOUBT_POSITION_M: f64 = 3.0;
 
+/// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10 ms are 0.15 m.
+const SHOWS_AGE_M_S: f64 = 15.0;
+/// The filter's belief before the flight counts as much as this many fixes.
+const BELIEVED_FIXES: f64 = 10.0;
+/// What the fixes have shown is forgotten after as many, 8 s.
+const REMEMBERED_FIXES: f64 = 40.0;
+/// One fix counts as at most this many standard deviations: an outlier says nothing of the age.
+const AGE_SIGMAS: f64 = 3.0;
+
+/// How much the ages of the fixes vary, from how far their positions are off along the motion: innovation-based adaptive
+/// estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17, 1972), of this one number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FixAge {
+    variance_s2: f64,
+    fixes: f64,
+    smallest_s2: f64,
+}
+
+remembers!(FixAge { variance_s2, fixes } but { smallest_s2 });
+
+impl FixAge {
+    pub(super) fn new(config: &EstimatorConfig) -> Self {
+        let variance_s2 = config.gnss_age_jitter_s * config.gnss_age_jitter_s;
+        Self { variance_s2, fixes: BELIEVED_FIXES, smallest_s2: 0.1 * variance_s2 }
+    }
+
+    /// Takes how far a position was off, m, the variance that is expected of a fix of exact age, m^2, and the speed, m/s.
+    fn take(&mut self, innovation_m: f64, exact_m2: f64, speed_m_s: f64) {
+        if self.smallest_s2 <= 0.0 || speed_m_s.abs() < SHOWS_AGE_M_S || !innovation_m.is_finite() {
+            return;
+        }
+        let speed_m2_s2 = speed_m_s * speed_m_s;
+        let most_m2 = AGE_SIGMAS * AGE_SIGMAS * (exact_m2 + speed_m2_s2 * self.variance_s2);
+        let shown_s2 = ((innovation_m * innovation_m).min(most_m2) - exact_m2) / speed_m2_s2;
+        self.fixes = (self.fixes + 1.0).min(REMEMBERED_FIXES);
+        self.variance_s2 += (shown_s2 - self.variance_s2) / self.fixes;
+        self.variance_s2 = self.variance_s2.max(self.smallest_s2);
+    }
+}
+
 /// The result of a scalar correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Correction {
     /// Innovation squared divided by its variance; its expected value is 1.
     pub(super) normalised_squared: f64,
+    /// Variance of the innovation.
+    pub(super) variance: f64,
     pub(super) accepted: bool,
 }
 
@@ -68,20 +111,27 @@ impl Estimator {
             self.nominal.inject(&gain.map(|share| share * innovation));
             self.covariance.update(&gain, &with, variance);
         }
-        Correction { normalised_squared, accepted }
+        Correction { normalised_squared, variance, accepted }
     }
 
-    /// The barometer measures height plus its own offset plus the ram error `-k V^2 / 2 g`.
+    /// The barometer measures height plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
+    /// the flow across the axis.
     pub(super) fn take_barometer(&mut self, altitude_m: f64) {
         let gravity = self.config.gravity_m_s2;
         let through_air = self.velocity_through_air_m_s();
         let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
         let state = &self.nominal;
-        let by_velocity = through_air * (-state.barometer_ram / gravity);
+        let nose = state.world_from_body * nalgebra::Vector3::x();
+        let across = through_air - nose * nose.dot(&through_air);
+        let across_height_m = across.norm_squared() / (2.0 * gravity);
+        let by_velocity =
+            through_air * (-state.barometer_ram / gravity) + across * (state.barometer_suction / gravity);
         let predicted_m = state.position_m.z + state.barometer_offset_m
             - state.barometer_ram * speed_height_m
-            - state.barometer_late_s * state.velocity_m_s.z;
-        let sensitivity = [
+            - state.barometer_late_s * state.velocity_m_s.z
+            + state.barometer_suction * across_height_m;
+        let mut sensitivity = [(BAROMETER_SUCTION, across_height_m); 10];
+        let known = [
             (POSITION + 2, 1.0),
             (VELOCITY, by_velocity.x),
             (VELOCITY + 1, by_velocity.y),
@@ -92,7 +142,9 @@ impl Estimator {
             (BAROMETER_RAM, -speed_height_m),
             (BAROMETER_LATE, -state.velocity_m_s.z),
         ];
-        let sensitivity = without_last_if(self.config.barometer_late_s <= 0.0, &sensitivity);
+        let known = without_last_if(self.config.barometer_late_s <= 0.0, &known);
+        sensitivity[..known.len()].copy_from_slice(known);
+        let sensitivity = &sensitivity[..known.len() + usize::from(self.config.barometer_suction > 0.0)];
         let noise = self.config.barometer_m * self.config.barometer_m;
         let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
         self.gates.barometer.count(correction.accepted);
@@ -100,7 +152,8 @@ impl Estimator {
             let state = &self.nominal;
             let late_m = state.barometer_late_s * state.velocity_m_s.z;
             self.heights.take_barometer(
-                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m,
+                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
+                    - state.barometer_suction * across_height_m,
             );
         }
         if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
@@ -134,7 +187,9 @@ impl Estimator {
             ];
             let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
             let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
-            let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s;
+            let late = since.acceleration_m_s2[axis];
+            let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s
+                + late * late * self.fix_age.variance_s2;
             let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
             self.gates.gnss_velocity.count(correction.accepted);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
@@ -158,11 +213,13 @@ impl Estimator {
             let predicted =
                 self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
             let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
-            let correction =
-                self.correct(sensitivity, fix.position_m[axis] - predicted, sigma * sigma, |_| true);
+            let aged_m2 = then_m_s * then_m_s * self.fix_age.variance_s2;
+            let innovation_m = fix.position_m[axis] - predicted;
+            let correction = self.correct(sensitivity, innovation_m, sigma * sigma + aged_m2, |_| true);
             self.gates.gnss_position.count(correction.accepted);
+            self.fix_age.take(innovation_m, correction.variance - aged_m2, then_m_s);
             if axis == 2 && fix.position_m.z.is_finite() {
-                self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z);
+                self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z, aged_m2);
             }
         }
         if self.gates.gnss_position.rejected_in_a_row >= POSITION_REJECTIONS {
@@ -241,5 +298,48 @@ impl Estimator {
                 self.covariance.widen(first + axis, sigma * sigma);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn age() -> FixAge {
+        FixAge::new(&EstimatorConfig { gnss_age_jitter_s: 0.01, ..EstimatorConfig::default() })
+    }
+
+    /// Innovations of both signs with exactly the variance of this jitter, s, at 40 m/s, beside 0.4 m of everything else.
+    fn shown(jitter_s: f64, fixes: u32) -> f64 {
+        let mut age = age();
+        let off_m = libm::sqrt(0.16 + 1600.0 * jitter_s * jitter_s);
+        for fix in 0..fixes {
+            age.take(if fix % 2 == 0 { off_m } else { -off_m }, 0.16, -40.0);
+        }
+        libm::sqrt(age.variance_s2)
+    }
+
+    #[test]
+    fn fixes_show_how_much_their_ages_vary() {
+        assert!((shown(0.03, 200) - 0.03).abs() < 0.002, "{}", shown(0.03, 200));
+        assert!((shown(0.01, 200) - 0.01).abs() < 1e-9, "{}", shown(0.01, 200));
+        // A fall has about 40 fixes.
+        assert!(shown(0.03, 40) > 0.02, "{}", shown(0.03, 40));
+        // Exact ages: a third of what was believed is left, which an offset of the clock needs.
+        assert!((shown(0.0, 200) - 0.01 * libm::sqrt(0.1)).abs() < 1e-9, "{}", shown(0.0, 200));
+    }
+
+    #[test]
+    fn an_outlier_a_slow_fix_and_no_number_say_little_or_nothing() {
+        let mut once = age();
+        once.take(500.0, 0.16, -40.0);
+        assert!(libm::sqrt(once.variance_s2) < 0.02, "{once:?}");
+        let mut none = age();
+        none.take(f64::NAN, 0.16, -40.0);
+        none.take(500.0, 0.16, 10.0);
+        assert_eq!(none, age());
+        let mut ruled_out = FixAge::new(&EstimatorConfig::default());
+        ruled_out.take(5.0, 0.16, -40.0);
+        assert_eq!(ruled_out, FixAge::new(&EstimatorConfig::default()));
     }
 }

@@ -169,10 +169,12 @@ pub struct MotorEstimate {
     felt_at_s: f64,
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
+    /// How long the motor had burnt when it chuffed, s; 0 if it did not.
+    chuffed_s: f64,
 }
 
 // The prior is constant; everything that changes is in the mean and the covariance.
-remembers!(MotorEstimate { detector, stage, mean, covariance, felt_at_s, starved_frames } but { prior });
+remembers!(MotorEstimate { detector, stage, mean, covariance, felt_at_s, starved_frames, chuffed_s } but { prior });
 
 const IMPULSE: usize = 0;
 const STRETCH: usize = 1;
@@ -201,6 +203,9 @@ const GATE_SIGMAS: f64 = 5.0;
 const STARVED_SHARE: f64 = 0.3;
 /// 80 ms: a dip of the thrust is shorter.
 const STARVED_FRAMES: u32 = 16;
+/// A motor that goes out within this time of its first thrust has chuffed, and lights again, s: its propellant did not burn
+/// yet where the igniter did not reach.
+const CHUFF_S: f64 = 0.4;
 /// Half the span over which the curve's slope is taken, s.
 const SLOPE_SPAN_S: f64 = 0.02;
 /// Limits of the scales.
@@ -225,6 +230,7 @@ impl MotorEstimate {
             covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
             felt_at_s: 0.0,
             starved_frames: 0,
+            chuffed_s: 0.0,
         }
     }
 
@@ -323,9 +329,12 @@ impl MotorEstimate {
         let thrust_n = force_n - self.air_scale() * air_n;
         if sample.may_burn {
             let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
-            if let Some(ignition_s) = self.detector.take(curve, middle_s, thrust_n) {
+            let mark_n = CAUGHT_SHARE * curve.peak_n();
+            if let Some(crossed_s) = self.detector.take(mark_n, middle_s, thrust_n) {
                 self.stage = MotorStage::Burning;
-                self.mean[IGNITION] = ignition_s;
+                // A motor that chuffed goes on along its curve.
+                let begun_s = if self.chuffed_s > 0.0 { self.chuffed_s } else { rise_s(curve, mark_n) };
+                self.mean[IGNITION] = crossed_s - begun_s;
                 self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
             }
         }
@@ -405,6 +414,13 @@ impl MotorEstimate {
         let air_n = sample.axial_air_force_n;
         let starved = force_n - self.air_scale() * air_n < STARVED_SHARE * thrust_n * cosine;
         self.starved_frames = if starved { self.starved_frames + 1 } else { 0 };
+        if self.starved_frames >= STARVED_FRAMES && since_s < CHUFF_S {
+            self.chuffed_s = (since_s - f64::from(STARVED_FRAMES) * self.prior.frame_s).max(0.0);
+            self.stage = MotorStage::Waiting;
+            self.detector = Detector::default();
+            self.starved_frames = 0;
+            return;
+        }
         if self.starved_frames >= STARVED_FRAMES {
             let lasted_s = f64::from(STARVED_FRAMES) * self.prior.frame_s;
             self.stage = MotorStage::EndedEarly { at_s: sample.time_s - lasted_s };
@@ -492,16 +508,15 @@ impl Detector {
         self.crossed_s.is_some()
     }
 
-    /// Takes a frame's mean thrust. Returns the instant of ignition when this is the second frame above the threshold.
-    fn take(&mut self, curve: &impl NominalThrust, middle_s: f64, thrust_n: f64) -> Option<f64> {
-        let mark_n = CAUGHT_SHARE * curve.peak_n();
+    /// Takes a frame's mean thrust. Returns when the thrust rose through the threshold, s, if this is the second frame above it.
+    fn take(&mut self, mark_n: f64, middle_s: f64, thrust_n: f64) -> Option<f64> {
         let before = self.last.replace((middle_s, thrust_n));
         if thrust_n <= mark_n {
             self.crossed_s = None;
             return None;
         }
-        if let Some(crossed_s) = self.crossed_s {
-            return Some(crossed_s - rise_s(curve, mark_n));
+        if self.crossed_s.is_some() {
+            return self.crossed_s;
         }
         self.crossed_s = Some(match before {
             Some((before_s, before_n)) if thrust_n > before_n && before_n <= mark_n => {
