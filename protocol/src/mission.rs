@@ -4,7 +4,8 @@ use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
-/// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it, also of a comment.
+/// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it, also of a comment, but for the
+/// line that says where a flight begins (`at` in `[start]`): that is chosen anew for each flight (`--start`).
 /// 64 bits tell missions apart; they are no protection against somebody who searches for a text with the same hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
@@ -12,9 +13,18 @@ pub struct MissionHash(pub [u8; 8]);
 
 impl MissionHash {
     pub fn of(text: &str) -> Self {
-        let digest = Sha256::digest(text);
+        let (mut digest, mut in_start) = (Sha256::new(), false);
+        for line in text.split_inclusive('\n') {
+            if line.starts_with('[') {
+                in_start = line.trim_end() == "[start]";
+            }
+            let key = line.split_once('=').map_or("", |(key, _)| key.trim());
+            if !(in_start && key == "at") {
+                digest.update(line);
+            }
+        }
         let mut hash = [0; 8];
-        hash.copy_from_slice(&digest[..8]);
+        hash.copy_from_slice(&digest.finalize()[..8]);
         Self(hash)
     }
 }
@@ -101,6 +111,23 @@ mod tests {
             [-1.0; 3],
         ] {
             assert_eq!(Expected::of_params(wrong), Expected::Unreadable, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn the_start_is_no_part_of_the_mission_and_everything_else_is() {
+        let text = "name = \"a\"\n[start]\nheight_m = 300.0\n\n[other]\nat = 1\n";
+        let hash = MissionHash::of(text);
+        for same in [
+            text.replace("300.0\n", "300.0\nat = \"pad\"\n"),
+            text.replace("[start]\n", "[start]\nat=\"drone\"   # from below\n"),
+        ] {
+            assert_eq!(MissionHash::of(&same), hash, "{same}");
+        }
+        for other in
+            [text.replace("300.0", "301.0"), text.replace("at = 1", "at = 2"), text.replace("\n\n", "\n")]
+        {
+            assert_ne!(MissionHash::of(&other), hash, "{other}");
         }
     }
 

@@ -124,6 +124,19 @@ mod tests {
         }
     }
 
+    /// A station that is prepared for a mission arms it wherever the flight begins.
+    #[test]
+    fn the_vehicle_tells_the_same_mission_from_every_start() {
+        use protocol::mission::MissionHash;
+        for (name, text) in vehicles::mission::BUILTIN {
+            for start in [StartPoint::Apogee, StartPoint::Pad, StartPoint::Drone] {
+                let Ok(flight) = load_flight(name).unwrap().starting_at(Some(start)) else { continue };
+                let told = flight.vehicle().unwrap().mission().hash;
+                assert_eq!(told, MissionHash::of(text), "{name} from {}", start.name());
+            }
+        }
+    }
+
     #[test]
     fn what_is_no_mission_is_refused_with_the_names_there_are() {
         let words = load_flight("mk9").err().unwrap().to_string();
