@@ -228,6 +228,17 @@ fn check(truth: &Truth) -> Result<(), WorldError> {
             return refuse("fin_offset_rad", value, "-0.5 to 0.5");
         }
     }
+    for value in truth.principal_axis_rad {
+        if !(-0.5..=0.5).contains(&value) {
+            return refuse("principal_axis_rad", value, "-0.5 to 0.5");
+        }
+    }
+    let [burns_s, out_s] = truth.chuff_s;
+    for (key, value) in [("chuff_s", burns_s), ("chuff_s", out_s), ("thrust_rise_s", truth.thrust_rise_s)] {
+        if !(0.0..=5.0).contains(&value) {
+            return refuse(key, value, "0 to 5");
+        }
+    }
     for value in truth.ground_rise {
         if !(-0.3..=0.3).contains(&value) {
             return refuse("ground_rise", value, "-0.3 to 0.3");
@@ -381,6 +392,13 @@ mod tests {
         let changed = world.changed(world.airframe(), &other, world.truth()).unwrap();
         let since_s = world.time_s() - world.thrust_begins_s().unwrap();
         assert!((changed.thrust_n() - 0.9 * 1.03 * other.thrust_at_n(since_s)).abs() < 1e-9);
-        assert!(world.changed(world.airframe(), &motor, &Truth { wind_m_s: -1.0, ..weaker }).is_err());
+        for wrong in [
+            Truth { wind_m_s: -1.0, ..weaker },
+            Truth { thrust_rise_s: -1.0, ..weaker },
+            Truth { chuff_s: [0.1, f64::NAN], ..weaker },
+            Truth { principal_axis_rad: [0.0, 2.0], ..weaker },
+        ] {
+            assert!(world.changed(world.airframe(), &motor, &wrong).is_err(), "{wrong:?}");
+        }
     }
 }
