@@ -12,7 +12,7 @@ use ground::update::{Msg, update};
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::{VehicleEndpoint, step};
+use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
@@ -56,7 +56,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
     let mut vehicle = Vehicle::on_the_pad(&flight)?;
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     vehicle.set_pin_out(true);
-    let mut endpoint = VehicleEndpoint::new().booted(hour + 1);
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(hour + 1);
     let mut armed = false;
     for frame in 0..(HOUR.as_millis() / FRAME.as_millis()) as u32 {
         let at = FRAME * frame;

@@ -278,7 +278,9 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     let phase = model.vehicle.phase_now();
     match model.auto_step {
         AutoStep::WaitForReady { not_before } => match phase {
-            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && is_simulated(model) => start_auto(model, now),
+            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && model.vehicle.is_simulated() => {
+                start_auto(model, now);
+            }
             // The flight has already begun, so there is nothing to start.
             Some(phase) if phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32 => {
                 model.auto_step = AutoStep::Done;
@@ -286,7 +288,7 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
             _ => arm_if_ready(model, not_before, now),
         },
         AutoStep::WaitForArmed => {
-            if armed && is_simulated(model) && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
+            if armed && model.vehicle.is_simulated() && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
                 start_auto(model, now);
             }
         }
@@ -294,14 +296,9 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     }
 }
 
-/// Whether the vehicle is known to be simulated.
-fn is_simulated(model: &Model) -> bool {
-    model.settings.demonstration || model.vehicle.is_simulated()
-}
-
 /// Whether the vehicle has reported what it is, and is not simulated.
 fn is_live(model: &Model) -> bool {
-    model.vehicle.boot.has_said_what_it_is() && !is_simulated(model)
+    model.vehicle.boot.has_said_what_it_is() && !model.vehicle.is_simulated()
 }
 
 fn refuse_auto(model: &mut Model, now: Duration) {
@@ -338,7 +335,7 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
     let Some(status) = model.vehicle.status.as_ref() else {
         return Some("the vehicle has not reported its checks".to_owned());
     };
-    if !is_simulated(model) {
+    if !model.vehicle.is_simulated() {
         return Some("the vehicle has not reported that it is simulated".to_owned());
     }
     let failing = words::failed_checks(status.value.checks_failed);

@@ -135,5 +135,10 @@ fn the_automatic_mode_is_refused_with_a_live_vehicle() {
     let mut own = Rig::new(Settings { demonstration: true, ..settings(true, false) });
     own.simulated = false;
     own.run(2.0);
-    assert!(is_arm(&own.take_commands()[0]), "the vehicle of this very process");
+    assert!(own.take_commands().is_empty(), "the demonstration asks for both marks, too");
+    // One mark is not enough: of the status alone, and, in `identity`, of the heartbeat alone.
+    let mut half = Rig::new(settings(true, false));
+    half.hil = false;
+    half.run(2.0);
+    assert!(half.take_commands().is_empty() && half.events().contains("automatic mode refused"));
 }

@@ -19,7 +19,7 @@ use protocol::identity::GROUND;
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
-use simulated_vehicle::endpoint::{VehicleEndpoint, step};
+use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::load_flight;
 
 use crate::rig::settings;
@@ -43,7 +43,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let mut vehicle = load_flight(profile).expect("built in").vehicle().expect("sound");
     vehicle.set_pin_out(true);
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-    let mut endpoint = VehicleEndpoint::new().booted(1);
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(1);
     let mut encoder = Encoder::new(GROUND);
     let mut model = Model::new(settings(true, true));
     let line = Line::default();

@@ -12,7 +12,7 @@ use ground::update::{Msg, update};
 use ground::view::status_lines;
 use protocol::dialect::{TdChute, TdPhase};
 use protocol::frame::Frame;
-use simulated_vehicle::endpoint::{VehicleEndpoint, step};
+use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
@@ -33,7 +33,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
     let mut rocket = Vehicle::on_the_pad(&flight).expect("its motor is known");
     rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     rocket.set_pin_out(true);
-    let mut endpoint = VehicleEndpoint::new().starting_by_itself();
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).starting_by_itself();
     let mut heard = Vec::new();
     let mut stands_s = 0.0;
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {

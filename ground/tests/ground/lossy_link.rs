@@ -10,7 +10,7 @@ use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::{VehicleEndpoint, step};
+use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::{StartPoint, load_flight};
 
 use crate::rig::settings;
@@ -68,7 +68,7 @@ fn run(seed: u64) -> Run {
         load_flight("mk2").and_then(|flight| flight.starting_at(Some(StartPoint::Drone))).expect("built in");
     flight.recipe.seed = seed;
     let mut vehicle = flight.vehicle().expect("sound");
-    let mut endpoint = VehicleEndpoint::new().booted(1);
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(1);
     let (mut up, mut down) = (LossyLink::new(2 * seed + 1), LossyLink::new(2 * seed + 2));
     let mut model = Model::new(settings(false, true));
     let mut encoder = Encoder::new(GROUND);

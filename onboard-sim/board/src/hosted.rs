@@ -11,7 +11,7 @@ use std::thread;
 
 use anyhow::{Context as _, Result, ensure};
 use board::radio::Radio;
-use board::recorded::Board;
+use board::recorded::{Board, VehicleKind};
 use board::stream::{Answer, Reader};
 use clap::{Parser, Subcommand};
 use flight::rules::phase::Phase;
@@ -110,7 +110,7 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
         Some(path) => Some(Serial::open(path).with_context(|| path.display().to_string())?),
     };
     let (mut from_world, mut to_world) = (io::stdin().lock(), io::stdout().lock());
-    let (mut board, mut arrived, mut answers) = (Board::default(), [0; 4096], Vec::new());
+    let (mut board, mut arrived, mut answers) = (Board::new(VehicleKind::Simulated), [0; 4096], Vec::new());
     loop {
         let read = from_world.read(&mut arrived)?;
         if read == 0 {

@@ -9,7 +9,7 @@ use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use board::radio::Radio;
-use board::recorded::{Board, FlyError, Watch};
+use board::recorded::{Board, FlyError, VehicleKind, Watch};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::{entry, exception};
@@ -77,7 +77,7 @@ fn fly_the_files() -> io::Result<()> {
     let file = written(c"costs")?;
     let mut costs =
         Costs { file, begun: 0, set_up_bytes: 0, most_bytes: 0, saved, save: Cost::default(), failed: None };
-    let mut board = Board::default();
+    let mut board = Board::new(VehicleKind::Real);
     let flown = fly(&mut board, (&mut frames, &mut answers), &mut costs)?;
     if let Some(error) = costs.failed {
         return Err(error);

@@ -15,7 +15,7 @@ use protocol::mission::MissionHash;
 use vehicle_link::endpoint::{Heard, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
 use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};
-use vehicle_link::vehicle::{MissionName, Vehicle};
+use vehicle_link::vehicle::{MissionName, Vehicle, VehicleKind};
 
 use crate::stream::{self, OnTheAir};
 
@@ -67,9 +67,9 @@ struct Flown<'a> {
 
 impl Crewed {
     /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml` its text.
-    pub(crate) fn new(on_the_air: &OnTheAir, mission: Mission, toml: &str) -> Self {
+    pub(crate) fn new(kind: VehicleKind, on_the_air: &OnTheAir, mission: Mission, toml: &str) -> Self {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
-        let endpoint = VehicleEndpoint::new()
+        let endpoint = VehicleEndpoint::new(kind)
             .booted(on_the_air.boot_number)
             .over_links(&[on_the_air.budget_bytes_s])
             .of_system(system_id);

@@ -10,6 +10,8 @@ use flight_log::again::{FrameError, RecordedComputer, mission_flown};
 use flight_log::frame::output_to_log;
 use log_records::computer_v1::ComputerInput;
 
+pub use vehicle_link::vehicle::VehicleKind;
+
 use crate::radio::{Crewed, Radio};
 use crate::stream::{Answer, Begin, Frame, Reader, put};
 
@@ -48,8 +50,8 @@ pub enum FlyError {
 }
 
 /// The flight computer on a board: frames in, answers out.
-#[derive(Default)]
 pub struct Board {
+    kind: VehicleKind,
     reader: Reader,
     flying: Option<Flying>,
     frames: u64,
@@ -67,6 +69,11 @@ struct Flying {
 }
 
 impl Board {
+    /// Before its first frame. `kind` is what it tells its crew that it is.
+    pub fn new(kind: VehicleKind) -> Self {
+        Self { kind, reader: Reader::default(), flying: None, frames: 0 }
+    }
+
     /// Frames that it has flown.
     pub fn frames(&self) -> u64 {
         self.frames
@@ -93,7 +100,8 @@ impl Board {
         while let Some(mut frame) = self.reader.next_record::<Frame>() {
             let begin = frame.begin.take();
             if let Some(begin) = begin.filter(|begin| self.flight() != Some(begin.flight)) {
-                self.flying = Some(Flying::power_up(&begin, watch.saved()).map_err(FlyError::Begin)?);
+                self.flying =
+                    Some(Flying::power_up(self.kind, &begin, watch.saved()).map_err(FlyError::Begin)?);
                 watch.is_set_up();
             }
             let flying = self.flying.as_mut().ok_or(FlyError::Empty)?;
@@ -154,12 +162,12 @@ impl Flying {
     }
 
     /// The flight computer before its first frame, and the crew's end of it; or why there is none.
-    fn power_up(begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
+    fn power_up(kind: VehicleKind, begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
         let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
         let mission = vehicles::mission::from_toml(&begin.toml, "mission");
         let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start);
         let computer = RecordedComputer::started(&mission, &begin.start, controller);
-        let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(air, mission, &begin.toml));
+        let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, mission, &begin.toml));
         Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })
     }
 }

@@ -4,14 +4,17 @@
 use std::cell::Cell;
 
 use board::port;
-use board::recorded::{Board, FlyError, Watch};
-use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, Reader, put};
+use board::radio::Radio;
+use board::recorded::{Board, FlyError, VehicleKind, Watch};
+use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, OnTheAir, Reader, put};
 use flight::computer::Commands;
 use flight::computer::news::News;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::{LoggedInput, input_from_log};
 use flight_log::sortie::LastFrame;
 use log_records::computer_v1::ComputerFrame;
+use protocol::dialect::{MavMessage, MavModeFlag, TdVehicleFlag};
+use protocol::frame::Framer;
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -22,7 +25,7 @@ const NEWS_BYTES_MAX: u64 = 2048;
 
 /// What a board answers to bytes that arrive a few at a time, as a serial line gives them.
 fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
-    let (mut board, mut out, mut flown) = (Board::default(), Vec::new(), Ok(()));
+    let (mut board, mut out, mut flown) = (Board::new(VehicleKind::Simulated), Vec::new(), Ok(()));
     for arrived in bytes.chunks(61) {
         flown = board.take(arrived, &mut (), &mut (), &mut |bytes: &[u8]| out.extend_from_slice(bytes));
         if flown.is_err() {
@@ -146,7 +149,7 @@ fn every_frame_before_a_reset_is_answered_before_it() {
     let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
     let answered = Cell::new(0);
     let mut resets = Resets { answered: &answered, found: Vec::new() };
-    Board::default()
+    Board::new(VehicleKind::Simulated)
         .take(&bytes, &mut (), &mut resets, &mut |_: &[u8]| answered.set(answered.get() + 1))
         .unwrap();
     assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
@@ -244,4 +247,49 @@ fn what_is_wrong_with_a_stream_is_said() {
     let (board, _, flown) = fly(&vec![1; 2 * LONGEST_BYTES]);
     assert!(flown.is_ok() && board.reader().missing_its_end() <= LONGEST_BYTES + 61, "memory is bounded");
     assert!(board.reader().broken() > 0);
+}
+
+/// Keeps what is sent.
+#[derive(Default)]
+struct Sent(Vec<u8>);
+
+impl Radio for Sent {
+    fn read(&mut self, _: &mut [u8]) -> usize {
+        0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.0.extend_from_slice(bytes);
+    }
+}
+
+/// A station acts by itself only on a vehicle that says in both places that it is simulated.
+#[test]
+fn a_board_tells_its_crew_whether_it_is_real() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let on_the_air =
+        OnTheAir { mission: "mk2".to_owned(), system_id: 1, boot_number: 7, ..OnTheAir::default() };
+    let on_the_air = OnTheAir { budget_bytes_s: 20_000, ..on_the_air };
+    let mut begin = Some(Begin { on_the_air: Some(on_the_air), ..begin(&sortie) });
+    let mut frames = flown(&mut sortie);
+    frames.truncate(400);
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    for (kind, marked) in [(VehicleKind::Real, false), (VehicleKind::Simulated, true)] {
+        let mut radio = Sent::default();
+        Board::new(kind).take(&bytes, &mut radio, &mut (), &mut |_: &[u8]| ()).unwrap();
+        let mut framer = Framer::new();
+        framer.push(&radio.0);
+        let said: Vec<bool> = core::iter::from_fn(|| framer.next_frame())
+            .filter_map(|frame| match frame.decode() {
+                Ok(MavMessage::HEARTBEAT(beat)) => {
+                    Some(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED))
+                }
+                Ok(MavMessage::TD_FLIGHT_STATUS(status)) => {
+                    Some(status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED))
+                }
+                _ => None,
+            })
+            .collect();
+        assert!(said.len() > 4 && said.iter().all(|said| *said == marked), "{kind:?}: {said:?}");
+    }
 }

@@ -37,6 +37,20 @@ pub mod vehicle {
 
     use crate::snapshot::Snapshot;
 
+    /// Whether something real can light and move. A station acts by itself only on a simulated vehicle.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum VehicleKind {
+        Real,
+        Simulated,
+    }
+
+    /// Which vehicle speaks, and since which power-up.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub struct Identity {
+        pub kind: VehicleKind,
+        pub boot_number: u32,
+    }
+
     /// Which mission or profile a vehicle flies.
     #[derive(Debug, Clone, PartialEq, Eq)]
     pub struct MissionName {

@@ -44,6 +44,8 @@ pub(crate) struct Rig {
     pub(crate) boot_number: u32,
     /// Whether both of its flags are set.
     pub(crate) simulated: bool,
+    /// Whether the heartbeat of a simulated vehicle says so, too.
+    pub(crate) hil: bool,
     pub(crate) motor: TdMotor,
     pub(crate) approach_wait_s: u16,
     pub(crate) hold: TdHold,
@@ -73,6 +75,7 @@ impl Rig {
             pad_wait_s: 0,
             boot_number: 0x1A2B_3C4D,
             simulated: true,
+            hil: true,
             motor: TdMotor::TD_MOTOR_LIVE,
             approach_wait_s: 0,
             hold: TdHold::TD_HOLD_NONE,
@@ -182,7 +185,7 @@ impl Rig {
     pub(crate) fn heartbeat(&mut self) {
         let mut base_mode = MavModeFlag::empty();
         base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, self.armed);
-        base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated);
+        base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated && self.hil);
         let phase = self.phase as u32;
         self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: phase,

@@ -330,7 +330,7 @@ impl Lane {
     ) {
         // In most frames nothing is due, so the state is only collected when needed.
         let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
-        if let Some(message) = telemetry::message(due.message_id, snapshot, context.boot_number) {
+        if let Some(message) = telemetry::message(due.message_id, snapshot, context.identity) {
             let frame = self.encoder.encode(&message);
             // Vital messages do not count as recent telemetry: a change of phase must not delay a position.
             if !due.vital {

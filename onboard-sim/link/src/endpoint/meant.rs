@@ -56,7 +56,7 @@ impl VehicleEndpoint {
         if request.target.system_id == 0 {
             return refused(denied, "it is for every vehicle, and must be for one".to_owned());
         }
-        let us = self.boot_number;
+        let us = self.identity.boot_number;
         match request.meant_boot() {
             MeantBoot::Boot(boot) if boot == us => {}
             MeantBoot::Boot(boot) => {

@@ -42,7 +42,7 @@ use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
 use crate::streams::{CheckTeller, Streams};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{Identity, Vehicle, VehicleKind};
 use crate::{commands, telemetry};
 
 /// Most requested messages that may wait; more are refused for the moment.
@@ -57,7 +57,7 @@ const ABORTED_BEATS_FOR_S: f64 = 3.0;
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
     us: Address,
-    boot_number: u32,
+    identity: Identity,
     lanes: Vec<Lane>,
     /// The budget of each link, bytes per second.
     capacities_bytes_s: Vec<u32>,
@@ -93,7 +93,7 @@ pub struct Outgoing {
 /// Data shared by all messages of one instant.
 struct Context {
     now_s: f64,
-    boot_number: u32,
+    identity: Identity,
 }
 
 /// State that is reported to the crew at once when it changes.
@@ -112,34 +112,28 @@ impl From<&Mode> for Told {
     }
 }
 
-impl Default for VehicleEndpoint {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl VehicleEndpoint {
     /// An endpoint with the standard messages at their default rates, over one link with a radio's budget.
-    pub fn new() -> Self {
-        Self::over(Streams::new(), 0)
+    pub fn new(kind: VehicleKind) -> Self {
+        Self::over(kind, Streams::new(), 0)
     }
 
     /// The same for signed frames, which are longer.
-    pub fn sending_signed() -> Self {
-        Self::over(Streams::signed(), SIGNATURE_LEN)
+    pub fn sending_signed(kind: VehicleKind) -> Self {
+        Self::over(kind, Streams::signed(), SIGNATURE_LEN)
     }
 
     /// The same for a vehicle with operators. A frame's signature must have been checked with the key that its link id
     /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
-    pub fn sending_to_crew() -> Self {
-        let endpoint = Self::over(Streams::with_crew(), SIGNATURE_LEN);
+    pub fn sending_to_crew(kind: VehicleKind) -> Self {
+        let endpoint = Self::over(kind, Streams::with_crew(), SIGNATURE_LEN);
         Self { stations: Stations::of_a_crew(), ..endpoint }
     }
 
-    fn over(streams: Streams, signature_len: usize) -> Self {
+    fn over(kind: VehicleKind, streams: Streams, signature_len: usize) -> Self {
         Self {
             us: VEHICLE,
-            boot_number: 0,
+            identity: Identity { kind, boot_number: 0 },
             lanes: vec![Lane::new(vec![0], streams, Encoder::new(VEHICLE), signature_len)],
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
             text_id: 0,
@@ -162,7 +156,7 @@ impl VehicleEndpoint {
     /// Sets the boot number, which only a new power-up changes.
     #[must_use]
     pub fn booted(self, boot_number: u32) -> Self {
-        Self { boot_number, ..self }
+        Self { identity: Identity { boot_number, ..self.identity }, ..self }
     }
 
     /// Sets the links by their budgets in bytes per second. All carry the same frames, limited by the slowest link,
@@ -290,7 +284,7 @@ impl VehicleEndpoint {
         for words in self.warnings.counted(self.now_s) {
             self.say_aloud(Severity::Warning, &words);
         }
-        let context = Context { now_s: self.now_s, boot_number: self.boot_number };
+        let context = Context { now_s: self.now_s, identity: self.identity };
         let mut snapshot = None;
         for message in self.stations.due(self.now_s) {
             for lane in &mut self.lanes {
@@ -482,7 +476,7 @@ impl VehicleEndpoint {
         of: u32,
         vehicle: &dyn Vehicle,
     ) -> (MavResult, Option<String>) {
-        let boot_number = self.boot_number;
+        let identity = self.identity;
         let lane = self.lane(link);
         let messages: Vec<MavMessage> = match message_id {
             // 0 asks for all modes, k for the k-th.
@@ -496,7 +490,7 @@ impl VehicleEndpoint {
                 .map(|(_, message)| message)
                 .collect(),
             MESSAGE_INTERVAL_DATA::ID => vec![lane.streams.interval_of(of)],
-            _ => telemetry::message(message_id, &vehicle.snapshot(), boot_number).into_iter().collect(),
+            _ => telemetry::message(message_id, &vehicle.snapshot(), identity).into_iter().collect(),
         };
         if messages.is_empty() {
             // One that this vehicle sends has no content now.

@@ -35,24 +35,25 @@ use protocol::mission::MissionHash;
 pub(crate) use self::ours::pad_check;
 pub use self::ours::td_phase;
 use crate::snapshot::Snapshot;
+use crate::vehicle::{Identity, VehicleKind};
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
 
 /// The message of this id in the current state, or `None` if the vehicle has no such message or no data for it.
-pub fn message(message_id: u32, snapshot: &Snapshot, boot_number: u32) -> Option<MavMessage> {
+pub fn message(message_id: u32, snapshot: &Snapshot, identity: Identity) -> Option<MavMessage> {
     match message_id {
-        HEARTBEAT_DATA::ID => Some(heartbeat(snapshot)),
+        HEARTBEAT_DATA::ID => Some(heartbeat(snapshot, identity.kind)),
         SYS_STATUS_DATA::ID => Some(sys_status(snapshot)),
         EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(snapshot)),
         ATTITUDE_QUATERNION_DATA::ID => Some(attitude(snapshot)),
         LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
         VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
         CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
-        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(boot_number)),
+        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(identity.boot_number)),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
         ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
-        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, boot_number)),
+        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, identity)),
         TD_FINS_DATA::ID => Some(ours::fins(snapshot)),
         TD_GIMBAL_DATA::ID => Some(ours::gimbal(snapshot)),
         TD_CONTROLLER_DATA::ID => ours::controller(snapshot),
@@ -92,11 +93,10 @@ pub fn available_modes() -> impl Iterator<Item = MavMessage> {
     })
 }
 
-fn heartbeat(snapshot: &Snapshot) -> MavMessage {
-    // The vehicle marks itself as simulated from its boot on, so that every ground station can show it.
-    let mut base_mode = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED
-        | MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED;
+fn heartbeat(snapshot: &Snapshot, kind: VehicleKind) -> MavMessage {
+    let mut base_mode =
+        MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED;
+    base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, kind == VehicleKind::Simulated);
     base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, snapshot.interlocks.armed);
     let system_status = match snapshot.phase {
         _ if snapshot.interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,

@@ -18,8 +18,9 @@ use protocol::dialect::{
 
 use super::{boot_ms, centidegrees, centimetres, characters};
 use crate::snapshot::{PATH_POINTS, Snapshot};
+use crate::vehicle::{Identity, VehicleKind};
 
-pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage {
+pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessage {
     let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
     let locks = snapshot.interlocks;
     let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
@@ -41,8 +42,11 @@ pub(super) fn flight_status(snapshot: &Snapshot, boot_number: u32) -> MavMessage
         phase: td_phase(snapshot.phase),
         abort_effect,
         abort_impact_m_s,
-        boot_number,
-        vehicle_flags: TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
+        boot_number: identity.boot_number,
+        vehicle_flags: match identity.kind {
+            VehicleKind::Simulated => TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
+            VehicleKind::Real => TdVehicleFlag::empty(),
+        },
         latch: td_latch(snapshot.latch),
         last_hold_ms: snapshot.last_hold_s.map_or(0, |s| libm::round(1000.0 * s) as u16),
     })

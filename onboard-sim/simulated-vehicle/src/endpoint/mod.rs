@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use flight::computer::crew::{Answer, Request};
 pub use vehicle_link::endpoint::{Heard, Outgoing, Path, VehicleEndpoint, gives_out_its_log};
+pub use vehicle_link::vehicle::VehicleKind;
 
 use crate::vehicle::{Frame, Vehicle, VehicleEvent};
 

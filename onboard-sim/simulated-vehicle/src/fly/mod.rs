@@ -31,7 +31,7 @@ pub use self::load::load_flight;
 pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
 use self::recording::{Offer, log_state, nanoseconds, note, record};
-use crate::endpoint::{self, VehicleEndpoint};
+use crate::endpoint::{self, VehicleEndpoint, VehicleKind};
 use crate::solve_times::SolveTimes;
 use crate::vehicle::{Judged, RocketFlight, Vehicle, VehicleEvent};
 
@@ -201,9 +201,9 @@ pub async fn fly(options: FlyOptions, stop: watch::Receiver<bool>) -> Result<Fli
 /// The vehicle's endpoint, set up from the options.
 fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
     let endpoint = match (&options.crew, &options.key_file) {
-        (Some(_), _) => VehicleEndpoint::sending_to_crew(),
-        (None, Some(_)) => VehicleEndpoint::sending_signed(),
-        (None, None) => VehicleEndpoint::new(),
+        (Some(_), _) => VehicleEndpoint::sending_to_crew(VehicleKind::Simulated),
+        (None, Some(_)) => VehicleEndpoint::sending_signed(VehicleKind::Simulated),
+        (None, None) => VehicleEndpoint::new(VehicleKind::Simulated),
     };
     let capacities_bytes_s: Vec<u32> =
         options.links.iter().map(|link| options.on_the_wire.capacity_bytes_s(link)).collect();

@@ -43,7 +43,8 @@ impl Sent {
 
 impl Wire {
     fn signed() -> Self {
-        let mut wire = Self { endpoint: VehicleEndpoint::sending_signed(), ..Self::new() };
+        let mut wire =
+            Self { endpoint: VehicleEndpoint::sending_signed(VehicleKind::Simulated), ..Self::new() };
         wire.run(2.0);
         wire
     }
@@ -185,8 +186,15 @@ fn a_whole_flight_stays_within_the_radio_s_budget_in_every_second() {
 }
 
 #[test]
-fn every_heartbeat_and_flight_status_says_from_the_boot_on_that_it_is_simulated_and_which_boot_it_is() {
-    let mut wire = Wire { endpoint: VehicleEndpoint::new().booted(0xB007_0001), ..Wire::new() };
+fn every_heartbeat_and_flight_status_says_from_the_boot_on_what_the_vehicle_is_and_which_boot_it_is() {
+    for kind in [VehicleKind::Simulated, VehicleKind::Real] {
+        says_what_it_is_and_which_boot_it_is(kind);
+    }
+}
+
+fn says_what_it_is_and_which_boot_it_is(kind: VehicleKind) {
+    let marked = kind == VehicleKind::Simulated;
+    let mut wire = Wire { endpoint: VehicleEndpoint::new(kind).booted(0xB007_0001), ..Wire::new() };
     let first = wire.run(0.001);
     assert!(
         count(&first, HEARTBEAT_DATA::ID) == 1 && count(&first, TD_FLIGHT_STATUS_DATA::ID) == 1,
@@ -199,12 +207,13 @@ fn every_heartbeat_and_flight_status_says_from_the_boot_on_that_it_is_simulated_
         match frame.decode() {
             Ok(MavMessage::HEARTBEAT(beat)) => {
                 beats += 1;
-                assert!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED));
+                assert_eq!(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED), marked);
             }
             Ok(MavMessage::TD_FLIGHT_STATUS(status)) => {
                 statuses += 1;
                 assert_eq!(status.boot_number, 0xB007_0001);
-                assert_eq!(status.vehicle_flags, protocol::dialect::TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
+                let flag = protocol::dialect::TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED;
+                assert_eq!(status.vehicle_flags.contains(flag), marked);
             }
             _ => {}
         }
@@ -216,7 +225,10 @@ fn every_heartbeat_and_flight_status_says_from_the_boot_on_that_it_is_simulated_
 
 /// A slow link, number 0, and a fast one, number 1.
 fn two_links() -> Wire {
-    Wire { endpoint: VehicleEndpoint::new().over_links(&[2_000, 20_000]), ..Wire::new() }
+    Wire {
+        endpoint: VehicleEndpoint::new(VehicleKind::Simulated).over_links(&[2_000, 20_000]),
+        ..Wire::new()
+    }
 }
 
 impl Wire {

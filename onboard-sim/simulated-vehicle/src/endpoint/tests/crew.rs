@@ -81,7 +81,7 @@ impl Launch {
         };
         let mut launch = Self {
             vehicle: rocket().with_crew(people, operators),
-            endpoint: VehicleEndpoint::sending_to_crew(),
+            endpoint: VehicleEndpoint::sending_to_crew(VehicleKind::Simulated),
             hub: Hub::new(1, Some(signing)),
             stations: (0..6).map(station).collect(),
             speaking: vec![RANGE, FLIGHT, PAD],
@@ -377,7 +377,8 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
     let frames_to_latch = |people: Option<People>| {
         let mut launch = Launch::two();
         if people.is_none() {
-            (launch.vehicle, launch.endpoint) = (rocket(), VehicleEndpoint::sending_signed());
+            (launch.vehicle, launch.endpoint) =
+                (rocket(), VehicleEndpoint::sending_signed(VehicleKind::Simulated));
             launch.hub = Hub::new(1, Some(Signing::new(key(1), Memory::default())));
             launch.run(4.0);
         }

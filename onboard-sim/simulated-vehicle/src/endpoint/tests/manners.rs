@@ -9,7 +9,11 @@ use protocol::dialect::{
 use protocol::identity::NETWORK_BUDGET_BYTES_S;
 use protocol::mission::MissionHash;
 
+use vehicle_link::vehicle::Identity;
+
 use super::*;
+
+const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0 };
 
 impl Wire {
     /// The answer to a question with these bytes.
@@ -142,10 +146,10 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     let mut snapshot = wire.vehicle.snapshot();
     let half_rad = 0.5 * 120f64.to_radians();
     snapshot.motion.ned_from_body = [libm::cos(half_rad), 0.0, 0.0, libm::sin(half_rad)];
-    let turned = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
+    let turned = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, SIMULATED);
     assert!(matches!(&turned, Some(MavMessage::VFR_HUD(hud)) if hud.heading == 120), "{turned:?}");
     (snapshot.pad_altitude_m, snapshot.motion.position_m[2]) = (510.0, -40.0);
-    let high = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, 0);
+    let high = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, SIMULATED);
     let above_sea =
         matches!(&high, Some(MavMessage::VFR_HUD(hud)) if hud.alt.to_bits() == 550.0f32.to_bits());
     assert!(above_sea, "above mean sea level: {high:?}");
@@ -228,7 +232,7 @@ fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
 #[test]
 fn the_version_announces_files_and_has_an_id_and_a_hash() {
     let mut wire = Wire::new();
-    wire.endpoint = VehicleEndpoint::new().booted(77);
+    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(77);
     assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
     let sent = wire.run(1.0);
     let version = find(&sent, |message| match message {
@@ -237,7 +241,11 @@ fn the_version_announces_files_and_has_an_id_and_a_hash() {
     });
     // It may have come with the answer.
     let snapshot = wire.vehicle.snapshot();
-    let now = vehicle_link::telemetry::message(AUTOPILOT_VERSION_DATA::ID, &snapshot, 77);
+    let now = vehicle_link::telemetry::message(
+        AUTOPILOT_VERSION_DATA::ID,
+        &snapshot,
+        Identity { boot_number: 77, ..SIMULATED },
+    );
     let Some(MavMessage::AUTOPILOT_VERSION(now)) = now else { panic!("it always has content") };
     assert!(version.is_none_or(|version| version == now));
     assert!(now.capabilities.contains(MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP));
@@ -286,8 +294,10 @@ const OF_EVERY_VEHICLE: [u32; 7] = [
 
 #[test]
 fn over_a_network_a_standard_station_sees_attitude_position_battery_and_mode_every_second() {
-    let mut wire =
-        Wire { endpoint: VehicleEndpoint::new().over_links(&[NETWORK_BUDGET_BYTES_S]), ..Wire::new() };
+    let mut wire = Wire {
+        endpoint: VehicleEndpoint::new(VehicleKind::Simulated).over_links(&[NETWORK_BUDGET_BYTES_S]),
+        ..Wire::new()
+    };
     let sent = wire.run(10.0);
     for message_id in OF_EVERY_VEHICLE {
         let found = count(&sent, message_id);
@@ -300,9 +310,10 @@ fn over_a_network_a_standard_station_sees_attitude_position_battery_and_mode_eve
 
 #[test]
 fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_give_way() {
-    for (endpoint, signature_len) in
-        [(VehicleEndpoint::new(), 0), (VehicleEndpoint::sending_signed(), SIGNATURE_LEN)]
-    {
+    for (endpoint, signature_len) in [
+        (VehicleEndpoint::new(VehicleKind::Simulated), 0),
+        (VehicleEndpoint::sending_signed(VehicleKind::Simulated), SIGNATURE_LEN),
+    ] {
         let mut wire = Wire { endpoint, ..Wire::new() };
         let before = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
         for message_id in OF_EVERY_VEHICLE {

@@ -87,7 +87,7 @@ impl Range {
     }
 
     fn without_operators(programs: Vec<Program>) -> Self {
-        Self::of(rocket(), VehicleEndpoint::new(), programs)
+        Self::of(rocket(), VehicleEndpoint::new(VehicleKind::Simulated), programs)
     }
 
     fn frame(&mut self) {
@@ -352,7 +352,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
     let two = People::Two { first_ask: FIRST_ASK };
     let fresh = || {
         let vehicle = rocket().with_crew(two, operators());
-        let mut range = Range::of(vehicle, VehicleEndpoint::sending_to_crew(), crowd());
+        let mut range = Range::of(vehicle, VehicleEndpoint::sending_to_crew(VehicleKind::Simulated), crowd());
         for program in [6, 7] {
             range.programs[program].speaks = false;
         }

@@ -21,7 +21,7 @@ use protocol::identity::{Address, GROUND, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::text::Reassembler;
 use vehicle_link::streams::{STANDARD, Streams};
 
-use super::{Outgoing, VehicleEndpoint, step};
+use super::{Outgoing, VehicleEndpoint, VehicleKind, step};
 use crate::fly::load_flight;
 use crate::vehicle::{Vehicle, VehicleEvent};
 use sim::dispersion::Dispersion;
@@ -76,7 +76,7 @@ impl Wire {
     fn new() -> Self {
         let mut wire = Self {
             vehicle: rocket(),
-            endpoint: VehicleEndpoint::new(),
+            endpoint: VehicleEndpoint::new(VehicleKind::Simulated),
             ground: Encoder::new(GROUND),
             beats: false,
         };
@@ -167,7 +167,7 @@ fn the_standard_rates_fit_the_radio_and_are_kept() {
 fn signatures_fit_the_radio_too() {
     let streams = Streams::signed();
     assert!(streams.fit(), "{} B/s", streams.bytes_s());
-    let mut wire = Wire { endpoint: VehicleEndpoint::sending_signed(), ..Wire::new() };
+    let mut wire = Wire { endpoint: VehicleEndpoint::sending_signed(VehicleKind::Simulated), ..Wire::new() };
     wire.run(1.0);
     let sent = wire.run(10.0);
     for (message_id, expected) in

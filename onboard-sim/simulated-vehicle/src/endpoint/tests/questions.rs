@@ -300,8 +300,8 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
     // Of a radio's budget, six pieces fit into any second, and a seventh does not.
     for (capacity_bytes_s, signature_len, least) in [(2000, 0, 0.75), (5760, 0, 0.8), (5760, 13, 0.8)] {
         let endpoint = match signature_len {
-            0 => VehicleEndpoint::new(),
-            _ => VehicleEndpoint::sending_signed(),
+            0 => VehicleEndpoint::new(VehicleKind::Simulated),
+            _ => VehicleEndpoint::sending_signed(VehicleKind::Simulated),
         };
         let mut wire = Wire { endpoint: endpoint.over_links(&[capacity_bytes_s]), ..Wire::new() };
         wire.endpoint.offer(Box::new(log(200_000)));
@@ -371,7 +371,10 @@ fn a_client_that_looks_for_parameters_in_files_is_answered_at_once_also_in_fligh
 
 #[test]
 fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
-    let mut wire = Wire { endpoint: VehicleEndpoint::new().over_links(&[2000, 2000]), ..Wire::new() };
+    let mut wire = Wire {
+        endpoint: VehicleEndpoint::new(VehicleKind::Simulated).over_links(&[2000, 2000]),
+        ..Wire::new()
+    };
     wire.endpoint.offer(Box::new(log(50_000)));
     wire.run(1.0);
     wire.ask_file(&Packet::request(1, 0, Opcode::OpenFileRo, 0, "/log/flight.mcap"));

@@ -35,7 +35,7 @@ impl Airborne {
         rocket.set_pin_out(true);
         let mut airborne = Self {
             rocket,
-            endpoint: VehicleEndpoint::new(),
+            endpoint: VehicleEndpoint::new(VehicleKind::Simulated),
             uplink: Vec::new(),
             heard: Delayed::default(),
             sent: Delayed::default(),

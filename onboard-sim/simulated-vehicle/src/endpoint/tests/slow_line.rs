@@ -66,7 +66,11 @@ struct Line {
 
 impl Line {
     fn at(baud: u32, signed: bool) -> Self {
-        let endpoint = if signed { VehicleEndpoint::sending_signed() } else { VehicleEndpoint::new() };
+        let endpoint = if signed {
+            VehicleEndpoint::sending_signed(VehicleKind::Simulated)
+        } else {
+            VehicleEndpoint::new(VehicleKind::Simulated)
+        };
         let budget = ((SHARE * f64::from(baud) / 10.0) as u32).min(RADIO_BUDGET_BYTES_S);
         let hub = || {
             let signing = signed.then(|| Signing::new(Key::new([7; Key::LEN]), Memory::default()));

@@ -55,7 +55,7 @@ impl Pad {
     }
 
     fn rocket() -> Self {
-        Self::of(rocket(), VehicleEndpoint::new())
+        Self::of(rocket(), VehicleEndpoint::new(VehicleKind::Simulated))
     }
 
     /// Below a drone.
@@ -66,7 +66,7 @@ impl Pad {
     fn flying(mission: &str) -> Self {
         let mut flight = load_flight(mission).unwrap();
         flight.recipe.dispersion = Dispersion::builtin("none").unwrap();
-        Self::of(Vehicle::on_the_pad(&flight).unwrap(), VehicleEndpoint::new())
+        Self::of(Vehicle::on_the_pad(&flight).unwrap(), VehicleEndpoint::new(VehicleKind::Simulated))
     }
 
     /// One frame as in the run loop.
@@ -328,7 +328,7 @@ fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
 #[test]
 fn a_vehicle_that_starts_by_itself_needs_no_station() {
     let mut pad = Pad::rocket();
-    pad.endpoint = VehicleEndpoint::new().starting_by_itself();
+    pad.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).starting_by_itself();
     pad.speaking.clear();
     frame(&mut pad.vehicle, &mut pad.endpoint, &[Asked::Arm, Asked::Start]);
     pad.run(pad.vehicle.computer().countdown_s() + 0.5);
@@ -338,7 +338,7 @@ fn a_vehicle_that_starts_by_itself_needs_no_station() {
 #[test]
 fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
     let vehicle = rocket();
-    let mut endpoint = VehicleEndpoint::new();
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated);
     let mut stranger = Encoder::new(SPARE);
     let beat = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     let first = frames(endpoint.poll(&vehicle));
