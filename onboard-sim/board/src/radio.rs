@@ -7,6 +7,7 @@ use flight::computer::news::News;
 use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::rules::operator::Operator;
+use flight::rules::outputs::Line;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StateWeights;
 use flight_log::frame::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
@@ -102,7 +103,7 @@ impl Crewed {
         if let Sensed::Measured(measured) = &input.sensed {
             self.vehicle.sensors.take(measured, input.frame);
         }
-        self.vehicle.parachute_ejected |= output.commands.parachute;
+        self.vehicle.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
         let flown = Flown { vehicle: &self.vehicle, computer, input };
         self.endpoint.on_answers(&output.answers, &flown);
         for news in &output.news {

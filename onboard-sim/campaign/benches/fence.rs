@@ -6,6 +6,7 @@
 #![expect(clippy::print_stdout, reason = "the hashes are its output")]
 
 use campaign::run::in_parallel;
+use flight::rules::outputs::Line;
 use flight::vehicle::mission::StartPoint;
 use sha2::{Digest as _, Sha256};
 use sim::recipe::Recipe;
@@ -62,10 +63,8 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
             for angle_rad in commands.gimbal_rad.iter().chain(&commands.fins_rad) {
                 hash.update(angle_rad.to_le_bytes());
             }
-            let booster = commands.booster;
-            hash.update(
-                [commands.ignite, commands.parachute, booster.ignite, booster.separate].map(u8::from),
-            );
+            let lines = [Line::LandingIgniter, Line::Parachute, Line::AscentIgniter, Line::Separation];
+            hash.update(lines.map(|line| u8::from(commands.outputs.is_on(line))));
         }
         if !flight.goes_on() {
             break;

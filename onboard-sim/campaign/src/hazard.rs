@@ -136,7 +136,7 @@ impl Way {
     /// The abort of a flight at this moment would end it so.
     fn aborts(self, phase: Phase, effect: AbortEffect) -> bool {
         match self {
-            Self::AbortInAscent => matches!(phase, Phase::Boost | Phase::Coast),
+            Self::AbortInAscent => effect == AbortEffect::ChuteAtApogee,
             Self::ParachuteFromApogee => phase == Phase::Deploy,
             Self::AbortInDescent => effect == AbortEffect::ChuteNow,
             Self::AbortTooLow => {

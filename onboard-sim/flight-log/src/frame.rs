@@ -3,11 +3,12 @@
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, People, Request};
-use flight::computer::pilot::{BoosterCommands, Sensed};
+use flight::computer::pilot::Sensed;
 use flight::computer::{Commander, Commands, Computer, Input, LogState, Output, Rehearsed};
 use flight::guidance::powered::ControlLevel;
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
+use flight::rules::outputs::{Line, Outputs};
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use log_records::computer_v1 as v1;
@@ -183,20 +184,20 @@ fn ending_to_log(ending: Ending) -> u32 {
 /// A frame's output as a record; `computer` has just flown it.
 pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
     let Output { commands, released, answers, news: _, planned } = output;
-    let &Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = commands;
+    let &Commands { gimbal_rad, fins_rad, outputs } = commands;
     v1::ComputerOutput {
         gimbal_rad: gimbal_rad.to_vec(),
         fins_rad: fins_rad.to_vec(),
-        ignite,
-        parachute,
+        ignite: outputs.is_on(Line::LandingIgniter),
+        parachute: outputs.is_on(Line::Parachute),
         released: *released,
         planned: *planned,
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
         answers: answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
-        ignite_booster: booster.ignite.then_some(true),
-        separate_booster: booster.separate.then_some(true),
+        ignite_booster: outputs.is_on(Line::AscentIgniter).then_some(true),
+        separate_booster: outputs.is_on(Line::Separation).then_some(true),
     }
 }
 
@@ -208,12 +209,12 @@ pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Comm
     Ok(Commands {
         gimbal_rad: list(&output.gimbal_rad, frame, "gimbal angles")?,
         fins_rad: list(&output.fins_rad, frame, "fin angles")?,
-        ignite: output.ignite,
-        parachute: output.parachute,
-        booster: BoosterCommands {
-            ignite: output.ignite_booster.unwrap_or(false),
-            separate: output.separate_booster.unwrap_or(false),
-        },
+        outputs: Outputs::of(|line| match line {
+            Line::LandingIgniter => output.ignite,
+            Line::Parachute => output.parachute,
+            Line::AscentIgniter => output.ignite_booster.unwrap_or(false),
+            Line::Separation => output.separate_booster.unwrap_or(false),
+        }),
     })
 }
 

@@ -88,12 +88,14 @@ pub mod rules {
     //!
     //! * [`phase`] has the flight phases and the one table that moves between them.
     //! * [`arming`] has the checks before arming, [`gate`] the checks before ignition.
+    //! * [`outputs`] says which igniter, charge or parachute has current.
     //! * [`operator`] has the people who may command; [`two_person`] lets two of them arm and start together.
     //! * [`verdict`] has the touchdown limits, and whether a landing kept them.
 
     pub mod arming;
     pub mod gate;
     pub mod operator;
+    pub mod outputs;
     pub mod phase;
     pub mod two_person;
     pub mod verdict;

@@ -262,7 +262,8 @@ impl Sortie {
 
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
-        let stays = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
+        let on_pad = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
+        let stays = on_pad && !self.world().ascent_motor_lights();
         self.surroundings.go_on() && !stays
     }
 

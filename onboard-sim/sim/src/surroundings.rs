@@ -4,6 +4,7 @@
 use flight::computer::pilot::Sensed;
 use flight::computer::{Commands, FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
+use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
@@ -95,9 +96,15 @@ impl Surroundings {
 
     /// Commands for the next frame.
     pub(crate) fn command(&mut self, commands: &Commands) {
-        let Commands { gimbal_rad, fins_rad, ignite, parachute, booster } = *commands;
-        let (ignite_booster, separate) = (booster.ignite, booster.separate);
-        self.actuators = Actuators { gimbal_rad, fins_rad, ignite, parachute, ignite_booster, separate };
+        let Commands { gimbal_rad, fins_rad, outputs } = *commands;
+        self.actuators = Actuators {
+            gimbal_rad,
+            fins_rad,
+            ignite: outputs.is_on(Line::LandingIgniter),
+            parachute: outputs.is_on(Line::Parachute),
+            ignite_booster: outputs.is_on(Line::AscentIgniter),
+            separate: outputs.is_on(Line::Separation),
+        };
         self.finite &= self.world.state().is_finite()
             && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());
     }

@@ -75,11 +75,14 @@ impl TrueBurn {
 #[derive(Debug, Clone)]
 pub(crate) struct Motor {
     burn: TrueBurn,
+    /// How long current must flow through the igniter, s.
     ignition_delay_s: f64,
+    /// How long the thrust hangs behind a fired igniter, s.
+    hang_fire_s: f64,
     chuff_s: [f64; 2],
     thrust_rise_s: f64,
-    /// Time of the ignition command, s.
-    commanded_s: Option<f64>,
+    /// Since when current flows through the igniter, s; once it has fired, since when it did.
+    current_since_s: Option<f64>,
     no_light: bool,
     out_after_s: f64,
 }
@@ -89,9 +92,10 @@ impl Motor {
         Self {
             burn: TrueBurn::new(curve, truth),
             ignition_delay_s: truth.ignition_delay_s,
+            hang_fire_s: 0.0,
             chuff_s: truth.chuff_s,
             thrust_rise_s: truth.thrust_rise_s,
-            commanded_s: None,
+            current_since_s: None,
             no_light: false,
             out_after_s: f64::INFINITY,
         }
@@ -107,29 +111,32 @@ impl Motor {
         } else {
             new_scale * (own_scale / before.impulse_scale)
         };
-        let ignition_delay_s = if after.ignition_delay_s.to_bits() == before.ignition_delay_s.to_bits() {
-            self.ignition_delay_s
-        } else {
-            after.ignition_delay_s + (self.ignition_delay_s - before.ignition_delay_s)
-        };
         let burn = TrueBurn { impulse_scale, ..after.burn.clone() };
         Self {
             burn,
-            ignition_delay_s,
+            ignition_delay_s: after.ignition_delay_s,
             chuff_s: after.chuff_s,
             thrust_rise_s: after.thrust_rise_s,
             ..self.clone()
         }
     }
 
-    /// Fires the igniter; only the first command counts.
-    pub(crate) fn ignite(&mut self, time_s: f64) {
-        self.commanded_s.get_or_insert(time_s);
+    /// Whether current flows through the igniter from this time on, s. It fires when the current has flowed for its delay
+    /// without a break, and then nothing stops it.
+    pub(crate) fn current(&mut self, flows: bool, time_s: f64) {
+        let fired = self.current_since_s.is_some_and(|since_s| time_s >= since_s + self.ignition_delay_s);
+        if flows {
+            self.current_since_s.get_or_insert(time_s);
+        } else if !fired {
+            self.current_since_s = None;
+        }
     }
 
-    /// When the thrust begins, s; `None` before the command, and for a motor that does not light.
+    /// When the thrust begins, s, if the current stays on until the igniter has fired; `None` without current, and for a
+    /// motor that does not light.
     pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
-        self.commanded_s.filter(|_| !self.no_light).map(|commanded_s| commanded_s + self.ignition_delay_s)
+        let delay_s = self.ignition_delay_s + self.hang_fire_s;
+        self.current_since_s.filter(|_| !self.no_light).map(|since_s| since_s + delay_s)
     }
 
     /// Time since the thrust began, s; negative before that.
@@ -178,7 +185,7 @@ impl Motor {
     pub(crate) fn break_down(&mut self, fault: &Fault) {
         match *fault {
             Fault::NoLight => self.no_light = true,
-            Fault::LateLight { delay_s } => self.ignition_delay_s += delay_s.max(0.0),
+            Fault::LateLight { delay_s } => self.hang_fire_s += delay_s.max(0.0),
             Fault::WeakMotor { scale } => self.burn.impulse_scale *= scale.clamp(0.01, 1.0),
             Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
             Fault::AscentNoLight
@@ -205,7 +212,7 @@ mod tests {
 
     fn motor(truth: &Truth) -> Motor {
         let mut motor = Motor::new(&curve(), truth);
-        motor.ignite(10.0);
+        motor.current(true, 10.0);
         motor
     }
 
@@ -264,10 +271,24 @@ mod tests {
     }
 
     #[test]
-    fn only_the_first_command_counts() {
-        let mut motor = motor(&Truth::default());
-        motor.ignite(11.0);
-        assert_eq!(motor.thrust_begins_s(), Some(10.15));
+    fn what_is_switched_off_before_it_has_lit_does_not_light() {
+        let mut lit = motor(&Truth::default());
+        lit.current(true, 11.0);
+        assert_eq!(lit.thrust_begins_s(), Some(10.15));
+        lit.current(false, 10.151);
+        assert_eq!(lit.thrust_begins_s(), Some(10.15), "nothing stops it any more");
+
+        let mut off = motor(&Truth::default());
+        off.current(false, 10.149);
+        assert!(off.thrust_begins_s().is_none() && off.thrust_n(12.0).abs() < 1e-15);
+        off.current(true, 20.0);
+        assert_eq!(off.thrust_begins_s(), Some(20.15), "the delay begins anew");
+
+        // A motor that hangs fire lights late, with or without current.
+        let mut hangs = motor(&Truth::default());
+        hangs.break_down(&Fault::LateLight { delay_s: 1.0 });
+        hangs.current(false, 10.5);
+        assert_eq!(hangs.thrust_begins_s(), Some(11.15));
     }
 
     #[test]

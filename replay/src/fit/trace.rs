@@ -6,6 +6,7 @@ use std::path::Path;
 use flight::computer::Commands;
 use flight::computer::pilot::{PilotInput, Sensed};
 use flight::estimation::estimator::{Estimate, Measurements};
+use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight_log::estimate::estimate_from_log;
@@ -118,8 +119,8 @@ impl Trace {
             fins_rad: input.fins_rad,
             gimbal_reported_rad,
             gimbal_rad: commands.gimbal_rad,
-            ignite: commands.ignite,
-            parachute: commands.parachute,
+            ignite: commands.outputs.is_on(Line::LandingIgniter),
+            parachute: commands.outputs.is_on(Line::Parachute),
             contact: input.contact,
             booster_attached: input.booster_attached,
             phase,

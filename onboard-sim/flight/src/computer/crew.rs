@@ -134,16 +134,17 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
 }
 
 /// The event for a request; `None` for one that is no matter of the phase table. A countdown is of this length, before a
-/// flight that starts there, and `abort` is the event that an abort would be now.
+/// flight that starts there, and `abort` is the event that an abort would be now; `lifted_off`: the vehicle has left its rail.
 pub(super) fn event_of(
     asked: Asked,
     checks: &[Check],
     (countdown_s, start): (f64, StartPoint),
     abort: Event,
+    lifted_off: bool,
 ) -> Option<Event> {
     Some(match asked {
         Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
-        Asked::Disarm => Event::DisarmRequested,
+        Asked::Disarm => Event::DisarmRequested { lifted_off },
         Asked::Start => Event::StartRequested { countdown_s },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
@@ -225,7 +226,9 @@ impl Computer {
         }
         let checks = self.arming_checks_by(uplink);
         let start = self.start_point();
-        let Some(event) = event_of(asked, &checks, (self.countdown_s, start), self.abort_event()) else {
+        let lifted_off = self.pilot.has_lifted_off();
+        let abort = self.abort_event();
+        let Some(event) = event_of(asked, &checks, (self.countdown_s, start), abort, lifted_off) else {
             return match asked {
                 Asked::Tap => self.tap(by),
                 Asked::TakeCommand => self.take_command(request),

@@ -34,7 +34,7 @@ use self::memory::remembers;
 use self::news::{MotorWatch, News, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
-use self::pilot::{BoosterCommands, Pilot, PilotInput, PilotOutput, Sensed};
+use self::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::estimation::estimator::Estimate;
@@ -42,6 +42,7 @@ use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
+use crate::rules::outputs::{Outputs, Seen};
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
 use crate::rules::two_person::Station;
 use crate::vehicle::mission::ArmingLimits;
@@ -102,7 +103,7 @@ pub struct Computer {
 
 impl Computer {
     /// One frame: note the input, estimate, answer the crew, watch over the countdown, fly or wait on the pad, keep the
-    /// time, report.
+    /// time, switch what lights, parts and ejects, report.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         self.frame = input.frame;
         self.table.begin(input.time_s);
@@ -124,10 +125,14 @@ impl Computer {
             self.wait_on_the_pad(input);
             false
         };
-        let mode = self.table.mode();
-        self.commands.ignite = mode.phase == Phase::Ignition && !mode.interlocks.landing_motor_inhibited;
-        self.commands.parachute = mode.phase == Phase::Chute;
         self.keep_time();
+        // Last, and nowhere else: whatever this frame has decided, an output follows from the mode that it ends in.
+        let seen = Seen {
+            flying: in_flight.is_some(),
+            lifted_off: self.pilot.has_lifted_off(),
+            separation_due: self.pilot.separates(),
+        };
+        self.commands.outputs = Outputs::decided(self.table.mode(), seen);
         Output {
             commands: self.commands,
             released: in_flight.is_none() && self.release.is_some(),
@@ -172,15 +177,14 @@ impl Computer {
 
     /// The rest of a frame in the air, or on the ground after the flight. Returns whether it planned.
     fn fly(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
-        let PilotOutput { gimbal_rad, fins_rad, level, booster } =
-            self.pilot.fly(&mut self.table, input, estimate);
+        let PilotOutput { gimbal_rad, fins_rad, level } = self.pilot.fly(&mut self.table, input, estimate);
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
             self.table.say_gate_shut(check);
         }
         self.gate_told = refusal;
-        self.commands = Commands { gimbal_rad, fins_rad, booster, ..self.commands };
+        self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
         if phase.in_landing_burn() && level != self.level {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
         }
@@ -199,7 +203,7 @@ impl Computer {
         }
         if mode.phase == Phase::Touchdown && self.is_over() {
             if mode.interlocks.armed {
-                let _ = self.table.happen(Event::DisarmRequested);
+                let _ = self.table.happen(Event::DisarmRequested { lifted_off: true });
             }
             if mode.may_be_safed(time_s).is_ok() {
                 let _ = self.table.happen(Event::SafingDone);
@@ -248,7 +252,11 @@ impl Computer {
         match mode.phase {
             Phase::Touchdown => in_phase_s >= AT_REST_S && mode.motor != Motor::Burning,
             Phase::Safed => true,
-            phase => phase.on_pad() && mode.interlocks.abort_latched,
+            // A motor whose igniter had current may still light.
+            phase => {
+                let stays = self.release.is_none() || in_phase_s >= AT_REST_S;
+                phase.on_pad() && mode.interlocks.abort_latched && stays
+            }
         }
     }
 
@@ -373,14 +381,11 @@ pub struct Commands {
     pub gimbal_rad: [f64; 2],
     /// Opening angles of the fins, rad.
     pub fins_rad: [f64; 4],
-    /// Current through the landing motor's igniter.
-    pub ignite: bool,
-    /// The parachute is ejected.
-    pub parachute: bool,
-    pub booster: BoosterCommands,
+    /// What lights, parts and ejects.
+    pub outputs: Outputs,
 }
 
-remembers!(Commands { gimbal_rad, fins_rad, ignite, parachute, booster });
+remembers!(Commands { gimbal_rad, fins_rad, outputs });
 
 /// The output of one frame.
 #[derive(Debug, Clone, PartialEq)]

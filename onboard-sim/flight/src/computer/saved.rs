@@ -18,13 +18,14 @@ use super::memory::checksum;
 use super::news::{MotorWatch, Readiness};
 use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
-use super::pilot::{BoosterCommands, Pilot, SavedPilot};
+use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
 use super::{Commands, Computer, CrewMemory, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::arming::Uplink;
+use crate::rules::outputs::Outputs;
 use crate::rules::phase::{Event, Interlocks, Latch, Mode};
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
@@ -202,9 +203,7 @@ impl Computer {
             commands: Commands {
                 gimbal_rad: [0.0; 2],
                 fins_rad: [mission.airframe.fins.closed_rad(); 4],
-                ignite: false,
-                parachute: false,
-                booster: BoosterCommands::default(),
+                outputs: Outputs::NONE,
             },
             self_test: SelfTest::NotBegun,
             readiness: Readiness::default(),

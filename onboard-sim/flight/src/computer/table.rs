@@ -130,16 +130,22 @@ impl Computer {
     /// # Errors
     /// The table refuses it, and nothing has changed.
     pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
-        match &self.flown {
+        let before = self.table.mode().phase;
+        let effects = match &self.flown {
             Some(input) => self.pilot.told(&mut self.table, event, input.time_s),
             None => self.table.happen(event),
+        }?;
+        if before == Phase::Boost && self.table.mode().phase.on_pad() {
+            let words = "the ascent motor's igniter is off; it had current: the motor may still light";
+            self.table.say(Severity::Critical, words.into());
         }
+        Ok(effects)
     }
 
     /// The event that an abort would be now, from the findings of the last frame.
     pub(super) fn abort_event(&self) -> Event {
         if self.release.is_none() {
-            return Event::AbortRequested { above_commit_height: false, gate_open: false };
+            return Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
         }
         self.pilot.abort_event(self.table.mode(), self.flown.as_ref())
     }

@@ -3,6 +3,7 @@
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot, touchdown_from_below_m, touchdown_m};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
+use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::airframe::MassModel;
@@ -162,7 +163,7 @@ impl InSpace<'_> {
         }
         let computer = self.known.computer;
         let attached = computer.flown().is_some_and(|flown| flown.booster_attached);
-        let booster = match (attached, computer.commands().booster.separate) {
+        let booster = match (attached, computer.commands().outputs.is_on(Line::Separation)) {
             (true, false) => Booster::Attached,
             (true, true) => Booster::Separating,
             (false, _) => Booster::Separated,

@@ -37,11 +37,11 @@ pub struct Actuators {
     pub gimbal_rad: [f64; 2],
     /// Opening angles of the four fins, rad.
     pub fins_rad: [f64; 4],
-    /// Fires the igniter; only the first time counts.
+    /// Current through the igniter. What is switched off before it has lit does not light.
     pub ignite: bool,
     /// Ejects the parachute; only the first time counts.
     pub parachute: bool,
-    /// Fires the igniter of the ascent motor; only the first time counts.
+    /// Current through the igniter of the ascent motor.
     pub ignite_booster: bool,
     /// Fires the charge that separates the booster; only the first time counts.
     pub separate: bool,
@@ -206,9 +206,7 @@ impl World {
             servo.step(command_rad);
             link.step(servo.load_rad());
         }
-        if actuators.ignite {
-            self.motor.ignite(time_s);
-        }
+        self.motor.current(actuators.ignite, time_s);
         if actuators.parachute {
             self.parachute.eject(time_s);
         }
@@ -379,7 +377,7 @@ impl World {
         self.motor.thrust_n(self.time_s())
     }
 
-    /// When the thrust begins or began, s; `None` before the ignition command and for a motor that does not light.
+    /// When the thrust begins or began, s; `None` without current before it has lit, and for a motor that does not light.
     pub fn thrust_begins_s(&self) -> Option<f64> {
         self.motor.thrust_begins_s()
     }
@@ -432,6 +430,11 @@ impl World {
     /// Thrust of the ascent motor now, N.
     pub fn booster_thrust_n(&self) -> f64 {
         self.stack.as_ref().map_or(0.0, |stack| stack.thrust_n(self.time_s()))
+    }
+
+    /// The ascent motor burns or has burnt, or will light if the current stays on.
+    pub fn ascent_motor_lights(&self) -> bool {
+        self.stack.as_ref().is_some_and(|stack| stack.lights())
     }
 
     /// When the separation charge was fired, s.

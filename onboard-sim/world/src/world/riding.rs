@@ -213,9 +213,7 @@ impl Stack {
     }
 
     pub(crate) fn command(&mut self, ignite: bool, separate: bool, time_s: f64) {
-        if ignite || self.lights_itself {
-            self.motor.ignite(time_s);
-        }
+        self.motor.current(ignite || self.lights_itself, time_s);
         if separate {
             self.charge_fired_s.get_or_insert(time_s);
         }
@@ -234,6 +232,11 @@ impl Stack {
     /// Speed that the charge gives a vehicle of a mass along its axis, m/s, and the rotation rate across it, rad/s.
     pub(crate) fn parting(&self, mass_kg: f64) -> (f64, [f64; 2]) {
         (self.booster.separation_impulse_n_s / mass_kg, self.truth.tip_off_rad_s)
+    }
+
+    /// The motor burns or has burnt, or will light if the current stays on.
+    pub(crate) fn lights(&self) -> bool {
+        self.motor.thrust_begins_s().is_some()
     }
 
     pub(crate) fn thrust_n(&self, time_s: f64) -> f64 {

@@ -119,7 +119,7 @@ impl AscentWatch {
         self.lifted_off
     }
 
-    /// The separation charge gets current.
+    /// Apogee is near, or was: the booster goes.
     pub(super) fn separates(&self) -> bool {
         self.separating_since_s.is_some()
     }
@@ -155,8 +155,10 @@ impl AscentWatch {
         if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
             return Some(Event::LiftOff);
         }
-        // The second opinion counts while a lift-off is expected: in a day on the pad the weather moves by 15 m.
-        if seen.phase == Phase::Boost && self.risen_s >= RISEN_S {
+        // The second opinion counts while a lift-off is expected, also after an abort of the ignition: in a day on the pad
+        // the weather moves by 15 m.
+        let expected = seen.phase == Phase::Boost || seen.time_s < LIFT_OFF_WITHIN_S;
+        if expected && self.risen_s >= RISEN_S {
             self.lifted_off = true;
             return Some(Event::LiftOff);
         }

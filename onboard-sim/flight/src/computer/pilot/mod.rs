@@ -76,26 +76,13 @@ impl PilotInput {
     }
 }
 
-/// The commands to the booster.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct BoosterCommands {
-    /// Current through the ascent motor's igniter.
-    pub ignite: bool,
-    /// Current through the charge that separates the booster.
-    pub separate: bool,
-}
-
-remembers!(BoosterCommands { ignite, separate });
-
-/// Where a frame points the vehicle. What it lights and ejects follows from the phase.
+/// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PilotOutput {
     /// Gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Fin openings, rad.
     pub fins_rad: [f64; 4],
-    /// To the booster.
-    pub booster: BoosterCommands,
     /// What decided where the nose points.
     pub level: ControlLevel,
 }
@@ -190,6 +177,16 @@ impl Pilot {
         let config = &self.known.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
         self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
+    }
+
+    /// The vehicle has left its rail.
+    pub(super) fn has_lifted_off(&self) -> bool {
+        self.ascent.has_lifted_off()
+    }
+
+    /// Apogee is near, or was: the booster goes.
+    pub(super) fn separates(&self) -> bool {
+        self.ascent.separates()
     }
 
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::ascent::{AscentSeen, axial_m_s2, words_of_ascent};
 use super::known::Burning;
 use super::outlook::{commit_height_m, touchdown_m};
-use super::{BoosterCommands, FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
+use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
@@ -117,10 +117,6 @@ impl Pilot {
         PilotOutput {
             gimbal_rad: self.gimbal_rad,
             fins_rad: self.fins_rad,
-            booster: BoosterCommands {
-                ignite: mode.phase == Phase::Boost && !self.ascent.has_lifted_off(),
-                separate: self.ascent.separates(),
-            },
             level: match flying {
                 true if by_baseline.is_some() => ControlLevel::Stabiliser,
                 true => self.powered.report().level,
@@ -339,7 +335,11 @@ impl Pilot {
         let gate_open = found.is_some_and(|(input, estimate)| {
             self.gate_shut_by(&self.gate_input(mode, input, estimate)).is_none()
         });
-        Event::AbortRequested { above_commit_height: self.parachute_has_room(gate_open), gate_open }
+        Event::AbortRequested {
+            lifted_off: self.has_lifted_off(),
+            above_commit_height: self.parachute_has_room(gate_open),
+            gate_open,
+        }
     }
 
     /// Room to spare where the motor is another way down, and just enough where it is not.

@@ -21,7 +21,10 @@ pub enum Event {
         checks_passed: bool,
     },
     /// Radio command: disarm; during a countdown it cancels it.
-    DisarmRequested,
+    DisarmRequested {
+        /// The vehicle has left its rail.
+        lifted_off: bool,
+    },
     /// Radio command: start the countdown.
     StartRequested {
         /// Length of the countdown, s.
@@ -78,6 +81,8 @@ pub enum Event {
     },
     /// Abort by radio.
     AbortRequested {
+        /// The vehicle has left its rail.
+        lifted_off: bool,
         /// The height is still sufficient for the parachute: with a margin if the gate is open, else without.
         above_commit_height: bool,
         /// The ignition gate is open at this moment.
@@ -101,7 +106,7 @@ impl Event {
             Self::PinPulled => "pin pulled",
             Self::PinInserted => "pin inserted",
             Self::ArmRequested { .. } => "arm",
-            Self::DisarmRequested => "disarm",
+            Self::DisarmRequested { .. } => "disarm",
             Self::StartRequested { .. } => "start",
             Self::Hold { .. } => "hold",
             Self::HoldElapsed => "hold elapsed",

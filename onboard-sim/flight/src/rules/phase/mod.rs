@@ -294,7 +294,7 @@ impl Mode {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Latch {
-    /// An abort of the crew.
+    /// An abort of the crew, or a disarm while the ascent motor was being lit.
     Commanded = 1,
     /// The vehicle lifted off although nobody had armed it.
     UncommandedLiftOff = 2,
@@ -318,7 +318,7 @@ impl Latch {
             return None;
         }
         Some(match event {
-            Event::AbortRequested { .. } => Self::Commanded,
+            Event::AbortRequested { .. } | Event::DisarmRequested { .. } => Self::Commanded,
             Event::LiftOff => Self::UncommandedLiftOff,
             Event::ReleasedEarly { .. } => Self::UncommandedRelease,
             Event::Apogee { .. } => Self::NoSeparation,

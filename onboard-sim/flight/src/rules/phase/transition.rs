@@ -90,12 +90,18 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         },
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
-        (P::PadArmed, E::DisarmRequested) => disarmed(mode),
+        (P::PadArmed, E::DisarmRequested { .. }) => disarmed(mode),
         // On the ground nothing is lit any more, but that does not make the motor safe.
-        (P::Touchdown, E::DisarmRequested) => {
+        (P::Touchdown, E::DisarmRequested { .. }) => {
             Row::Go(latch(Interlocks { armed: false, ..locks }), phase, Effects::of(&[Effect::Disarm]))
         }
-        (_, E::DisarmRequested) => wrong("disarm", "only PAD_ARMED and TOUCHDOWN disarm"),
+        // The igniter had current: what an abort does is the least.
+        (P::Boost, E::DisarmRequested { lifted_off: false }) if !locks.abort_latched => {
+            stays_on_its_pad(mode)
+        }
+        (_, E::DisarmRequested { .. }) => {
+            wrong("disarm", "only PAD_ARMED, BOOST before the lift-off, and TOUCHDOWN disarm")
+        }
 
         (P::PadArmed, E::StartRequested { countdown_s }) => match mode.countdown_end_s {
             Some(_) => Row::Refuse(Refusal::CountdownRunning),
@@ -126,7 +132,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         },
         (_, E::HoldElapsed) => wrong("end a hold", "only PAD_ARMED is held"),
 
-        // From here on nobody may approach or disarm the vehicle, because the motor may light late.
+        // From here on nobody may approach the vehicle, because the motor may light late.
         (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
             Mode { countdown_end_s: None, ..*mode },
             P::Boost,
@@ -161,13 +167,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         }
         (P::Boost, E::LiftOff) => go(phase),
         (_, E::LiftOff) => wrong("lift off", "only a vehicle on its pad and BOOST lift off"),
-        // The motor may still light: as after an abort on the pad.
-        (P::Boost, E::NoLiftOff) => {
-            let inhibited = inhibited(mode);
-            let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
-            let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
-            Row::Go(Mode { interlocks, ..inhibited }, P::PadIdle, Effects::of(&effects))
-        }
+        (P::Boost, E::NoLiftOff) => stays_on_its_pad(mode),
         (_, E::NoLiftOff) => wrong("miss the lift-off", "only BOOST waits for it"),
         (P::Boost, E::Burnout) => go(P::Coast),
         // The landing motor burnt out, which happens once; the contact with the ground decides what follows.
@@ -223,8 +223,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Ignition, E::NoThrustTimeout) => go(phase),
         (_, E::NoThrustTimeout) => wrong("miss thrust", "only IGNITION waits for it"),
 
-        (_, E::AbortRequested { above_commit_height, gate_open }) => {
-            abort(mode, above_commit_height, gate_open, time_s)
+        (_, E::AbortRequested { lifted_off, above_commit_height, gate_open }) => {
+            abort(mode, lifted_off, above_commit_height, gate_open, time_s)
         }
 
         // Ground.
@@ -266,12 +266,21 @@ fn inhibited(mode: &Mode) -> Mode {
     }
 }
 
+/// The ascent motor's igniter had current and has none any more. The motor may still light: as after an abort on the pad.
+/// If it does, the vehicle rises as one that nobody armed.
+fn stays_on_its_pad(mode: &Mode) -> Row {
+    let inhibited = inhibited(mode);
+    let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
+    let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
+    Row::Go(Mode { interlocks, ..inhibited }, Phase::PadIdle, Effects::of(&effects))
+}
+
 /// The abort column: the effect of an abort in each phase.
 #[expect(
     clippy::match_same_arms,
     reason = "rows of different phases stay apart even where they say the same"
 )]
-fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -> Row {
+fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bool, time_s: f64) -> Row {
     use Phase as P;
     let phase = mode.phase;
     let locks = mode.interlocks;
@@ -299,6 +308,7 @@ fn abort(mode: &Mode, above_commit_height: bool, gate_open: bool, time_s: f64) -
             Row::Go(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, Effects::of(&effects))
         }
         P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
+        P::Boost if !lifted_off => stays_on_its_pad(mode),
         P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
         // A repeated abort on the way down may still have enough height for the parachute.
         P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => {

@@ -2,8 +2,11 @@
 
 use super::space::flight_of;
 use super::*;
-use flight::computer::AbortEffect;
+use flight::computer::{AbortEffect, FRAME_S};
+use flight::rules::outputs::{Line, Outputs};
 use flight::vehicle::mission::StartPoint;
+use sim::outside::{Outside, Unwatched};
+use sim::sortie::Sortie;
 use world::RestOutcome;
 
 fn from(start: StartPoint, dispersion: &str, faults: &[&str]) -> Told {
@@ -59,8 +62,9 @@ fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
     let ascent = |rocket: &Vehicle| rocket.snapshot().descent.unwrap().ascent.unwrap();
     rocket.run_until(|rocket| rocket.snapshot().descent.is_some());
     assert_eq!((ascent(&rocket).booster, ascent(&rocket).apogee), (Booster::Attached, None));
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
+    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::SafeOnPad, "it has not lifted off");
     rocket.run_until(|rocket| rocket.phase() == Phase::Coast);
+    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
     let told = ascent(&rocket).apogee.unwrap();
     let began_s = rocket.snapshot().since_zero_s.unwrap();
     rocket.run_until(|rocket| ascent(rocket).booster == Booster::Separated);
@@ -76,8 +80,13 @@ fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
 
 #[test]
 fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
-    for phase in [Phase::Boost, Phase::Coast] {
-        let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(phase);
+    let events_until = |rocket: &mut Told, words: &str| {
+        while !said(&rocket.advance(), words) {}
+    };
+    for words in ["LIFT-OFF", "burnt out at"] {
+        let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(Phase::Boost);
+        events_until(&mut rocket, words);
+        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
         assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
         let events = rocket.run_until(Vehicle::is_over);
@@ -85,6 +94,100 @@ fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
         assert!(phases(&events).contains(&Phase::Chute) && !phases(&events).contains(&Phase::Ignition));
         let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
         assert!(impact_m_s.abs() < 10.0, "{impact_m_s}");
+    }
+}
+
+/// The igniter has had current, and the motor has not lit: it does not light, and nobody goes near it for a minute.
+#[test]
+fn an_abort_or_a_disarm_before_the_lift_off_switches_the_igniter_off_and_says_that_it_may_still_light() {
+    for asked in [Asked::Abort, Asked::Disarm] {
+        let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(Phase::Boost);
+        rocket.advance();
+        assert!(rocket.computer().commands().outputs.is_on(Line::AscentIgniter));
+        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::SafeOnPad);
+        assert_eq!(rocket.request(asked).ending, Ending::Accepted);
+        assert_eq!(rocket.computer().commands().outputs, Outputs::NONE);
+        let events = rocket.run_until(Vehicle::is_over);
+        assert_eq!(phases(&events), [Phase::PadIdle]);
+        assert!(said(&events, "the motor may still light") && said(&events, "keep away for 60 s"));
+        let after = rocket.snapshot();
+        assert!(after.interlocks.abort_latched && !after.interlocks.armed);
+        assert!((58.0..60.0).contains(&after.pad_wait_s.unwrap()), "{:?}", after.pad_wait_s);
+        for _ in 0..1_000 {
+            rocket.advance();
+        }
+        assert!(rocket.sortie.world().booster_thrust_n().abs() < 1e-15);
+        assert_eq!(rocket.phase(), Phase::PadIdle);
+    }
+}
+
+/// The motor has lit, and no lift-off is felt yet: it rises, and comes down as after any abort on the way up.
+#[test]
+fn an_abort_between_the_light_and_the_lift_off_ends_under_the_parachute() {
+    let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(Phase::Boost);
+    rocket.run_until(|rocket| rocket.sortie.world().booster_thrust_n() > 0.0);
+    assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+    assert_eq!(rocket.phase(), Phase::PadIdle);
+    let events = rocket.run_until(Vehicle::is_over);
+    let seen = [Phase::PadIdle, Phase::Boost, Phase::Coast, Phase::Chute, Phase::Touchdown];
+    assert_eq!(phases(&events), seen);
+    assert!(said(&events, "LIFT-OFF") && rocket.sortie.world().thrust_begins_s().is_none());
+    let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+    assert!(impact_m_s.abs() < 10.0, "{impact_m_s}");
+}
+
+/// Asks for something in a copy of a flight and flies it on; whether it was accepted.
+fn asked_in(flight: &Sortie, asked: Asked, frames: usize) -> bool {
+    let mut flight = flight.clone();
+    let requests = [Request::of_the_programme(asked)];
+    let outside = Outside { requests: &requests, ..Outside::NOBODY };
+    let answered = flight.step_with(&outside, &mut Unwatched).output.unwrap();
+    let accepted = answered.answers[0].ending == Ending::Accepted;
+    let lit = flight.world().booster_thrust_n() > 0.0;
+    let mut outputs = answered.commands.outputs;
+    for _ in 0..=frames {
+        let lands_here = flight.computer().mode().interlocks.lands_here;
+        let stopped = accepted && !(lands_here && asked == Asked::Abort);
+        assert!(!(stopped && outputs.lights()), "{asked:?} at {:?}: {outputs:?}", flight.computer().mode());
+        outputs = flight.step().output.unwrap().commands.outputs;
+    }
+    // What had not lit does not light.
+    let lights = flight.world().booster_thrust_n() > 0.0;
+    assert!(!accepted || lit || !lights, "{asked:?}: the motor lit later");
+    accepted
+}
+
+/// The bar: an abort, a disarm and a hold in every frame from ten seconds before the release to three after it.
+#[test]
+fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_burn_too_low_for_the_parachute()
+{
+    for start in [StartPoint::Pad, StartPoint::Drone] {
+        let mut rocket = from(start, "field", &[]).run_to(Phase::PadArmed);
+        rocket.request(Asked::Start);
+        let release_s = rocket.computer().mode().countdown_end_s.unwrap();
+        let mut flight = rocket.vehicle.sortie.clone();
+        let mut lit = 0;
+        for frame in 0..2_600 {
+            let mode = *flight.computer().mode();
+            let risen = flight.computer().flown().is_some() && !mode.phase.on_pad();
+            // The igniter is looked at for as long as a motor may take to light.
+            let looking = risen && flight.computer().commands().outputs.lights();
+            let frames = if looking || frame % 200 == 0 { 600 } else { 2 };
+            let held = asked_in(&flight, Asked::Hold, frames);
+            assert_eq!(
+                held,
+                mode.may_hold(start, f64::from(u32::try_from(flight.frame()).unwrap() + 1) * FRAME_S)
+            );
+            let disarmed = asked_in(&flight, Asked::Disarm, frames);
+            assert!(disarmed || !mode.phase.on_pad(), "{mode:?}");
+            let aborted = asked_in(&flight, Asked::Abort, frames);
+            assert!(aborted, "{mode:?}");
+            lit += u32::from(flight.computer().commands().outputs.is_on(Line::AscentIgniter));
+            flight.step();
+        }
+        let since_s = f64::from(u32::try_from(flight.frame()).unwrap()) * FRAME_S - release_s;
+        assert!((2.9..3.1).contains(&since_s), "{since_s}");
+        assert_eq!(lit > 10, start == StartPoint::Pad, "{start:?}: {lit} frames lit");
     }
 }
 

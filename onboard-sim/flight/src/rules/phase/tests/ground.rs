@@ -191,7 +191,7 @@ fn in_the_last_two_seconds_nothing_holds_and_an_abort_and_a_disarm_still_end_it(
         }
     }
     for time_s in [6.0, 7.9, 8.0] {
-        for event in [ABORT, Event::DisarmRequested, Event::PinInserted] {
+        for event in [ABORT, Event::DisarmRequested { lifted_off: false }, Event::PinInserted] {
             let ended = transition(&counting, event, time_s);
             assert_eq!((ended.refusal, ended.mode.countdown_end_s), (None, None), "{event:?}");
             assert!(!ended.mode.interlocks.armed);
@@ -240,7 +240,7 @@ fn after_a_minute_a_held_vehicle_disarms() {
 
 #[test]
 fn every_event_that_leaves_pad_armed_ends_the_hold() {
-    for event in [Event::DisarmRequested, Event::PinInserted, ABORT, Event::LiftOff] {
+    for event in [Event::DisarmRequested { lifted_off: false }, Event::PinInserted, ABORT, Event::LiftOff] {
         let answer = transition(&held(), event, 9.0);
         assert_eq!((answer.refusal, answer.mode.hold), (None, None), "{event:?}");
     }

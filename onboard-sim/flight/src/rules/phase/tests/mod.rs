@@ -9,7 +9,6 @@ fn every_event() -> Vec<Event> {
         Event::SelfTestPassed,
         Event::PinPulled,
         Event::PinInserted,
-        Event::DisarmRequested,
         Event::StartRequested { countdown_s: 5.0 },
         Event::CountdownElapsed,
         Event::ReleasedAt(StartPoint::Pad),
@@ -30,6 +29,7 @@ fn every_event() -> Vec<Event> {
         Event::HoldElapsed,
     ];
     for flag in flags {
+        events.push(Event::DisarmRequested { lifted_off: flag });
         events.push(Event::ArmRequested { checks_passed: flag });
         events.push(Event::IgnitionGate { open: flag });
         events.push(Event::Contact { thrust_below_weight: flag });
@@ -37,7 +37,9 @@ fn every_event() -> Vec<Event> {
         events.push(Event::ReleasedEarly { parachute_fills: flag });
         events.push(Event::Apogee { booster_attached: flag });
         for gate_open in flags {
-            events.push(Event::AbortRequested { above_commit_height: flag, gate_open });
+            for lifted_off in flags {
+                events.push(Event::AbortRequested { lifted_off, above_commit_height: flag, gate_open });
+            }
         }
     }
     events
@@ -78,12 +80,17 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
         (P::Safe, E::SelfTestPassed) => (P::PadIdle, &[]),
         (P::Safe | P::PadIdle | P::PadArmed | P::Touchdown | P::Safed, E::PinPulled)
         | (P::Safe | P::PadIdle | P::Touchdown | P::Safed, E::PinInserted) => (phase, &[]),
-        (P::PadArmed, E::PinInserted | E::DisarmRequested) => (P::PadIdle, &[Disarm]),
+        (P::PadArmed, E::PinInserted | E::DisarmRequested { .. }) => (P::PadIdle, &[Disarm]),
         (P::PadIdle, E::ArmRequested { checks_passed: true }) => (P::PadArmed, &[]),
         (P::PadArmed, E::StartRequested { .. }) => (P::PadArmed, &[StartCountdown]),
         (P::PadArmed | P::Boost, E::LiftOff) => (P::Boost, &[]),
         (P::Safe | P::PadIdle, E::LiftOff) => (P::Boost, &[InhibitLandingMotor]),
-        (P::Boost, E::NoLiftOff) => (P::PadIdle, &[InhibitLandingMotor, Disarm, ShowPadWait]),
+        (
+            P::Boost,
+            E::NoLiftOff
+            | E::DisarmRequested { lifted_off: false }
+            | E::AbortRequested { lifted_off: false, .. },
+        ) => (P::PadIdle, &[InhibitLandingMotor, Disarm, ShowPadWait]),
         (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills: true }) => {
             (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
         }
@@ -134,7 +141,7 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
             | P::Chute,
             E::Contact { thrust_below_weight: true },
         ) => (P::Touchdown, &[InhibitLandingMotor]),
-        (P::Touchdown, E::DisarmRequested) => (phase, &[Disarm]),
+        (P::Touchdown, E::DisarmRequested { .. }) => (phase, &[Disarm]),
         (P::Touchdown, E::SafingDone) => (P::Safed, &[Disarm]),
         _ => return None,
     };
@@ -177,7 +184,7 @@ fn with_arm(rest: &[Event]) -> Vec<Event> {
     ARM.iter().chain(rest).copied().collect()
 }
 
-const ABORT: Event = Event::AbortRequested { above_commit_height: false, gate_open: false };
+const ABORT: Event = Event::AbortRequested { lifted_off: true, above_commit_height: false, gate_open: false };
 
 #[test]
 fn a_vehicle_released_at_apogee_flies_to_safed() {
@@ -242,7 +249,7 @@ fn a_countdown_must_be_a_number_of_seconds() {
 #[test]
 fn disarming_cancels_the_countdown_and_latches_nothing() {
     let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
-    let answer = transition(&counting, Event::DisarmRequested, 4.0);
+    let answer = transition(&counting, Event::DisarmRequested { lifted_off: false }, 4.0);
     assert_eq!(answer.mode.phase, Phase::PadIdle);
     assert_eq!(answer.effects, Effects::of(&[Effect::Disarm, Effect::CancelCountdown]));
     assert_eq!(answer.mode.countdown_end_s, None);
@@ -286,12 +293,31 @@ fn an_abort_while_rising_ends_under_the_parachute_at_apogee() {
 }
 
 #[test]
+fn an_abort_or_a_disarm_before_the_lift_off_leaves_the_vehicle_on_its_pad_as_after_a_misfire() {
+    let abort = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
+    for event in [abort, Event::DisarmRequested { lifted_off: false }] {
+        let aborted = transition(&in_order(Phase::Boost), event, 1.0).mode;
+        let locks = aborted.interlocks;
+        assert_eq!(aborted.phase, Phase::PadIdle);
+        assert!(!locks.armed && locks.abort_latched && locks.landing_motor_inhibited);
+        assert_eq!(aborted.pad_wait_remaining_s(1.0), Some(PAD_ABORT_WAIT_S));
+        // A motor that lights all the same.
+        let risen = transition(&aborted, Event::LiftOff, 2.0).mode;
+        assert!(risen.phase == Phase::Boost && risen.interlocks.landing_motor_inhibited);
+        let apogee = transition(&risen, Event::Apogee { booster_attached: false }, 8.0);
+        assert_eq!(apogee.mode.phase, Phase::Chute);
+    }
+    let risen = transition(&in_order(Phase::Boost), Event::DisarmRequested { lifted_off: true }, 1.0);
+    assert!(matches!(risen.refusal, Some(Refusal::WrongPhase { .. })));
+}
+
+#[test]
 fn after_an_abort_under_thrust_the_vehicle_lands_here_and_the_phase_stays() {
     let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
     assert_eq!(aborted.mode.phase, Phase::Powered);
     assert!(aborted.mode.interlocks.lands_here && aborted.effects.is_empty());
     assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
-    let burns = Event::AbortRequested { above_commit_height: false, gate_open: true };
+    let burns = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: true };
     let lit = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
     assert!(
         lit.phase == Phase::Ignition && lit.interlocks.lands_here,
@@ -399,7 +425,7 @@ proptest! {
                 let gate_open = matches!(
                     event,
                     Event::IgnitionGate { open: true }
-                        | Event::AbortRequested { above_commit_height: false, gate_open: true }
+                        | Event::AbortRequested { above_commit_height: false, gate_open: true, .. }
                 );
                 prop_assert!(gate_open, "{event:?}");
                 prop_assert_eq!(answer.mode.phase, Phase::Ignition);

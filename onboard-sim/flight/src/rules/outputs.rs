@@ -1,0 +1,264 @@
+//! What lights, parts and ejects: both igniters, the separation charge and the parachute.
+//!
+//! [`Outputs::decided`] is the only function that switches one of them on. The flight computer calls it once, at the end of
+//! a frame, when the crew has been answered and the phase is settled. An output has current unless
+//! [something speaks against it](why_not), so each names every reason for which it is off. The reasons repeat latches that
+//! the [phase table](crate::rules::phase) has checked already: a mistake there lights nothing by itself.
+
+use serde::{Deserialize, Serialize};
+
+use crate::computer::memory::remembers;
+use crate::rules::phase::{Mode, Motor, Phase};
+
+/// Something that gets current.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Line {
+    AscentIgniter,
+    LandingIgniter,
+    /// The charge between booster and vehicle.
+    Separation,
+    Parachute,
+}
+
+/// What the outputs depend on besides the mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    /// The frame belongs to a flight; the one in which the countdown ends does not yet.
+    pub flying: bool,
+    /// The vehicle has left its rail.
+    pub lifted_off: bool,
+    /// Apogee is near, or was: the booster goes.
+    pub separation_due: bool,
+}
+
+/// Every reason for which an output has no current now; none of them: it has.
+pub fn why_not(line: Line, mode: &Mode, seen: Seen) -> impl Iterator<Item = &'static str> {
+    let Mode { phase, interlocks: locks, motor, .. } = *mode;
+    let reasons: [Option<&'static str>; 6] = match line {
+        Line::AscentIgniter => [
+            (phase != Phase::Boost).then_some("only BOOST lights the ascent motor"),
+            (!seen.flying).then_some("the flight begins with the next frame"),
+            seen.lifted_off.then_some("the vehicle has lifted off"),
+            (!locks.armed).then_some("not armed"),
+            (!locks.pin_out).then_some("the pin is in"),
+            locks.abort_latched.then_some("an abort is latched"),
+        ],
+        Line::LandingIgniter => [
+            (phase != Phase::Ignition).then_some("only IGNITION lights the landing motor"),
+            locks.landing_motor_inhibited.then_some("the landing motor is inhibited"),
+            (!locks.armed).then_some("not armed"),
+            (!locks.pin_out).then_some("the pin is in"),
+            // An abort too low for the parachute lands on the motor, and so does one after the command to light.
+            (locks.abort_latched && !locks.lands_here).then_some("an abort is latched"),
+            None,
+        ],
+        Line::Separation => [
+            (!seen.separation_due).then_some("apogee is not near"),
+            phase.on_pad().then_some("the vehicle is on its pad"),
+            None,
+            None,
+            None,
+            None,
+        ],
+        Line::Parachute => [
+            (phase != Phase::Chute).then_some("only CHUTE ejects the parachute"),
+            (motor == Motor::Burning).then_some("the landing motor burns"),
+            None,
+            None,
+            None,
+            None,
+        ],
+    };
+    reasons.into_iter().flatten()
+}
+
+/// Which outputs have current. Nothing else in the flight computer can set one: the fields are private.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Outputs {
+    landing_igniter: bool,
+    parachute: bool,
+    ascent_igniter: bool,
+    separation: bool,
+}
+
+remembers!(Outputs { landing_igniter, parachute, ascent_igniter, separation });
+
+impl Outputs {
+    /// No current anywhere.
+    pub const NONE: Self =
+        Self { landing_igniter: false, parachute: false, ascent_igniter: false, separation: false };
+
+    /// The outputs at the end of a frame.
+    pub fn decided(mode: &Mode, seen: Seen) -> Self {
+        Self::of(|line| why_not(line, mode, seen).next().is_none())
+    }
+
+    /// The outputs that a log or a board tells of.
+    pub fn of(is_on: impl Fn(Line) -> bool) -> Self {
+        Self {
+            landing_igniter: is_on(Line::LandingIgniter),
+            parachute: is_on(Line::Parachute),
+            ascent_igniter: is_on(Line::AscentIgniter),
+            separation: is_on(Line::Separation),
+        }
+    }
+
+    /// Whether an output has current.
+    pub fn is_on(&self, line: Line) -> bool {
+        match line {
+            Line::AscentIgniter => self.ascent_igniter,
+            Line::LandingIgniter => self.landing_igniter,
+            Line::Separation => self.separation,
+            Line::Parachute => self.parachute,
+        }
+    }
+
+    /// Whether an igniter has current.
+    pub fn lights(&self) -> bool {
+        self.ascent_igniter || self.landing_igniter
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use rand::{Rng as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::rules::phase::{Event, HoldCause, StartPoint, transition};
+
+    const SEEN: Seen = Seen { flying: true, lifted_off: false, separation_due: false };
+
+    fn boosting() -> Mode {
+        let mut mode = Mode { phase: Phase::Boost, ..Mode::power_up(0.0) };
+        (mode.interlocks.armed, mode.interlocks.pin_out) = (true, true);
+        mode
+    }
+
+    #[test]
+    fn each_output_that_is_off_names_every_reason() {
+        let reasons = |line, mode: &Mode, seen| why_not(line, mode, seen).collect::<Vec<_>>();
+        assert!(reasons(Line::AscentIgniter, &boosting(), SEEN).is_empty());
+        let risen = Seen { lifted_off: true, ..SEEN };
+        assert_eq!(reasons(Line::AscentIgniter, &boosting(), risen), ["the vehicle has lifted off"]);
+        let at_power_up = Mode::power_up(0.0);
+        assert_eq!(
+            reasons(Line::AscentIgniter, &at_power_up, SEEN),
+            ["only BOOST lights the ascent motor", "not armed", "the pin is in"]
+        );
+        assert_eq!(
+            reasons(Line::LandingIgniter, &at_power_up, SEEN),
+            ["only IGNITION lights the landing motor", "not armed", "the pin is in"]
+        );
+        assert_eq!(
+            reasons(Line::Separation, &at_power_up, SEEN),
+            ["apogee is not near", "the vehicle is on its pad"]
+        );
+        let burning = Mode { phase: Phase::Powered, motor: Motor::Burning, ..boosting() };
+        assert_eq!(
+            reasons(Line::Parachute, &burning, SEEN),
+            ["only CHUTE ejects the parachute", "the landing motor burns"]
+        );
+        assert!(Outputs::decided(&boosting(), SEEN).is_on(Line::AscentIgniter));
+        assert!(Outputs::decided(&boosting(), SEEN).lights());
+        assert_eq!(Outputs::decided(&at_power_up, SEEN), Outputs::NONE);
+    }
+
+    /// An event of any kind; most of them are those that lead on.
+    fn event(dice: u32, lifted_off: bool) -> Event {
+        let flag = |bit: u32| dice >> bit & 1 == 1;
+        let (above_commit_height, gate_open) = (flag(29), flag(30));
+        match dice & 31 {
+            0 => Event::AbortRequested { lifted_off, above_commit_height, gate_open },
+            1 => Event::DisarmRequested { lifted_off },
+            2 => Event::Hold { cause: HoldCause::Commanded, start: StartPoint::Pad },
+            3 => Event::PinInserted,
+            4 | 5 => Event::PinPulled,
+            6 => Event::HoldElapsed,
+            7 => Event::NoLiftOff,
+            8 => Event::NoThrustTimeout,
+            9 => Event::GateShutForGood { parachute_fills: gate_open },
+            10 => Event::Contact { thrust_below_weight: gate_open },
+            11 => Event::Apogee { booster_attached: gate_open },
+            12 | 13 => Event::Apogee { booster_attached: false },
+            14 => Event::SelfTestPassed,
+            15..=17 => Event::ArmRequested { checks_passed: true },
+            18 | 19 => Event::StartRequested { countdown_s: 1.0 },
+            20 | 21 => Event::CountdownElapsed,
+            22 => Event::ReleasedAt(StartPoint::Apogee),
+            23 => Event::LiftOff,
+            24 => Event::Burnout,
+            25 => Event::SeparationDue,
+            26 | 27 => Event::FinsConfirmed,
+            28 => Event::LandArm,
+            29 => Event::IgnitionGate { open: gate_open },
+            30 => Event::ThrustConfirmed,
+            _ => Event::ReleasedEarly { parachute_fills: gate_open },
+        }
+    }
+
+    /// The bar: in a million random sequences no igniter has current after an abort, a disarm or a hold was accepted, but for
+    /// the landing motor of a vehicle that was aborted too low for its parachute or after the command to light. A motor is
+    /// lit armed and with its pin out, at most once, and never with the parachute.
+    #[test]
+    fn in_a_million_random_sequences_no_igniter_is_on_after_an_abort_a_disarm_or_a_hold() {
+        let mut random = ChaCha8Rng::seed_from_u64(48);
+        let (mut ended, mut lit_before, mut landings) = (0_u64, 0_u64, 0_u64);
+        for _ in 0..1_000_000_u32 {
+            let mut mode = Mode::power_up(0.0);
+            for first in [Event::SelfTestPassed, Event::PinPulled] {
+                mode = transition(&mode, first, 0.0).mode;
+            }
+            let (mut seen, mut time_s) = (Seen { flying: false, ..SEEN }, 0.0);
+            let (mut ascent_began, mut landing_began) = (false, false);
+            let mut before = Outputs::NONE;
+            // What stays off until somebody starts anew, or for ever.
+            let mut stopped = false;
+            for _ in 0..24 {
+                let dice = random.next_u32();
+                time_s += [0.005, 0.5, 1.0, 1.1][(dice >> 5 & 3) as usize];
+                let asked = event(dice, seen.lifted_off);
+                let answer = transition(&mode, asked, time_s);
+                let accepted = answer.refusal.is_none();
+                mode = answer.mode;
+                seen.flying |= !mode.phase.on_pad();
+                seen.lifted_off |= accepted && asked == Event::LiftOff;
+                seen.separation_due |= accepted && asked == Event::SeparationDue;
+                let outputs = Outputs::decided(&mode, seen);
+                let stops = matches!(
+                    asked,
+                    Event::AbortRequested { .. } | Event::DisarmRequested { .. } | Event::Hold { .. }
+                );
+                if accepted && stops {
+                    stopped = true;
+                    ended += 1;
+                    lit_before += u64::from(before.is_on(Line::AscentIgniter));
+                } else if accepted && matches!(asked, Event::StartRequested { .. } | Event::LiftOff) {
+                    // An armed vehicle that lifts off by itself flies its mission.
+                    stopped = false;
+                }
+                let (ascent, landing) =
+                    (outputs.is_on(Line::AscentIgniter), outputs.is_on(Line::LandingIgniter));
+                let locks = mode.interlocks;
+                assert!(!(ascent && (stopped || locks.abort_latched)), "{asked:?}: {mode:?}");
+                assert!(!(landing && (stopped || locks.abort_latched) && !locks.lands_here), "{mode:?}");
+                assert!(!outputs.lights() || (locks.armed && locks.pin_out), "{mode:?}");
+                assert!(!(ascent && landing), "{mode:?}");
+                assert!(!outputs.is_on(Line::Parachute) || !outputs.lights(), "{mode:?}");
+                // What was switched off does not come on again.
+                assert!(!(ascent && ascent_began && !before.is_on(Line::AscentIgniter)), "{mode:?}");
+                assert!(!(landing && landing_began && !before.is_on(Line::LandingIgniter)), "{mode:?}");
+                (ascent_began, landing_began) = (ascent_began | ascent, landing_began | landing);
+                landings += u64::from(landing && stopped);
+                before = outputs;
+            }
+        }
+        let found = format!("{ended} ended, {lit_before} of them with current, {landings} landings");
+        assert!(
+            ended > 100_000 && lit_before > 1_000 && landings > 10,
+            "the sequences test too little: {found}"
+        );
+    }
+}
