@@ -206,7 +206,7 @@ impl Config {
         let path = |path: &Option<std::path::PathBuf>| path.as_ref().map(|path| path.display().to_string());
         let other_keys: Vec<String> = DEFINITIONS
             .iter()
-            .filter(|definition| keys.key(definition.act) != definition.usual)
+            .filter(|definition| keys.key(definition.act) != Some(definition.usual))
             .map(|definition| format!("{}={}", definition.name, keys.name(definition.act)))
             .collect();
         let theme_name = match theme {

@@ -170,9 +170,9 @@ impl Act {
         }
     }
 
-    pub fn definition(self) -> &'static Definition {
-        let place = DEFINITIONS.iter().position(|definition| definition.act == self);
-        &DEFINITIONS[place.unwrap_or(0)]
+    /// Its definition; `None` for the page that shares another one's key.
+    pub fn definition(self) -> Option<&'static Definition> {
+        DEFINITIONS.iter().find(|definition| definition.act == self)
     }
 
     /// Whether it opens a dialog that commands the vehicle.
@@ -269,15 +269,15 @@ impl Bindings {
         Some(DEFINITIONS[place].act)
     }
 
-    /// The key of an action.
-    pub fn key(&self, act: Act) -> Key {
-        let place = DEFINITIONS.iter().position(|definition| definition.act == act);
-        self.0[place.unwrap_or(0)]
+    /// The key of an action, if it has one.
+    pub fn key(&self, act: Act) -> Option<Key> {
+        let place = DEFINITIONS.iter().position(|definition| definition.act == act)?;
+        self.0.get(place).copied()
     }
 
-    /// The name of the key of an action.
+    /// The name of the key of an action; empty without one.
     pub fn name(&self, act: Act) -> String {
-        self.key(act).name()
+        self.key(act).map_or_else(String::new, Key::name)
     }
 
     /// The action that this small letter would have opened as a capital letter.
@@ -405,6 +405,18 @@ mod tests {
         assert_eq!(Bindings::chosen(std::iter::empty()), Ok(usual));
     }
 
+    /// The ascent shares the key of the descent: it has no definition, and was the first action, which arms.
+    #[test]
+    fn an_action_without_a_definition_is_no_other_action() {
+        let keys = Bindings::default();
+        let defined =
+            DEFINITIONS.iter().filter(|definition| keys.key(definition.act) == Some(definition.usual));
+        assert_eq!(defined.count(), DEFINITIONS.len());
+        let ascent = Act::Show(Page::Ascent);
+        assert!(ascent.definition().is_none() && keys.key(ascent).is_none());
+        assert_eq!(keys.name(ascent), "");
+    }
+
     #[test]
     fn a_wrong_choice_is_refused_with_what_would_do() {
         let refused = |given: &str| given.parse::<Bindings>().unwrap_err().to_string();
@@ -441,7 +453,7 @@ mod tests {
                 prop_assert_eq!(keys.act(Key::Enter), None);
                 prop_assert_eq!(keys.act(Key::Escape), Some(Act::Follow));
                 for act in [Act::Arm, Act::Start, Act::Disarm] {
-                    let key = keys.key(act);
+                    let key = keys.key(act).unwrap();
                     prop_assert!(matches!(key, Key::Char(letter) if letter.is_ascii_uppercase()), "{key:?}");
                     prop_assert_eq!(keys.act(key), Some(act));
                 }

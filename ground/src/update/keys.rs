@@ -280,7 +280,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     if matches!(act, Act::Arm | Act::Start | Act::Disarm | Act::Tap | Act::TakeCommand)
         && let Some(why) = why_not_here(model)
     {
-        return model.warn(now, format!("this screen cannot {}: {why}", act.definition().name));
+        let name = act.definition().map_or("do that", |definition| definition.name);
+        return model.warn(now, format!("this screen cannot {name}: {why}"));
     }
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}

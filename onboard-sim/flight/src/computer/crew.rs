@@ -277,10 +277,13 @@ impl Computer {
     /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
     fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
         let Request { asked, station, by, confirms, .. } = *request;
-        let (Some(People::Two { first_ask }), Some(act), Some(by), Some(station)) =
-            (self.people, act_of(asked), by, station)
-        else {
-            return Ok(None);
+        let (first_ask, act) = match (self.people, act_of(asked)) {
+            (Some(People::Two { first_ask }), Some(act)) => (first_ask, act),
+            (None | Some(People::One), _) | (Some(People::Two { .. }), None) => return Ok(None),
+        };
+        let (Some(by), Some(station)) = (by, station) else {
+            let reason = "two people with a key each, at a station, must agree".into();
+            return Err(self.deny(asked, reason));
         };
         let time_s = self.table.time_s();
         let waited = self.crew.two_person.waiting(time_s);
