@@ -234,7 +234,7 @@ impl Station {
     fn tick_msgs(&mut self, model: &Model) -> Vec<Msg> {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
-            failed: !recorder.is_running(),
+            failed: !recorder.is_whole(),
             space: self.log_space.look(recorder, self.clock.now()),
         });
         let health = (health != model.log).then_some(Msg::Log(health));

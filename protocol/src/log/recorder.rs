@@ -4,9 +4,12 @@
 //! [`Recorder::try_record`] never waits and counts what it drops. At least every 200 ms and at every
 //! [`Recorder::sync_soon`] the open chunk is ended and written to the operating system, so a killed process loses no
 //! more than that. A second thread syncs the file to the disk, so that a slow disk does not lengthen the 200 ms.
+//!
+//! The system reports a disk error once for an open file: the sync after it succeeds although data is lost. So every failure is
+//! kept where it happens, and [`Recorder::is_whole`] and [`Recorder::finish`] read what was kept.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -46,6 +49,22 @@ pub enum RecorderError {
     Gone { path: PathBuf },
 }
 
+/// The file of a log as the disk sees it.
+trait Disk: Send + Sync + 'static {
+    fn sync(&self) -> io::Result<()>;
+    fn len_bytes(&self) -> io::Result<u64>;
+}
+
+impl Disk for File {
+    fn sync(&self) -> io::Result<()> {
+        self.sync_data()
+    }
+
+    fn len_bytes(&self) -> io::Result<u64> {
+        Ok(self.metadata()?.len())
+    }
+}
+
 enum Order {
     Write(Box<Record>, u64),
     SyncSoon,
@@ -68,6 +87,17 @@ struct Shared {
     /// Length of the log up to the mark, bytes; 0 without one.
     marked_bytes: AtomicU64,
     thread: Mutex<Option<JoinHandle<Result<(), LogWriteError>>>>,
+}
+
+/// Sets the flag if the thread that holds it panics.
+struct FailedByPanic(Arc<Shared>);
+
+impl Drop for FailedByPanic {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.failed.store(true, Ordering::Release);
+        }
+    }
 }
 
 impl Recorder {
@@ -104,36 +134,57 @@ impl Recorder {
         let disk = file.try_clone().map_err(create_error)?;
         let writer = LogWriter::new(BufWriter::new(file), header)
             .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
+        Self::start((path.to_owned(), tlog_path), (writer, tlog), disk).map_err(create_error)
+    }
+
+    /// Starts the two threads.
+    fn start<W: Write + Seek + Send + 'static>(
+        (path, tlog_path): (PathBuf, Option<PathBuf>),
+        (writer, tlog): (LogWriter<W>, Option<TlogWriter<BufWriter<File>>>),
+        disk: impl Disk,
+    ) -> io::Result<Self> {
         let (orders, inbox) = sync_channel(QUEUE_RECORDS);
         let shared = Arc::new(Shared {
-            path: path.to_owned(),
+            path,
             tlog_path,
             dropped: AtomicU64::new(0),
             failed: AtomicBool::new(false),
             marked_bytes: AtomicU64::new(0),
             thread: Mutex::new(None),
         });
-        let for_thread = Arc::clone(&shared);
+        let disk = Arc::new(disk);
         let (sync_wanted, wishes) = sync_channel::<()>(1);
-        let syncing = disk.try_clone().map_err(create_error)?;
-        std::thread::Builder::new()
-            .name("log sync".to_owned())
-            .spawn(move || {
-                while wishes.recv().is_ok() {
-                    // If the disk fails, the writes or the last sync report it.
-                    let _ = syncing.sync_data();
+        let (synced, for_syncing) = (Arc::clone(&disk), Arc::clone(&shared));
+        let syncing = std::thread::Builder::new().name("log sync".to_owned()).spawn(move || {
+            let _watch = FailedByPanic(Arc::clone(&for_syncing));
+            let mut first_error = None;
+            while wishes.recv().is_ok() {
+                if let Err(error) = synced.sync() {
+                    for_syncing.failed.store(true, Ordering::Release);
+                    first_error.get_or_insert(error);
                 }
-            })
-            .map_err(create_error)?;
-        let thread = std::thread::Builder::new()
-            .name("recorder".to_owned())
-            .spawn(move || {
-                let ended =
-                    write_until_finished(writer, tlog, &disk, &inbox, &sync_wanted, &for_thread.marked_bytes);
-                for_thread.failed.store(ended.is_err(), Ordering::Release);
-                ended
-            })
-            .map_err(create_error)?;
+            }
+            first_error
+        })?;
+        let for_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || {
+            let _watch = FailedByPanic(Arc::clone(&for_thread));
+            let mut ended =
+                write_until_finished(writer, tlog, &*disk, &inbox, &sync_wanted, &for_thread.marked_bytes);
+            // The other thread ends with its last sync.
+            drop(sync_wanted);
+            let lost = match syncing.join() {
+                Ok(lost) => lost,
+                Err(_panic) => Some(io::Error::other("the thread that syncs the log stopped unexpectedly")),
+            };
+            if let (Ok(()), Some(error)) = (&ended, lost) {
+                ended = Err(mcap::McapError::from(error).into());
+            }
+            if ended.is_err() {
+                for_thread.failed.store(true, Ordering::Release);
+            }
+            ended
+        })?;
         if let Ok(mut slot) = shared.thread.lock() {
             *slot = Some(thread);
         }
@@ -154,8 +205,8 @@ impl Recorder {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 
-    /// Returns whether the writer still takes records.
-    pub fn is_running(&self) -> bool {
+    /// Returns whether nothing has failed so far: neither a write nor a sync nor a thread.
+    pub fn is_whole(&self) -> bool {
         !self.shared.failed.load(Ordering::Acquire)
     }
 
@@ -194,7 +245,7 @@ impl Recorder {
     /// dropped.
     ///
     /// # Errors
-    /// A record could not be written; everything synced before it can still be read.
+    /// A record could not be written or, at any time, not synced; everything synced before it can still be read.
     pub fn finish(&self) -> Result<PathBuf, RecorderError> {
         let path = self.shared.path.clone();
         let thread = self.shared.thread.lock().ok().and_then(|mut slot| slot.take());
@@ -223,9 +274,9 @@ impl Recorder {
 
 #[expect(clippy::disallowed_methods, reason = "the flush timer is about the disk, not about the flight")]
 fn write_until_finished(
-    mut writer: LogWriter<BufWriter<File>>,
+    mut writer: LogWriter<impl Write + Seek>,
     mut tlog: Option<TlogWriter<BufWriter<File>>>,
-    disk: &File,
+    disk: &impl Disk,
     inbox: &Receiver<Order>,
     sync_wanted: &SyncSender<()>,
     marked_bytes: &AtomicU64,
@@ -262,7 +313,7 @@ fn write_until_finished(
             Ok(Order::Mark) => {
                 hand_over(&mut writer, tlog.as_mut(), sync_wanted)?;
                 flush_due = None;
-                let bytes = disk.metadata().map_err(mcap::McapError::from)?.len();
+                let bytes = disk.len_bytes().map_err(mcap::McapError::from)?;
                 marked_bytes.store(bytes, Ordering::Release);
             }
             Ok(Order::Finish) | Err(RecvTimeoutError::Disconnected) => {
@@ -271,7 +322,7 @@ fn write_until_finished(
                 }
                 let mut output = writer.finish()?;
                 output.flush().map_err(mcap::McapError::from)?;
-                return disk.sync_data().map_err(|error| mcap::McapError::from(error).into());
+                return disk.sync().map_err(|error| mcap::McapError::from(error).into());
             }
         }
     }
@@ -280,7 +331,7 @@ fn write_until_finished(
 /// Writes everything to the operating system, which keeps it even if this process is killed, and asks the other
 /// thread to sync it to the disk, which may take longer than one flush interval.
 fn hand_over(
-    writer: &mut LogWriter<BufWriter<File>>,
+    writer: &mut LogWriter<impl Write + Seek>,
     tlog: Option<&mut TlogWriter<BufWriter<File>>>,
     sync_wanted: &SyncSender<()>,
 ) -> Result<(), LogWriteError> {
@@ -291,4 +342,104 @@ fn hand_over(
     // A full queue means that a sync is already requested.
     let _ = sync_wanted.try_send(());
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, SeekFrom};
+
+    use super::*;
+    use crate::log::record::{Event, EventLevel};
+
+    /// Fails at one sync only, as Linux reports a disk error, and says so here when it has.
+    struct FailsOnce {
+        failing_sync: u64,
+        syncs: AtomicU64,
+        happened: SyncSender<()>,
+    }
+
+    impl Disk for FailsOnce {
+        fn sync(&self) -> io::Result<()> {
+            if self.syncs.fetch_add(1, Ordering::Relaxed) == self.failing_sync {
+                let _ = self.happened.try_send(());
+                return Err(io::Error::other("no disk"));
+            }
+            Ok(())
+        }
+
+        fn len_bytes(&self) -> io::Result<u64> {
+            Ok(1)
+        }
+    }
+
+    /// Panics at the first write after `calm` of them.
+    struct Panics {
+        inner: Cursor<Vec<u8>>,
+        calm: u32,
+    }
+
+    impl Write for Panics {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.calm = self.calm.checked_sub(1).expect("the writer panics here");
+            self.inner.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Panics {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.inner.seek(to)
+        }
+    }
+
+    fn event() -> Record {
+        Record::Event(Event { level: EventLevel::Info, name: "test".to_owned(), message: "here".to_owned() })
+    }
+
+    fn started<W: Write + Seek + Send + 'static>(output: W, disk: impl Disk) -> Recorder {
+        let writer = LogWriter::new(output, &LogHeader::default()).unwrap();
+        Recorder::start((PathBuf::from("of a test"), None), (writer, None), disk).unwrap()
+    }
+
+    #[test]
+    fn a_disk_error_at_one_sync_of_many_is_kept_until_the_end() {
+        let (happened, seen) = sync_channel(1);
+        let disk = FailsOnce { failing_sync: 0, syncs: AtomicU64::new(0), happened };
+        let recorder = started(Cursor::new(Vec::new()), disk);
+        recorder.record(event(), 0);
+        recorder.sync_soon();
+        seen.recv().unwrap();
+        let ended = recorder.finish();
+        assert!(matches!(ended, Err(RecorderError::Write { .. })), "{ended:?}");
+        assert!(!recorder.is_whole());
+    }
+
+    #[test]
+    fn a_recorder_thread_that_panics_has_failed() {
+        let (happened, _) = sync_channel(1);
+        let disk = FailsOnce { failing_sync: u64::MAX, syncs: AtomicU64::new(0), happened };
+        let recorder = started(Panics { inner: Cursor::new(Vec::new()), calm: 1_000 }, disk);
+        // Every mark ends a chunk, which is a write at least.
+        for k in 0..2_000 {
+            recorder.record(event(), k);
+            recorder.mark_soon();
+        }
+        let ended = recorder.finish();
+        assert!(matches!(ended, Err(RecorderError::Gone { .. })), "{ended:?}");
+        assert!(!recorder.is_whole());
+    }
+
+    #[test]
+    fn without_an_error_a_log_stays_whole() {
+        let (happened, _) = sync_channel(1);
+        let disk = FailsOnce { failing_sync: u64::MAX, syncs: AtomicU64::new(0), happened };
+        let recorder = started(Cursor::new(Vec::new()), disk);
+        recorder.record(event(), 0);
+        recorder.sync_soon();
+        assert!(recorder.finish().is_ok());
+        assert!(recorder.is_whole());
+    }
 }

@@ -92,7 +92,7 @@ pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     };
     let directory = recorder.path().parent().filter(|path| !path.as_os_str().is_empty());
     let space_bytes = fs4::available_space(directory.unwrap_or(Path::new("."))).unwrap_or(0);
-    LogState { running: recorder.is_running() && recorder.dropped() == 0, space_bytes }
+    LogState { running: recorder.is_whole() && recorder.dropped() == 0, space_bytes }
 }
 
 // The vehicle's own log as a file that it gives out once it is down: the part up to a mark, which does not change any
