@@ -26,6 +26,8 @@ const GIVE_UP: Duration = Duration::from_secs(30);
 const CLOSE_TRIES: u32 = 3;
 /// The rate is a mean over this many seconds.
 const RATE_OVER_S: usize = 10;
+/// A listing ends here, so that a vehicle that lists without end fills no memory: a flight every minute for a week.
+const MAX_LISTED: usize = 10_000;
 
 /// Why a download has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -34,6 +36,8 @@ pub enum Failure {
     NoAnswer,
     #[error("the vehicle has no log to offer")]
     NoFiles,
+    #[error("the vehicle lists more than {MAX_LISTED} files; name the one to fetch")]
+    TooManyFiles,
     #[error("the vehicle has no file of that name")]
     NoSuchFile,
     #[error("the vehicle does not give out its log now: it is armed or in flight")]
@@ -212,6 +216,9 @@ impl Download {
                 for entry in files {
                     self.listed.push(String::from_utf8_lossy(entry).into_owned());
                 }
+                if self.listed.len() > MAX_LISTED {
+                    self.phase = Phase::Over(Some(Failure::TooManyFiles));
+                }
                 None
             }
             (Phase::Listing, Some(Refusal::EndOfFile)) => {
@@ -378,5 +385,22 @@ impl Download {
                 self.rate.pop_front();
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_listing_without_end_is_given_up() {
+        let mut download = Download::new(None, None, 0);
+        for _ in 0..MAX_LISTED {
+            for packet in download.poll(Duration::ZERO) {
+                download.take(&packet.ack(b"Fone\t1\0Ftwo\t2\0"), Duration::ZERO);
+            }
+        }
+        assert_eq!(download.ended(), Some(Err(Failure::TooManyFiles)));
+        assert!(download.listed.len() <= MAX_LISTED + 2);
     }
 }

@@ -177,7 +177,7 @@ impl Pieces {
         {
             burst.prolonged = burst.number;
             let ahead = burst.front + PROLONGED_AHEAD;
-            asked.push(ask(Opcode::BurstReadFile, &(ahead..ahead + DATA_LEN as u32)));
+            asked.push(ask(Opcode::BurstReadFile, &(ahead..ahead.saturating_add(DATA_LEN as u32))));
         }
         let silent =
             (self.interval * SILENT_INTERVALS).max(self.round_trip * 2).clamp(SILENT_LEAST, SILENT_MOST);
@@ -223,7 +223,7 @@ impl Pieces {
                 if self.reads.len() >= MOST_READS {
                     return asked;
                 }
-                let piece = from..gap.end.min(from + DATA_LEN as u32);
+                let piece = from..gap.end.min(from.saturating_add(DATA_LEN as u32));
                 from = piece.end;
                 let waits = |read: &Read| read.range.start < piece.end && piece.start < read.range.end;
                 if self.reads.iter().any(waits) {
@@ -240,5 +240,19 @@ impl Pieces {
             }
         }
         asked
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_bytes_of_the_longest_possible_file_are_asked_for() {
+        let mut have = Ranges::default();
+        have.add(0..u32::MAX - 5);
+        let asked = Pieces::default().poll(&have, u32::MAX, 0, &mut 0, Duration::ZERO);
+        assert_eq!(asked.len(), 1, "{asked:?}");
+        assert_eq!((asked[0].offset, asked[0].size), (u32::MAX - 5, 5));
     }
 }
