@@ -94,7 +94,7 @@ impl Transport {
                 udp::connect(remote, queues).await?;
             }
             LinkAddress::TcpIn(local) => {
-                let bound = stream::listen_tcp(local, inbox, outbox).await?;
+                let bound = stream::listen_tcp(local, inbox, outbox, believed_by_owner).await?;
                 if local.ends_with(":0") {
                     *local = bound.to_string();
                 }
@@ -293,6 +293,29 @@ mod tests {
                 client.read_exact(bytes).await.unwrap();
             }
             assert_eq!(first, [*b"all", *b"one"]);
+        });
+    }
+
+    #[test]
+    fn four_silent_tcp_connections_do_not_keep_the_station_out() {
+        run(async {
+            let mut link = Transport::open(LinkAddress::TcpIn("127.0.0.1:0".to_owned())).await.unwrap();
+            let LinkAddress::TcpIn(address) = link.address().clone() else { unreachable!() };
+            let address: SocketAddr = address.parse().unwrap();
+            let mut silent = Vec::new();
+            for _ in 0..4 {
+                silent.push(TcpStream::connect(address).await.unwrap());
+                while !matches!(link.receive().await, Some(Received::Up(_))) {}
+            }
+            let mut station = TcpStream::connect(address).await.unwrap();
+            station.write_all(b"here").await.unwrap();
+            let origin = next_origin(&mut link).await;
+            link.sender().send_to(b"one".to_vec(), Some(origin));
+            let mut bytes = [0; 3];
+            station.read_exact(&mut bytes).await.unwrap();
+            assert_eq!(bytes, *b"one");
+            // The oldest of them has lost its place.
+            assert_eq!(silent[0].read(&mut bytes).await.unwrap(), 0);
         });
     }
 

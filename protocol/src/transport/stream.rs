@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::broadcast;
 use tokio::sync::mpsc::{Receiver, Sender};
+use tokio::sync::{broadcast, oneshot};
+use tokio::time::Instant;
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
 use super::Outgoing;
@@ -155,8 +156,11 @@ impl Line for Port {
 
 // TCP links: `tcpin` serves a few clients; `tcpout` connects, and reconnects after a failure.
 
-/// This many clients are served at the same time; further ones are disconnected.
+/// This many clients are served at the same time. A further one takes the place of the one that has said nothing valid for
+/// longest; if all have spoken lately, it is disconnected.
 const MAX_CLIENTS: usize = 4;
+/// Whoever was accepted keeps the place for this long without another accepted frame: ten heartbeats of a station.
+const KEEPS_PLACE_FOR: Duration = Duration::from_secs(10);
 /// This many writes wait for each client; a slow client loses the oldest ones.
 const CLIENT_QUEUE: usize = 256;
 /// A connection attempt fails after this time.
@@ -169,32 +173,72 @@ pub(super) async fn listen_tcp(
     address: &str,
     inbox: Sender<Received>,
     outbox: Receiver<Outgoing>,
+    believed: Receiver<Origin>,
 ) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
-    tokio::spawn(serve(listener, inbox, outbox));
+    tokio::spawn(serve(listener, inbox, outbox, believed));
     Ok(bound)
 }
 
-async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
+/// A client that is being served; dropping it disconnects.
+struct Client {
+    stream_id: StreamId,
+    /// When its last frame was accepted, if one was.
+    believed_at: Option<Instant>,
+    leave: oneshot::Sender<()>,
+}
+
+/// Makes room for one more client if there is any; the clients are in the order in which they came.
+fn make_room(clients: &mut Vec<Client>, now: Instant) -> bool {
+    clients.retain(|client| !client.leave.is_closed());
+    if clients.len() < MAX_CLIENTS {
+        return true;
+    }
+    // One that was never accepted sorts before every time.
+    let quietest = clients.iter().enumerate().min_by_key(|(_, client)| client.believed_at);
+    let leaves = quietest.filter(|(_, client)| {
+        client.believed_at.is_none_or(|at| now.saturating_duration_since(at) >= KEEPS_PLACE_FOR)
+    });
+    let Some((place, _)) = leaves else { return false };
+    clients.remove(place);
+    true
+}
+
+async fn serve(
+    listener: TcpListener,
+    inbox: Sender<Received>,
+    mut outbox: Receiver<Outgoing>,
+    mut believed: Receiver<Origin>,
+) {
     let (all, _) = broadcast::channel::<Outgoing>(CLIENT_QUEUE);
+    let mut clients: Vec<Client> = Vec::new();
     let mut stream_id: StreamId = 0;
     loop {
         tokio::select! {
             accepted = listener.accept() => match accepted {
-                Ok((stream, from)) if all.receiver_count() < MAX_CLIENTS => {
+                Ok((stream, from)) => {
+                    // The notices of the queue come before the choice of who leaves.
+                    while let Ok(origin) = believed.try_recv() {
+                        note_believed(&mut clients, origin);
+                    }
+                    if !make_room(&mut clients, Instant::now()) {
+                        // Dropping the stream closes its connection.
+                        continue;
+                    }
                     if inbox.send(Received::Up(from.to_string())).await.is_err() {
                         return;
                     }
-                    tokio::spawn(serve_client(stream, stream_id, inbox.clone(), all.subscribe()));
+                    let (leave, left) = oneshot::channel();
+                    clients.push(Client { stream_id, believed_at: None, leave });
+                    tokio::spawn(serve_client(stream, stream_id, inbox.clone(), (all.subscribe(), left)));
                     stream_id += 1;
                 }
-                // There are too many clients; dropping this one closes its connection.
-                Ok(_) => {}
                 // This happens when no file descriptor is left, for instance. Trying again at once would use a whole
                 // core.
                 Err(_) => tokio::time::sleep(REOPEN_AFTER).await,
             },
+            Some(origin) = believed.recv() => note_believed(&mut clients, origin),
             outgoing = outbox.recv() => {
                 let Some(outgoing) = outgoing else { return };
                 // It fails when no client is connected, which is no error.
@@ -204,12 +248,18 @@ async fn serve(listener: TcpListener, inbox: Sender<Received>, mut outbox: Recei
     }
 }
 
-/// Serves one client until it disconnects.
+fn note_believed(clients: &mut [Client], origin: Origin) {
+    for client in clients.iter_mut().filter(|client| Origin::Stream(client.stream_id) == origin) {
+        client.believed_at = Some(Instant::now());
+    }
+}
+
+/// Serves one client until it disconnects or loses its place.
 async fn serve_client(
     stream: TcpStream,
     stream_id: StreamId,
     inbox: Sender<Received>,
-    mut all: broadcast::Receiver<Outgoing>,
+    (mut all, left): (broadcast::Receiver<Outgoing>, oneshot::Receiver<()>),
 ) {
     // Without this, TCP delays telemetry to collect more bytes. If the option cannot be set, the delay is accepted.
     let _ = stream.set_nodelay(true);
@@ -232,6 +282,7 @@ async fn serve_client(
     tokio::select! {
         _ = read_all(reader, stream_id, SILENCE, &inbox) => {}
         () = write => {}
+        _ = left => {}
     }
     // It fails only when the owner has dropped the link.
     let _ = inbox.send(Received::Gone(stream_id)).await;
@@ -264,5 +315,41 @@ impl Line for Connection {
         // accepted.
         let _ = stream.set_nodelay(true);
         Ok(stream)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Clients whose last accepted frame is this many seconds old; `None`: they were never accepted.
+    fn clients(ages_s: &[Option<u64>], now: Instant) -> (Vec<Client>, Vec<oneshot::Receiver<()>>) {
+        let client = |(stream_id, age_s): (usize, &Option<u64>)| {
+            let (leave, left) = oneshot::channel();
+            let believed_at = age_s.map(|age_s| now - Duration::from_secs(age_s));
+            (Client { stream_id: stream_id as StreamId, believed_at, leave }, left)
+        };
+        ages_s.iter().enumerate().map(client).unzip()
+    }
+
+    #[test]
+    fn a_new_client_takes_the_place_of_the_oldest_that_said_nothing_valid_and_never_of_a_station_that_speaks()
+    {
+        let now = Instant::now() + Duration::from_hours(1);
+        for (ages_s, leaves) in [
+            ([None, None, None, None], Some(0)),
+            ([Some(0), None, None, Some(20)], Some(1)),
+            ([Some(0), Some(11), Some(30), Some(9)], Some(2)),
+            ([Some(0), Some(1), Some(2), Some(9)], None),
+        ] {
+            let (mut served, mut left) = clients(&ages_s, now);
+            assert_eq!(make_room(&mut served, now), leaves.is_some(), "{ages_s:?}");
+            let gone =
+                left.iter_mut().position(|left| left.try_recv() != Err(oneshot::error::TryRecvError::Empty));
+            assert_eq!(gone, leaves, "{ages_s:?}");
+        }
+        let (mut served, mut left) = clients(&[Some(0); 4], now);
+        left.pop();
+        assert!(make_room(&mut served, now), "one that has disconnected takes no place");
     }
 }
