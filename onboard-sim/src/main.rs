@@ -31,7 +31,7 @@ enum Command {
     ///
     /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
     ///
-    /// Exit codes: 0 landed inside every limit (from apogee: the limits of the legs); 1 error; 2 usage; 3 ended
+    /// Exit codes: 0 landed inside every limit (from apogee: on its legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     #[command(
         after_help = "Examples:\n  onboard-sim fly --profile mk2 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"

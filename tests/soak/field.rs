@@ -125,7 +125,7 @@ impl Field {
             }
         }
         // One in a hundred hits the ground: the station has to live through that, too.
-        let how = vehicle.wait_for_line("limits of the legs");
+        let how = vehicle.wait_for_line("the legs");
         vehicle.wait_for_line("disarmed");
         self.proxy.impair(IDEAL);
         for terminal in [&*screen, &*watching, &*distant] {

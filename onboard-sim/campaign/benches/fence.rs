@@ -53,7 +53,7 @@ fn fly(name: &str, recipe: &Recipe, flights: u64) {
     println!("{name:40} {landed:4} of {flights:4}  {digits:016x}");
 }
 
-/// The hash of one flight, and whether it landed by its legs.
+/// The hash of one flight, and whether it landed on its legs.
 fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
     let mut flight = Sortie::new(recipe, number).unwrap();
     let mut hash = Sha256::new();

@@ -175,10 +175,18 @@ row! {
     strict: bool,
     /// Within the limits of the legs, and upright afterwards.
     legs: bool,
-    /// Why the flight did not land within the limits of the legs; empty if it did.
+    /// Why the flight did not land on its legs; empty if it did.
     failure: String,
     /// How the vehicle came to rest; empty if it did not.
     rest: String,
+    /// Largest share of a leg's stroke that was used, if legs can give way.
+    stroke_used: Option<f64>,
+    /// Largest force at a foot over the leg's strength, if legs can give way.
+    strength_used: Option<f64>,
+    /// Smallest distance of nozzle and body from the ground since contact, if legs can give way, m.
+    clearance_m: Option<f64>,
+    /// Largest tilt since contact, if legs can give way, degrees.
+    leaned_deg: Option<f64>,
     /// Last phase.
     phase: String,
     /// Plans that converged and land.

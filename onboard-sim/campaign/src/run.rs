@@ -50,7 +50,7 @@ pub struct Progress {
     pub flown: u64,
     /// Flights that this run has to fly.
     pub of: u64,
-    /// Flights of this run that landed within the limits of the legs.
+    /// Flights of this run that landed on their legs.
     pub legs: u64,
     /// Flights of this run that landed inside Table 2.
     pub strict: u64,

@@ -9,7 +9,7 @@ use sim::fault::{FaultError, TimedFault};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Expected {
-    /// The flight lands within the limits of the legs.
+    /// The flight lands on its legs.
     Land,
     /// The flight may not land, but the vehicle uses what still works: the motor is lit inside the gate, and the
     /// vehicle reaches the ground more slowly than without the motor.

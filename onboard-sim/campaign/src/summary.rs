@@ -36,13 +36,13 @@ const TOLD: [&str; 14] = [
 pub struct Summary {
     /// The manifest of the campaign.
     pub manifest: Manifest,
-    /// Flights that landed within the limits of the legs.
+    /// Flights that landed on their legs.
     pub legs: Share,
     /// Flights that landed inside the landing paper's Table 2.
     pub strict: Share,
     /// What perfect information lands; `None` if it lands no flight.
     pub attainable: Option<Attainable>,
-    /// Why the others did not land within the limits of the legs, the most frequent reason first.
+    /// Why the others did not, the most frequent reason first.
     pub failures: Vec<Failures>,
     /// Ignitions while a check of the gate failed. This must be zero.
     pub ignitions_outside_gate: u64,
@@ -60,7 +60,7 @@ pub struct Attainable {
     pub command_height_m: f64,
     /// Flights that it lands.
     pub attainable: Share,
-    /// Of these, the flights that landed within the limits of the legs.
+    /// Of these, the flights that landed on their legs.
     pub landed: Share,
     /// Flights that landed although they are not attainable from that height. Their controller chose another height for
     /// each flight.
@@ -140,7 +140,7 @@ pub struct Sensitivity {
     /// The quantity, with its unit.
     pub column: &'static str,
     pub median_deviation: f64,
-    /// Fraction of the inner half that landed within the limits of the legs.
+    /// Fraction of the inner half that landed on their legs.
     pub inner: Share,
     /// The same fraction of the outer half.
     pub outer: Share,

@@ -145,6 +145,7 @@ impl Tally {
         let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
+        let strain = outcome.rest.and_then(|rest| rest.strain);
         let attainable = attainable::window(self.flight.mission(), drawn, apogee);
         Row {
             number: self.number,
@@ -189,7 +190,11 @@ impl Tally {
             strict: outcome.strict,
             legs: outcome.legs,
             failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
-            rest: outcome.rest.map_or("", rest_name).to_owned(),
+            rest: outcome.rest.map_or("", |rest| rest_name(rest.outcome)).to_owned(),
+            stroke_used: strain.map(|strain| strain.stroke_used),
+            strength_used: strain.map(|strain| strain.strength_used),
+            clearance_m: strain.map(|strain| strain.clearance_m),
+            leaned_deg: strain.map(|strain| strain.tilt_rad.to_degrees()),
             phase: outcome.phase.name().to_owned(),
             plans_converged: plans(ControlLevel::Converged),
             plans_best_feasible: plans(ControlLevel::BestFeasible),

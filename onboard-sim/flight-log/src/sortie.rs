@@ -19,11 +19,10 @@ use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::{Dispersion, DispersionError};
 use sim::limits::Limits;
-use sim::outcome::Failure;
 use sim::outside::Watch;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use world::Touchdown;
+use world::{Strain, Touchdown};
 
 use crate::estimate::{estimate_to_log, motor_to_log, state_to_log, vector_to_log};
 use crate::frame::frame_to_log;
@@ -167,15 +166,18 @@ pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> V
     records
 }
 
-/// The verdict on a finished flight, by the limits of its legs and by the landing paper's Table 2; `None` if it did not
-/// come down. Any other failure (a parachute, tipping over) is an additional limit that allows nothing.
+/// The verdict on a finished flight, by its legs and by the landing paper's Table 2; `None` if it did not come down. Legs that can
+/// give way are judged by what they bore, others by their limits at contact. Any other failure (a parachute, tipping over) is
+/// an additional limit that allows nothing.
 pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
     let both = Limits::of(flight.mission());
-    let mut limits = limits_to_log(&both.by_legs(touchdown).1);
-    let of_legs = [Failure::Vertical, Failure::Lateral, Failure::Tilt, Failure::Rate];
-    if let Some(failure) = outcome.failure.filter(|failure| !of_legs.contains(failure)) {
+    let mut limits = match outcome.rest.and_then(|rest| rest.strain) {
+        Some(strain) => borne(&strain),
+        None => limits_to_log(&both.by_legs(touchdown).1),
+    };
+    if let Some(failure) = outcome.failure.filter(|failure| !failure.is_of_a_limit()) {
         limits.push(v1::LimitResult {
             name: failure.name().to_owned(),
             value: 1.0,
@@ -194,6 +196,22 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
         table_2: limits_to_log(&both.by_table_2(touchdown).1),
         ending: Some(outcome.ending(aborted).to_string()),
     })
+}
+
+/// What the legs bore and what they bear: the shares of stroke and strength.
+fn borne(strain: &Strain) -> Vec<v1::LimitResult> {
+    let share = |name: &str, value: f64, passed: bool| v1::LimitResult {
+        name: name.to_owned(),
+        value,
+        minimum: 0.0,
+        maximum: 1.0,
+        unit: String::new(),
+        passed,
+    };
+    vec![
+        share("stroke used", strain.stroke_used, strain.stroke_used < 1.0),
+        share("leg load", strain.strength_used, strain.strength_used <= 1.0),
+    ]
 }
 
 /// The state at contact in the world's x-z plane.

@@ -25,8 +25,8 @@ impl fmt::Display for FlightEnding<'_> {
         }
         match (self.landed, self.table_2, self.failure) {
             (true, Some(true), _) => out.write_str("LANDED inside every limit"),
-            (true, Some(false), _) => out.write_str("LANDED within the limits of the legs, outside Table 2"),
-            (true, None, _) => out.write_str("LANDED within the limits of the legs; Table 2 is not known"),
+            (true, Some(false), _) => out.write_str("LANDED on its legs, outside Table 2"),
+            (true, None, _) => out.write_str("LANDED on its legs; Table 2 is not known"),
             (false, _, Some(UNDER_PARACHUTE)) => out.write_str("DOWN UNDER THE PARACHUTE, not landed"),
             (false, _, Some(failure)) => write!(out, "NOT LANDED: {failure}"),
             (false, _, None) => out.write_str("NOT LANDED: outside a limit"),

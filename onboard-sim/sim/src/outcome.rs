@@ -1,8 +1,9 @@
-//! How a flight ended, judged by the landing paper's Table 2 and by the limits of the legs.
+//! How a flight ended, judged by the landing paper's Table 2 and by its legs: by their limits at contact, or, where they can give
+//! way, by whether the vehicle stands undamaged.
 
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use world::{RestOutcome, Touchdown};
+use world::{Rest, RestOutcome, Strain, Touchdown};
 
 use crate::ending::{FlightEnding, UNDER_PARACHUTE};
 
@@ -25,6 +26,12 @@ pub enum Failure {
     Rate,
     /// The vehicle was within the limits at contact but fell over.
     TippedOver,
+    /// Nozzle or body struck the ground, of a vehicle whose legs can give way.
+    Struck,
+    /// A leg gave way by all of its stroke.
+    StrokeUsedUp,
+    /// A foot bore more than its leg's strength.
+    Overload,
     /// The vehicle had not come to rest when the time limit of a flight ended.
     TimeOut,
     /// The state was not a number.
@@ -43,9 +50,20 @@ impl Failure {
             Self::Tilt => "tilt",
             Self::Rate => "rotation rate",
             Self::TippedOver => "tipped over",
+            Self::Struck => "body strike",
+            Self::StrokeUsedUp => "stroke used up",
+            Self::Overload => "leg overloaded",
             Self::TimeOut => "time-out",
             Self::NotANumber => "not a number",
         }
+    }
+
+    /// A limit of the legs tells it: at contact, or of what they bear.
+    pub const fn is_of_a_limit(self) -> bool {
+        matches!(
+            self,
+            Self::Vertical | Self::Lateral | Self::Tilt | Self::Rate | Self::StrokeUsedUp | Self::Overload
+        )
     }
 }
 
@@ -55,14 +73,14 @@ pub struct Outcome {
     /// The first contact.
     pub touchdown: Option<Touchdown>,
     /// How the vehicle came to rest.
-    pub rest: Option<RestOutcome>,
+    pub rest: Option<Rest>,
     /// Last phase.
     pub phase: Phase,
     /// Inside Table 2 at contact and upright afterwards.
     pub strict: bool,
-    /// Within the limits of the legs at contact and upright afterwards.
+    /// Within the limits of the legs at contact and upright afterwards; of legs that can give way: it stands undamaged.
     pub legs: bool,
-    /// Why it was not within the limits of the legs, or not upright.
+    /// Why it did not land on its legs.
     pub failure: Option<Failure>,
 }
 
@@ -84,7 +102,7 @@ pub struct Ending {
     /// The first contact.
     pub touchdown: Option<Touchdown>,
     /// How the vehicle came to rest.
-    pub rest: Option<RestOutcome>,
+    pub rest: Option<Rest>,
     /// Last phase.
     pub phase: Phase,
     /// The motor was commanded to light.
@@ -99,7 +117,7 @@ pub struct Ending {
 
 /// Judges how a flight ended.
 pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
-    let upright = ending.rest == Some(RestOutcome::Upright);
+    let upright = ending.rest.is_some_and(|rest| rest.outcome == RestOutcome::Upright);
     let (strict, failure) = match &ending.touchdown {
         _ if !ending.finite => (false, Some(Failure::NotANumber)),
         None => (false, Some(Failure::TimeOut)),
@@ -107,19 +125,11 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
         Some(_) if !ending.ignited => (false, Some(Failure::NoIgnition)),
         Some(_) if !ending.lit => (false, Some(Failure::NoLight)),
         Some(touchdown) => {
-            let legs = &mission.leg_limits;
-            let too_much = [
-                (touchdown.vertical_m_s.abs(), legs.vertical_m_s, Failure::Vertical),
-                (touchdown.lateral_m_s, legs.lateral_m_s, Failure::Lateral),
-                (touchdown.tilt_rad, legs.tilt_deg.to_radians(), Failure::Tilt),
-                (touchdown.rate_rad_s, legs.rate_deg_s.to_radians(), Failure::Rate),
-            ];
-            let first = too_much
-                .iter()
-                .find(|(found, most, _)| found.is_nan() || found > most)
-                .map(|(_, _, failure)| *failure);
-            let failure = first.or((!upright).then_some(Failure::TippedOver));
-            (upright && inside_table_2(mission, touchdown), failure)
+            let damage = match ending.rest {
+                Some(Rest { outcome, strain: Some(strain), .. }) => damage(outcome, &strain),
+                _ => beyond_limits(mission, touchdown).or((!upright).then_some(Failure::TippedOver)),
+            };
+            (upright && inside_table_2(mission, touchdown), damage)
         }
     };
     Outcome {
@@ -129,6 +139,30 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
         strict: strict && failure.is_none(),
         legs: failure.is_none(),
         failure,
+    }
+}
+
+/// The first limit of the legs that the contact broke.
+fn beyond_limits(mission: &Mission, touchdown: &Touchdown) -> Option<Failure> {
+    let legs = &mission.leg_limits;
+    let too_much = [
+        (touchdown.vertical_m_s.abs(), legs.vertical_m_s, Failure::Vertical),
+        (touchdown.lateral_m_s, legs.lateral_m_s, Failure::Lateral),
+        (touchdown.tilt_rad, legs.tilt_deg.to_radians(), Failure::Tilt),
+        (touchdown.rate_rad_s, legs.rate_deg_s.to_radians(), Failure::Rate),
+    ];
+    let first = too_much.iter().find(|(found, most, _)| found.is_nan() || found > most);
+    first.map(|(_, _, failure)| *failure)
+}
+
+/// What is broken of a vehicle whose legs can give way.
+fn damage(rest: RestOutcome, strain: &Strain) -> Option<Failure> {
+    match rest {
+        RestOutcome::TippedOver => Some(Failure::TippedOver),
+        RestOutcome::BodyStrike => Some(Failure::Struck),
+        RestOutcome::Upright if strain.strength_used > 1.0 => Some(Failure::Overload),
+        RestOutcome::Upright if strain.stroke_used >= 1.0 => Some(Failure::StrokeUsedUp),
+        RestOutcome::Upright => None,
     }
 }
 

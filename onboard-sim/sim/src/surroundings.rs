@@ -118,7 +118,7 @@ impl Surroundings {
     pub(crate) fn outcome(&self, mission: &Mission, phase: Phase, ignited: bool) -> Outcome {
         let ending = Ending {
             touchdown: self.world.touchdown().copied(),
-            rest: self.world.rest().map(|rest| rest.outcome),
+            rest: self.world.rest().copied(),
             phase,
             ignited,
             lit: self.world.thrust_begins_s().is_some(),

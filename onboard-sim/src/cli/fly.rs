@@ -225,7 +225,7 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     if let (Some(judged), Some(verdict)) = (&summary.judged, &summary.verdict) {
         let boot_s = judged.impact.time_s;
         writeln!(out, "touchdown at T+{:.3} s, {boot_s:.3} s since power-up", verdict.time_s)?;
-        writeln!(out, "by the limits of the legs:")?;
+        writeln!(out, "by what its legs bear:")?;
         print_limits(&mut out, &verdict.limits)?;
         writeln!(out, "by the landing paper's Table 2:")?;
         print_limits(&mut out, &verdict.table_2)?;

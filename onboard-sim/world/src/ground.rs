@@ -1,7 +1,11 @@
 //! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
 //! vehicle is broken if any other part touches the ground.
+//!
+//! A leg may have a block that crushes in series with its spring and damper. Its foot then moves along the body's axis and
+//! stays where it was pushed. The force that crushes it is taken along the ground's normal: at 10 degrees it is 1.5 % more along
+//! the axis. A foot has no mass of its own: the body carries it, and the block stops a little more than it has to.
 
-use flight::vehicle::airframe::Airframe;
+use flight::vehicle::airframe::{Airframe, Crush};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
 
@@ -46,6 +50,26 @@ pub struct Rest {
     pub outcome: RestOutcome,
     /// Angle between nose and vertical, rad.
     pub tilt_rad: f64,
+    /// What its legs have borne, if they can give way.
+    pub strain: Option<Strain>,
+}
+
+/// What legs that can give way have borne since the first contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strain {
+    /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
+    pub stroke_used: f64,
+    /// Largest force at a foot over the leg's strength.
+    pub strength_used: f64,
+    /// Smallest distance of nozzle and body from the ground, m; 0 where they struck it.
+    pub clearance_m: f64,
+    /// Largest angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+}
+
+impl Strain {
+    const NONE: Self =
+        Self { stroke_used: 0.0, strength_used: 0.0, clearance_m: f64::INFINITY, tilt_rad: 0.0 };
 }
 
 /// How a vehicle comes to rest.
@@ -65,8 +89,12 @@ pub(crate) struct Ground {
     stiffness_n_m: f64,
     damping_n_s_m: f64,
     friction: f64,
-    /// Positions of the feet relative to the nozzle exit, m.
+    crush: Option<Crush>,
+    /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher foot.
     feet_m: [Vector3<f64>; 4],
+    /// How far each leg has given way, m.
+    given_m: [f64; 4],
+    strain: Strain,
     /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
     hull_m: [Vector3<f64>; 8],
     /// Rise of the ground along world x and y, metre per metre.
@@ -99,7 +127,10 @@ impl Ground {
             stiffness_n_m: legs.stiffness_n_m,
             damping_n_s_m: legs.damping_n_s_m,
             friction: legs.friction_coefficient,
+            crush: legs.crush,
             feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
+            given_m: [0.0; 4],
+            strain: Strain::NONE,
             hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
             rise,
             still_s: 0.0,
@@ -113,11 +144,15 @@ impl Ground {
 
     /// Height of the vehicle's lowest point above the ground, m.
     pub(crate) fn clearance_m(&self, state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
+        self.lowest_m(&self.feet_m, state, cg_m).min(self.lowest_m(&self.hull_m, state, cg_m))
+    }
+
+    /// Height of the lowest of some places of the vehicle above the ground, m.
+    fn lowest_m(&self, places_m: &[Vector3<f64>], state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
         let up_in_body = state.world_from_body.inverse_transform_vector(&self.upwards());
-        let lowest = |places: &[Vector3<f64>]| {
-            places.iter().fold(f64::INFINITY, |low, place| low.min((place - cg_m).dot(&up_in_body)))
-        };
-        state.position_m.dot(&self.upwards()) + lowest(&self.feet_m).min(lowest(&self.hull_m))
+        let below_cg =
+            places_m.iter().fold(f64::INFINITY, |low, place| low.min((place - cg_m).dot(&up_in_body)));
+        state.position_m.dot(&self.upwards()) + below_cg
     }
 
     /// What touches the ground.
@@ -140,23 +175,65 @@ impl Ground {
         world_from_body: &Rotation3<f64>,
         cg_m: &Vector3<f64>,
     ) {
+        for foot in 0..self.feet_m.len() {
+            if let Some((_, force_n)) = self.on_foot(foot, state, world_from_body, cg_m) {
+                let place_m = self.feet_m[foot] - cg_m;
+                load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
+            }
+        }
+    }
+
+    /// How far the ground has pushed a foot in, m, and the force on it in the world, N; `None` in the air.
+    fn on_foot(
+        &self,
+        foot: usize,
+        state: &RigidState,
+        world_from_body: &Rotation3<f64>,
+        cg_m: &Vector3<f64>,
+    ) -> Option<(f64, Vector3<f64>)> {
         let upwards = self.upwards();
         let length = upwards.norm();
         let normal = upwards / length;
-        for foot_m in &self.feet_m {
-            let place_m = foot_m - cg_m;
-            let depth_m = -(state.position_m + world_from_body * place_m).dot(&upwards) / length;
-            if depth_m <= 0.0 {
-                continue;
-            }
-            let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
-            let rising_m_s = sliding.dot(&normal);
-            let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
-            sliding -= normal * rising_m_s;
-            let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
-            let force_n = sliding * (-self.friction * normal_n / fading) + normal * normal_n;
-            load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
+        let place_m = self.feet_m[foot] - cg_m;
+        let depth_m = -(state.position_m + world_from_body * place_m).dot(&upwards) / length;
+        if depth_m <= 0.0 {
+            return None;
         }
+        let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
+        let rising_m_s = sliding.dot(&normal);
+        let mut normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
+        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
+            normal_n = normal_n.min(crush.force_n);
+        }
+        sliding -= normal * rising_m_s;
+        let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
+        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n))
+    }
+
+    /// Legs that are pushed in further than their springs reach at the force that crushes them give way.
+    pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
+        let Some(crush) = self.crush else { return };
+        let world_from_body = state.world_from_body.to_rotation_matrix();
+        for foot in 0..self.feet_m.len() {
+            let Some((depth_m, force_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
+                continue;
+            };
+            let beyond_m = depth_m - crush.force_n / self.stiffness_n_m;
+            let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
+            self.given_m[foot] += gives_m;
+            self.feet_m[foot].x += gives_m;
+            let strain = &mut self.strain;
+            strain.stroke_used = strain.stroke_used.max(self.given_m[foot] / crush.stroke_m);
+            strain.strength_used = strain.strength_used.max(force_n.norm() / crush.strength_n);
+        }
+        let hull_m = self.lowest_m(&self.hull_m, state, cg_m);
+        self.strain.clearance_m = self.strain.clearance_m.min(hull_m.max(0.0));
+        self.strain.tilt_rad = self.strain.tilt_rad.max(state.tilt_rad());
+    }
+
+    /// What the legs have borne so far, if they can give way and have met the ground.
+    pub(crate) fn strain(&self) -> Option<Strain> {
+        self.strain.clearance_m.is_finite().then_some(self.strain)
     }
 
     /// Takes a further time on the ground, s, and returns how the vehicle came to rest, if it has. It is not at rest

@@ -29,7 +29,7 @@ pub mod wind;
 pub mod world;
 
 pub use battery::Battery;
-pub use ground::{Rest, RestOutcome, Touchdown};
+pub use ground::{Rest, RestOutcome, Strain, Touchdown};
 pub use hanging::Hanging;
 pub use motor::TrueBurn;
 pub use truth::{AscentTruth, Truth};

@@ -550,7 +550,7 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
     };
     let contact = info.clocks.words(verdict.contact());
     row(output, "", &format!("touchdown at {contact}"))?;
-    let by = if verdict.table_2.is_empty() { "" } else { "by the limits of the legs:" };
+    let by = if verdict.table_2.is_empty() { "" } else { "by what its legs bear:" };
     for (title, limits) in [(by, &verdict.limits), ("by the landing paper's Table 2:", &verdict.table_2)] {
         if !title.is_empty() && !limits.is_empty() {
             row(output, "", title)?;

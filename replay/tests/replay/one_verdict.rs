@@ -34,7 +34,7 @@ fn both_verdicts_are_shown_with_every_row() {
         assert_eq!(ending.contains("every limit"), verdict.landed && strict, "{ending}");
         let (_, stdout, _) = run(&mut replay("info", log));
         for words in
-            ["by the limits of the legs:", "by the landing paper's Table 2:", "rotation rate", "pitch rate"]
+            ["by what its legs bear:", "by the landing paper's Table 2:", "rotation rate", "pitch rate"]
         {
             assert!(stdout.contains(words), "{words} is not in {stdout}");
         }

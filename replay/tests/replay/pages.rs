@@ -48,7 +48,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
     let order = [
         "LANDED ",
         "Touchdown at T+",
-        "by the limits of the legs",
+        "by what its legs bear",
         "vertical speed",
         "by the landing paper's Table 2",
         "ignition delay",

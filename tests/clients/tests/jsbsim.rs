@@ -16,7 +16,7 @@ use sim::draw::{Draw, draw};
 use sim::outcome::{Ending, Outcome, judge};
 use sim::sortie::Sortie;
 use world::sensors::believed_start;
-use world::{RestOutcome, Touchdown};
+use world::{Rest, RestOutcome, Touchdown};
 
 const FLIGHTS: u64 = 20;
 /// Flights of one run of the bridge.
@@ -96,7 +96,7 @@ fn judged(mission: &Mission, told: &Value) -> Outcome {
         mission,
         &Ending {
             touchdown,
-            rest,
+            rest: rest.map(|outcome| Rest { time_s: number("time_s"), outcome, tilt_rad: 0.0, strain: None }),
             phase: flight::rules::phase::Phase::Touchdown,
             ignited,
             lit: ignited,

@@ -161,7 +161,7 @@ impl Landing {
 pub struct Flown {
     /// Name of the set of dispersions.
     pub set: String,
-    /// Landed within the limits of the legs.
+    /// Landed on its legs.
     pub legs: Share,
     /// Landed inside the landing paper's Table 2.
     pub strict: Share,

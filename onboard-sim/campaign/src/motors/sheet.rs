@@ -84,8 +84,12 @@ impl Card {
                      --flights {} --out flights",
                     self.recipe.seed, self.winds.today.legs.of
                 ),
-                format!("Distances of people: {}. The fence of the mission ({:.0} m) only decides whether the landing motor may light.", Rule::SOURCE, self.recipe.mission.gate.fence_radius_m),
-                "A rate is the share of simulated flights that landed within the limits of the legs, with Wilson's 95 % \
+                format!(
+                    "Distances of people: {}. The fence of the mission ({:.0} m) only decides whether the landing motor may light.",
+                    Rule::SOURCE,
+                    self.recipe.mission.gate.fence_radius_m
+                ),
+                "A rate is the share of simulated flights that landed on their legs, with Wilson's 95 % \
                  interval. More flights make it narrower; only flights make it true."
                     .to_owned(),
             ],
@@ -294,7 +298,7 @@ impl Card {
         let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
         let chute_m_s = libm::sqrt(2.0 * choice.mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
         let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
-        vec![
+        let mut checks = vec![
             format!("Weigh the vehicle with its motor: {:.3} kg, to 5 g.", choice.mass.loaded_kg),
             format!(
                 "Balance it on an edge: {:.0} mm above the nozzle, to 3 mm.",
@@ -315,7 +319,14 @@ impl Card {
             format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
             "After the flight: a motor that was not lit is live. Nobody approaches for 60 s; then the pin first."
                 .to_owned(),
-        ]
+        ];
+        if let Some(crush) = airframe.legs.crush {
+            checks.insert(2, format!(
+                "Each leg: its block new and unmarked, its foot free to rise by {:.0} mm. A block that has given way is replaced.",
+                1e3 * crush.stroke_m
+            ));
+        }
+        checks
     }
 }
 

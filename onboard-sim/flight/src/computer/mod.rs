@@ -322,7 +322,7 @@ impl LogState {
 /// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rehearsed {
-    /// It found plans, and landed within the limits of the legs.
+    /// It found plans, and landed on its legs.
     pub warm: bool,
     /// The result in words.
     pub found: String,

@@ -6,6 +6,7 @@
 use alloc::string::String;
 use serde::Deserialize;
 
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::fins::FinModel;
 
 /// A vehicle.
@@ -298,6 +299,20 @@ pub struct Legs {
     pub damping_n_s_m: f64,
     /// Friction coefficient between foot and ground.
     pub friction_coefficient: f64,
+    /// What gives way in each leg; without it the spring takes any load and has no end.
+    pub crush: Option<Crush>,
+}
+
+/// A block in each leg that crushes at a nearly constant force, as honeycomb and foam do, and does not come back.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crush {
+    /// Vertical force at the foot at which the leg gives way, N.
+    pub force_n: f64,
+    /// How far the foot can give way, m.
+    pub stroke_m: f64,
+    /// Largest force at the foot, in any direction, that the leg bears, N.
+    pub strength_n: f64,
 }
 
 /// The recovery parachute, attached at the nose.
@@ -421,6 +436,27 @@ fn recovery(airframe: &Airframe) -> Check {
     positive("legs.stiffness_n_m", legs.stiffness_n_m)?;
     not_negative("legs.damping_n_s_m", legs.damping_n_s_m)?;
     not_negative("legs.friction_coefficient", legs.friction_coefficient)?;
+    if let Some(crush) = &legs.crush {
+        let weight_n = airframe.mass.loaded_kg * STANDARD_GRAVITY_M_S2;
+        require(
+            crush.force_n.is_finite() && crush.force_n > 0.5 * weight_n,
+            "legs.crush.force_n",
+            crush.force_n,
+            "a finite number above half the loaded weight (the vehicle may stand on two feet)",
+        )?;
+        require(
+            crush.stroke_m > 0.0 && crush.stroke_m < -legs.foot_station_m,
+            "legs.crush.stroke_m",
+            crush.stroke_m,
+            "above 0 and below -foot_station_m (the nozzle stays above the ground)",
+        )?;
+        require(
+            crush.strength_n.is_finite() && crush.strength_n > crush.force_n,
+            "legs.crush.strength_n",
+            crush.strength_n,
+            "a finite number above legs.crush.force_n (the block gives way before the leg breaks)",
+        )?;
+    }
     positive("parachute.area_m2", parachute.area_m2)?;
     positive("parachute.drag_coefficient", parachute.drag_coefficient)?;
     not_negative("parachute.ejection_delay_s", parachute.ejection_delay_s)?;

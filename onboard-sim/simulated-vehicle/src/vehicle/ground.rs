@@ -58,7 +58,7 @@ impl Ground {
             self.judged_by_table_2 = Some(judged(limits.by_table_2(touchdown), outcome.strict));
             let Judged { impact, verdict, .. } = by_legs;
             events.push(VehicleEvent::Verdict { impact, verdict: Box::new(verdict) });
-            let words = outcome_in_words(&outcome, world.rest().map(|rest| rest.outcome));
+            let words = outcome_in_words(&outcome);
             events.push(VehicleEvent::Text { severity: Severity::Notice, text: words });
         }
         let waited_s = world.rest().map_or(f64::INFINITY, |rest| world.time_s() - rest.time_s);
@@ -78,14 +78,20 @@ fn contact(vertical_m_s: f64) -> VehicleEvent {
     VehicleEvent::Text { severity: Severity::Notice, text }
 }
 
-fn outcome_in_words(outcome: &Outcome, rest: Option<RestOutcome>) -> String {
-    let stands = match rest {
+fn outcome_in_words(outcome: &Outcome) -> String {
+    let stands = match outcome.rest.map(|rest| rest.outcome) {
         Some(RestOutcome::Upright) => "stands",
         Some(RestOutcome::TippedOver) => "tipped over",
         Some(RestOutcome::BodyStrike) => "hit the ground with its body",
         None => "is not at rest",
     };
     let why = outcome.failure.map_or_else(String::new, |failure| format!(" ({})", failure.name()));
-    let legs = if outcome.legs { "kept" } else { "broken" };
-    format!("it {stands}; limits of the legs {legs}{why}")
+    if let Some(strain) = outcome.rest.and_then(|rest| rest.strain) {
+        let [stroke, load] = [strain.stroke_used, strain.strength_used].map(|share| 100.0 * share);
+        let undamaged = if outcome.legs { ", undamaged" } else { "" };
+        format!("it {stands}{undamaged}{why}; stroke {stroke:.0} %, leg load {load:.0} %")
+    } else {
+        let legs = if outcome.legs { "kept" } else { "broken" };
+        format!("it {stands}; limits of the legs {legs}{why}")
+    }
 }

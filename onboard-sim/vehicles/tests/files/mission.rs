@@ -83,8 +83,9 @@ fn mk3_flies_with_the_numbers_of_mk2() {
     let (name, summary, airframe) = (mk2.name.clone(), mk2.summary.clone(), mk2.airframe.clone());
     assert!(mk3.estimator.gnss_age_jitter_s > 0.0 && mk3.estimator.barometer_suction > 0.0);
     let estimator = EstimatorConfig { gnss_age_jitter_s: 0.0, barometer_suction: 0.0, ..mk3.estimator };
-    // Only mk2 hangs below a drone.
-    assert_eq!(Mission { name, summary, airframe, estimator, drop: mk2.drop, ..mk3 }, mk2);
+    // Only mk2 hangs below a drone, and mk3's legs bear more.
+    let (drop, leg_limits) = (mk2.drop, mk2.leg_limits);
+    assert_eq!(Mission { name, summary, airframe, estimator, drop, leg_limits, ..mk3 }, mk2);
 }
 
 #[test]

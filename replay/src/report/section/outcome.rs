@@ -24,7 +24,7 @@ pub(super) fn verdict(_: &Flight, info: &Info) -> String {
     if verdict.table_2.is_empty() {
         html += &limits("touchdown", &verdict.limits);
     } else {
-        html += &limits("by the limits of the legs", &verdict.limits);
+        html += &limits("by what its legs bear", &verdict.limits);
         html += &limits("by the landing paper's Table 2", &verdict.table_2);
     }
     html

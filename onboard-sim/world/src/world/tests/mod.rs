@@ -1,6 +1,7 @@
 mod ascent;
 mod invariants;
 mod landing;
+mod legs;
 mod mismatch;
 
 use core::f64::consts::FRAC_PI_2;
