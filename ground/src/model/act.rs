@@ -80,7 +80,7 @@ pub const DEFINITIONS: [Definition; 40] = [
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
     define(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
-    define(Act::Tap, "tap", 'T', "two people: tap at least every 2 s, from the start to the release"),
+    define(Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
     define(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
     define(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
     define(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),

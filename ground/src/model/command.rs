@@ -7,7 +7,7 @@ use protocol::dialect::{MavCmd, MavResult, TdAct, TdInterlock, TdPhase};
 use protocol::identity::Address;
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, GONE_AFTER, Model, Seat, Settings, Vehicle, is_on_pad, words};
+use super::{Ask, GONE_AFTER, LinkState, Model, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words};
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little over two
 /// heartbeats.
@@ -277,9 +277,18 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
 }
 
 /// Why no command reaches the vehicle that is meant.
-fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
-    let unheard = (!model.link.state(now).carries()).then(|| "the vehicle is not heard".to_owned());
-    unheard.or_else(|| why_nothing_moves(model, now))
+pub fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
+    why_old(model, now).or_else(|| why_nothing_moves(model, now))
+}
+
+/// Why what is known of the vehicle says nothing about the present: it is silent, or what it says arrives late.
+fn why_old(model: &Model, now: Duration) -> Option<String> {
+    if !model.link.state(now).carries() {
+        return Some("the vehicle is not heard".to_owned());
+    }
+    let LinkState::Lost(age) = model.link.down(now) else { return None };
+    let (age_s, most_s) = (age.as_secs_f64(), RED_AFTER.as_secs());
+    Some(format!("what the vehicle said last is {age_s:.1} s old, at most {most_s} s would do"))
 }
 
 /// Why this seat does not act with the station's key. A hold and an abort are anybody's.

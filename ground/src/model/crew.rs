@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Model, why_not_seat};
 
-/// How long a countdown may continue without a commanding screen.
-pub const UNATTENDED_MAX: Duration = Duration::from_secs(2);
+/// How long a countdown may continue without a commanding screen. The vehicle is to be held 1 s after the last one has gone: the
+/// rest is for the hold and its way.
+pub const UNATTENDED_MAX: Duration = Duration::from_millis(800);
 
 /// The seats at commanding screens: the station's own screen and the attached ones without `--watch`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -143,6 +143,30 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     }
 }
 
+/// In a countdown the vehicle notices after this long what is lost, s: station, screen, tap or link.
+const NOTICED_AFTER_S: f64 = 1.0;
+
+impl Model {
+    /// The time before the release, as it is shown here, from which on a hold comes too late, s: what is shown is old by the way
+    /// down, and a hold takes the way up. `None` if the vehicle does not tell it.
+    pub fn last_hold_s(&self) -> Option<f64> {
+        let round_trip = self.link.round_trip.unwrap_or_default();
+        self.vehicle.last_hold_s().map(|last_s| last_s + round_trip.as_secs_f64())
+    }
+
+    /// Whether the countdown runs and a hold comes too late.
+    pub fn is_past_hold(&self, now: Duration) -> bool {
+        let left_s = self.vehicle.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
+        left_s.zip(self.last_hold_s()).is_some_and(|(left_s, last_s)| left_s <= last_s)
+    }
+
+    /// What a loss does to the countdown, in one sentence: station, screen, tap or link.
+    pub fn loss_in_words(&self) -> Option<String> {
+        let last_s = self.vehicle.last_hold_s()? + NOTICED_AFTER_S;
+        Some(format!("What is lost before T-{last_s:.0} s holds the countdown; what is lost later may fly."))
+    }
+}
+
 /// The operator who held the countdown, or whose silence did.
 fn held_by(vehicle: &Vehicle) -> Option<String> {
     let number = vehicle.told::<TD_CREW_DATA>().map(|crew| crew.value.held_by)?;
@@ -153,20 +177,20 @@ fn held_by(vehicle: &Vehicle) -> Option<String> {
 /// Why the countdown was held and what happens next; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
-    let whom = if armed_here { "this station" } else { "its station" };
+    let theirs = || held_by(vehicle).unwrap_or_else(|| "its station".to_owned());
+    let whom = if armed_here { "this station".to_owned() } else { theirs() };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
-        TdHold::TD_HOLD_UPLINK_SILENT if held_by(vehicle).is_some() && !armed_here => {
-            format!("the vehicle did not hear {} for 2 s", held_by(vehicle).unwrap_or_default())
-        }
-        TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 2 s"),
+        TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 1 s"),
+        TdHold::TD_HOLD_STATION_DEAF => format!("{whom} did not hear the vehicle for 1 s"),
+        TdHold::TD_HOLD_LOG_FAILED => "the vehicle's log has failed".to_owned(),
         TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
             Some(who) => format!("{who} asked for it"),
             None => "a station asked for it".to_owned(),
         },
         TdHold::TD_HOLD_TAP_OVERDUE => match held_by(vehicle) {
-            Some(who) => format!("no tap of {who} for 2 s"),
-            None => "no tap for 2 s".to_owned(),
+            Some(who) => format!("no tap of {who} for 1 s"),
+            None => "no tap for 1 s".to_owned(),
         },
     };
     let held = status.phase == TdPhase::TD_PHASE_PAD_ARMED;

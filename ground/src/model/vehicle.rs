@@ -250,12 +250,6 @@ impl Vehicle {
         (told_ms > 0).then(|| f64::from(told_ms) / 1_000.0)
     }
 
-    /// Whether the countdown runs and a hold comes too late.
-    pub fn is_past_hold(&self, now: Duration) -> bool {
-        let left_s = self.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
-        left_s.zip(self.last_hold_s()).is_some_and(|(left_s, last_s)| left_s <= last_s)
-    }
-
     /// Position and velocity, from the better of its two sources.
     pub fn best_motion(&self) -> Option<Sample<Motion>> {
         better(self.motion, self.hud, STALE_AFTER)

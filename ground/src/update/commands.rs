@@ -10,7 +10,7 @@ use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::{
-    Acknowledgement, AutoStep, CommandKind, Model, Seat, Speaker, TrackedCommand, UNATTENDED_MAX,
+    Acknowledgement, AutoStep, CommandKind, LogFault, Model, Seat, Speaker, TrackedCommand,
     why_nothing_moves, words,
 };
 
@@ -268,7 +268,7 @@ const READY_WITHIN: Duration = Duration::from_secs(10);
 /// The same while another station uses our ids: one that ran before under the same ids is in the way for up to 15 s.
 const FREE_WITHIN: Duration = Duration::from_secs(20);
 pub(super) fn step_auto(model: &mut Model, now: Duration) {
-    if !model.settings.auto || !model.link.state(now).carries() {
+    if !model.settings.auto || !model.link.down(now).carries() {
         return;
     }
     if model.auto_step != AutoStep::Done && is_live(model) {
@@ -367,28 +367,36 @@ fn start_auto(model: &mut Model, now: Duration) {
     }
 }
 
-// Holds a countdown that this station's crew started when no commanding screen is left.
+// Holds a countdown that this station's crew started when no commanding screen is left, or the station's log fails.
 
 /// How often the hold is sent; the countdown itself shows whether it worked.
 const HOLD_EVERY: Duration = Duration::from_millis(100);
 /// Half of the tick period: ticks are not exact to the millisecond.
 const HALF_A_TICK: Duration = Duration::from_millis(50);
 
-pub(super) fn hold_if_unattended(model: &mut Model, now: Duration) {
-    let alone = !model.settings.auto && model.crew.is_gone(now);
-    if !(alone && counts_down(model) && armed_here(model)) {
+/// Why this station is not fit to command a countdown.
+fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
+    if !model.settings.auto && model.crew.is_gone(now) {
+        return Some("no commanding screen in the countdown");
+    }
+    let fault = model.log_fault(now).filter(|fault| *fault != LogFault::Full);
+    fault.map(|_| "the station's log fails in the countdown")
+}
+
+pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
+    let unfit = why_unfit(model, now);
+    let Some(why) = unfit.filter(|_| counts_down(model) && armed_here(model)) else {
         if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_told) {
-            let why = if alone { "the countdown has ended" } else { "a commanding screen is back" };
+            let why = if unfit.is_some() { "the countdown has ended" } else { "its reason is gone" };
             model.info(now, format!("the hold is no longer sent: {why}"));
         }
         return;
-    }
-    let too_late = model.vehicle.is_past_hold(now);
+    };
+    let too_late = model.is_past_hold(now);
     if model.crew.hold_due.is_none() || (too_late && !model.crew.too_late_told) {
         model.crew.too_late_told = too_late;
-        let nobody = format!("no commanding screen for {} s in the countdown", UNATTENDED_MAX.as_secs());
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
-        let text = format!("{nobody}: {what}");
+        let text = format!("{why}: {what}");
         model.record_operator(now, "hold", &Seat::default(), &text);
         model.tell(now, Speaker::Ground, EventLevel::Warning, text);
     }

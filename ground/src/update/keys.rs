@@ -292,7 +292,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
         },
-        Act::HoldCountdown if model.vehicle.is_past_hold(now) && act.works(model, now) => {
+        Act::HoldCountdown if model.is_past_hold(now) && act.works(model, now) => {
             model.warn(now, "too late for a hold: Ctrl-X, then Enter, aborts");
         }
         Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
@@ -495,7 +495,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
     };
     match why_not {
-        // The next one comes within 2 s, and the vehicle shows the time that is left.
+        // The next one comes within 1 s, and the vehicle shows the time that is left.
         None if kind == CommandKind::Tap => {
             commands::send_once(model, kind);
             model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));

@@ -10,17 +10,23 @@ use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
-use crate::model::{Deflection, LinkState, Model, Role, Speaker, is_on_pad, note_trace, unheard_hints};
+use crate::model::{
+    Deflection, LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace,
+    unheard_hints,
+};
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
-/// An armed vehicle holds its countdown if it hears nothing for 2 s. With 20 heartbeats in that time and 50 % loss,
-/// all are lost once in a million times.
+/// An armed vehicle holds its countdown if it hears nothing for 1 s. With ten heartbeats in that time and 25 % loss, all are
+/// lost once in a million times.
 const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
 /// For a vehicle whose answers are the only proof that it hears this station.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
 const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
+/// A station that has heard nothing of an armed vehicle for this long says so. The vehicle is to know it 1 s after the loss:
+/// the rest is for the next heartbeat and its way.
+const DEAF_AFTER: Duration = Duration::from_millis(800);
 /// Without a screen: how long the program waits for further messages after a flight.
 const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
 /// Without a screen: how long the program waits for a lost link to return.
@@ -60,7 +66,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     commands::step_auto(model, now);
     commands::poll(model, now);
     commands::observe(model, now);
-    commands::hold_if_unattended(model, now);
+    commands::hold_if_unfit(model, now);
     pad::pass_range_test(model, now);
     vehicle_changes::send_book_end(model, now);
     keep_place(model, now);
@@ -96,24 +102,35 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
     true
 }
 
-/// Whether the vehicle must hear this station frequently: it is armed on the pad, or is about to be.
+/// Whether the vehicle must hear this station frequently: it is armed on the pad by nobody else, or is about to be. A countdown
+/// that is no longer heard may still run.
 fn must_be_heard(model: &Model, now: Duration) -> bool {
-    let armed = model.vehicle.is_armed();
+    let hears = model.link.state(now).carries();
     let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
-    let asks = model.dialog.is_some();
-    model.link.state(now).carries() && on_pad && (armed || asks)
+    let counts = model.vehicle.countdown_s().is_some() && may_have_left(&model.vehicle, now).is_none();
+    let armed = model.vehicle.is_armed() && model.link.uplink.armed_by_other.is_none();
+    on_pad && ((armed && (hears || counts)) || (hears && model.dialog.is_some()))
+}
+
+/// Whether this station hears nothing of a vehicle that is armed on the pad, or only what is old.
+fn is_deaf(model: &Model, now: Duration) -> bool {
+    let silent = model.link.heard_at.is_none_or(|at| now.saturating_sub(at) >= DEAF_AFTER);
+    let old = matches!(model.link.down(now), LinkState::Lost(_));
+    model.vehicle.is_armed() && (silent || old)
 }
 
 /// Heartbeats are sent from the run loop, so that a hanging ground station sends none.
 fn heartbeat(model: &mut Model, now: Duration) {
     let every = if must_be_heard(model, now) { FAST_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
     if is_due(&mut model.due.heartbeat, every, now) {
+        let system_status =
+            if is_deaf(model, now) { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
         model.outbox.push(Action::send(MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: model.settings.session,
             mavtype: MavType::MAV_TYPE_GCS,
             autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
             base_mode: MavModeFlag::empty(),
-            system_status: MavState::MAV_STATE_ACTIVE,
+            system_status,
             mavlink_version: 3,
         })));
     }

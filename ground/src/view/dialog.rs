@@ -45,7 +45,7 @@ pub fn dialog_lines(
         }
         Prompt::Start => {
             let next = next_person(model).map(plain).into_iter().chain([any_other_key()]);
-            ("START the countdown", Vec::new(), next.collect())
+            ("START the countdown", Vec::new(), next.chain(model.loss_in_words().map(plain)).collect())
         }
         Prompt::Confirm(ask) => {
             let asks = plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name()));
@@ -162,7 +162,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, V
     if by == own && why_not_here(model).is_none() {
         let key = keys.name(Act::Tap);
         let words = format!("Tap {key}: {left_s:.1} s left, or the countdown is held.");
-        return Some(("TAP at least every 2 s", vec![strong(words)]));
+        return Some(("TAP twice a second", vec![strong(words)]));
     }
     let words = format!("{} taps: {left_s:.1} s left, or the countdown is held.", model.operator(by));
     Some(("TAPS", vec![plain(words)]))

@@ -12,7 +12,7 @@ use ratatui::text::{Line, Span};
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
     Acknowledgement, CommandKind, Foreign, LinkState, Model, Role, Standing, TrackedCommand, abort_too_late,
-    dead_reckoning::may_have_left, hold_words, standing, unheard_hints, why_nothing_moves, why_other_mission,
+    dead_reckoning::may_have_left, hold_words, standing, unheard_hints, why_not_reached, why_other_mission,
     words,
 };
 
@@ -244,9 +244,12 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 /// In the countdown: until when a hold works.
 fn hold_until(model: &Model, now: Duration) -> Option<String> {
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    let last_s = model.vehicle.last_hold_s().filter(|_| counts)?;
-    let late = model.vehicle.is_past_hold(now);
-    Some(if late { "; TOO LATE to hold".to_owned() } else { format!("; hold until T-{}", shortest(last_s)) })
+    let last_s = model.last_hold_s().filter(|_| counts)?;
+    if model.is_past_hold(now) {
+        return Some("; TOO LATE to hold".to_owned());
+    }
+    // Rather too early than too late.
+    Some(format!("; hold until T-{}", shortest((10.0 * last_s).ceil() / 10.0)))
 }
 
 /// What an abort would do now, marked if the report is stale.
@@ -397,7 +400,7 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     }
     let failing = words::failed_checks(status.value.checks_failed);
     let uplink = || "uplink not proven, every other check passes".to_owned();
-    let why = why_nothing_moves(model, now)
+    let why = why_not_reached(model, now)
         .or_else(|| (!failing.is_empty()).then(|| failing.join(", ")))
         .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
         .or_else(|| why_other_mission(model))

@@ -3,6 +3,7 @@
 use ground::key::Key;
 use ground::model::{LogFault, LogHealth, LogSpace, LogStanding, Prompt, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
+use protocol::dialect::MavCmd;
 use protocol::log::record::Record;
 
 use crate::rig::{Rig, is_arm, settings, typed};
@@ -120,6 +121,28 @@ fn a_log_that_fails_after_the_arming_stops_the_start() {
     assert!(rig.model.dialog.as_ref().is_some_and(|dialog| dialog.prompt == Prompt::WithoutLog));
     rig.keys(&[Key::Escape, Key::Char('S'), Key::Enter]);
     assert!(rig.take_commands().is_empty());
+}
+
+/// The vehicle is held, unless the crew has gone on without a log before.
+#[test]
+fn a_station_log_that_fails_in_the_countdown_holds_it() {
+    for nolog in [false, true] {
+        let mut rig = armed();
+        if nolog {
+            rig.msg(Msg::Log(FAILED));
+            rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::default() });
+        }
+        rig.countdown_ms = 8_000;
+        rig.run(1.0);
+        rig.take_commands();
+        rig.msg(Msg::Log(FAILED));
+        rig.run(1.0);
+        let hold = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
+        let held = rig.take_commands().iter().filter(|sent| sent.command == hold).count();
+        assert_eq!(held > 5, !nolog, "{held}");
+        let said = "the station's log fails in the countdown: HOLD";
+        assert_eq!(rig.events().contains(said), !nolog, "{}", rig.events());
+    }
 }
 
 /// `--log none` is a choice that was made already.

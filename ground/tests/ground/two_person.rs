@@ -185,7 +185,7 @@ fn anyone_holds_and_the_screen_says_who_held_and_why() {
     rig.countdown_ms = i32::MAX;
     for (hold, held_by, words) in [
         (TdHold::TD_HOLD_COMMANDED, ANN, "HOLD: RANGE SAFETY Ann asked for it; start anew"),
-        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 2 s; start anew"),
+        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 1 s; start anew"),
     ] {
         rig.hold = hold;
         crew(&mut rig, TD_CREW_DATA { held_by, commanded_by: BOB, ..TD_CREW_DATA::default() });

@@ -230,13 +230,14 @@ pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
 
 /// The station that armed the vehicle as a record.
 pub fn commander_to_log(commander: &Commander) -> v1::Commander {
-    let Commander { station, age_s, by } = commander;
+    let Commander { station, age_s, by, deaf } = commander;
     v1::Commander {
         system: u32::from(station.system),
         component: u32::from(station.component),
         age_s: *age_s,
         by: by.as_ref().map(operator_to_log),
         station: (station.number != 0).then_some(station.number),
+        deaf: deaf.then_some(true),
     }
 }
 
@@ -247,7 +248,7 @@ pub fn commander_to_log(commander: &Commander) -> v1::Commander {
 pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, RecordError> {
     let station = station_from_log((commander.system, commander.component, commander.station), frame)?;
     let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
-    Ok(Commander { station, age_s: commander.age_s, by })
+    Ok(Commander { station, age_s: commander.age_s, by, deaf: commander.deaf.unwrap_or(false) })
 }
 
 /// How well a station is heard, as a record; `None` where nobody has to be heard.
@@ -447,7 +448,12 @@ mod tests {
                 battery_v: flags[7].then_some(number(17)),
                 log: LogState { running: flags[4], space_bytes },
                 uplink,
-                commander: commander.map(|(station, by)| Commander { station, age_s: number(16), by }),
+                commander: commander.map(|(station, by)| Commander {
+                    station,
+                    age_s: number(16),
+                    by,
+                    deaf: flags[1],
+                }),
                 people,
                 requests: &requests,
                 rehearsed: rehearsed.as_ref(),

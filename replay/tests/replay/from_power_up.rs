@@ -115,8 +115,12 @@ impl Flown {
             let mut requests = Vec::new();
             while let Some(reached) = crew.next_if(|reached| reached.frame <= frame) {
                 requests.extend(reached.request);
-                let commander =
-                    reached.commander_age_s.map(|age_s| Commander { station: STATION, age_s, by: None });
+                let commander = reached.commander_age_s.map(|age_s| Commander {
+                    station: STATION,
+                    age_s,
+                    by: None,
+                    deaf: false,
+                });
                 vehicle.set_uplink(reached.uplink, commander);
                 vehicle.set_pin_out(reached.pin_out);
             }

@@ -10,7 +10,9 @@ use crate::computer::memory::remembers;
 use crate::rules::arming;
 use crate::rules::arming::{Check, Uplink};
 use crate::rules::operator::Operator;
-use crate::rules::phase::{Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_SILENT_S, transition};
+use crate::rules::phase::{
+    Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_PROVEN_S, UPLINK_SILENT_S, transition,
+};
 use crate::rules::two_person::{self, Act, Ask, CONFIRM_WITHIN_S, Reply, Station, TAP_WITHIN_S, TwoPerson};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -209,6 +211,11 @@ impl Computer {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
             return Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) };
         }
+        if asked == Asked::Start
+            && let Some(reason) = self.why_not_start(request)
+        {
+            return self.deny(asked, reason);
+        }
         if is_so_already(&mode, asked) {
             return Answer::ACCEPTED;
         }
@@ -272,6 +279,20 @@ impl Computer {
             Some(by) if !by.role.may_command() => Some(format!("{by} only looks on")),
             Some(_) => None,
         }
+    }
+
+    /// Why nobody starts from there now. Who starts is who armed: the station whose silence holds the countdown. Of two people
+    /// one taps, too, and they may start from any two of their stations.
+    fn why_not_start(&self, request: &Request) -> Option<String> {
+        let station = request.station.filter(|_| !matches!(self.people, Some(People::Two { .. })));
+        let armed_by = self.commander.filter(|_| self.table.mode().interlocks.armed);
+        if let (Some(station), Some(Commander { station: armed_by, by, .. })) = (station, armed_by)
+            && armed_by != station
+        {
+            let who = named(armed_by, by);
+            return Some(format!("{who} armed it: start there, or take command when it is silent"));
+        }
+        (!self.log.running).then(|| "the log has failed: disarm, and see to it".into())
     }
 
     /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
@@ -351,18 +372,15 @@ impl Computer {
             return self.deny(Asked::TakeCommand, "no station".into());
         };
         let armed = self.table.mode().interlocks.armed;
-        let Some(Commander { station: before, age_s, by: before_by }) = self.commander.filter(|_| armed)
+        let Some(Commander { station: before, age_s, by: before_by, .. }) = self.commander.filter(|_| armed)
         else {
             return self.deny(Asked::TakeCommand, "no station has armed the vehicle".into());
         };
         if before == station {
             return Answer::ACCEPTED;
         }
-        let named = |station: Station, by: Option<Operator>| {
-            by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
-        };
         let (old, new) = (named(before, before_by), named(station, request.by));
-        if age_s <= UPLINK_SILENT_S {
+        if age_s <= UPLINK_PROVEN_S {
             return self.deny(Asked::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
         }
         // Nobody commands and taps: that takes two.
@@ -385,15 +403,26 @@ impl Computer {
         Answer::ACCEPTED
     }
 
-    /// Holds the countdown if the station that armed the vehicle has fallen silent.
+    /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears nothing of the vehicle.
     pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
-        let Some(Commander { station, age_s, by }) = input.commander else { return };
-        if age_s > UPLINK_SILENT_S
-            && self.hold(HoldCause::UplinkSilent, || {
-                format!("nothing heard of {station} for {UPLINK_SILENT_S} s")
-            })
-        {
+        let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
+        // An age that is not a number is no sign of life.
+        let is_heard = age_s <= UPLINK_SILENT_S;
+        let held = if !is_heard {
+            let why = || format!("nothing heard of {station} for {UPLINK_SILENT_S} s");
+            self.hold(HoldCause::UplinkSilent, why)
+        } else {
+            deaf && self.hold(HoldCause::StationDeaf, || format!("{station} hears nothing of this vehicle"))
+        };
+        if held {
             self.crew.held_by = by;
+        }
+    }
+
+    /// Holds the countdown if the log has failed: nobody would learn afterwards what happened.
+    pub(super) fn watch_the_log(&mut self) {
+        if !self.log.running {
+            self.hold(HoldCause::LogFailed, || "the log has failed in the countdown".into());
         }
     }
 
@@ -419,6 +448,11 @@ impl Computer {
             self.crew.two_person.end_taps();
         }
     }
+}
+
+/// A station by its operator, if it has one, and its ids.
+fn named(station: Station, by: Option<Operator>) -> String {
+    by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
 }
 
 /// What takes two people.

@@ -119,6 +119,7 @@ impl Computer {
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
+        self.watch_the_log();
         let planned = if let Some((flown, estimate)) = &in_flight {
             self.fly(flown, estimate)
         } else {
@@ -337,6 +338,8 @@ pub struct Commander {
     pub age_s: f64,
     /// Whose key it armed with.
     pub by: Option<Operator>,
+    /// It says that it hears nothing of the vehicle.
+    pub deaf: bool,
 }
 
 /// Everything that a frame depends on besides the computer's memory.

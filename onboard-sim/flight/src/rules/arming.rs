@@ -5,7 +5,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
-use crate::rules::phase::UPLINK_SILENT_S;
+use crate::rules::phase::UPLINK_PROVEN_S;
 use crate::rules::verdict::LandingVerdict;
 use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::mission::ArmingLimits;
@@ -133,13 +133,13 @@ fn uplink(uplink: Uplink) -> Check {
     let (passed, found) = match uplink {
         Uplink::NotNeeded => (true, "not needed: the vehicle starts by itself".to_owned()),
         Uplink::NeverHeard => (false, "no heartbeat of this station".to_owned()),
-        Uplink::Heard { age_s } => (age_s <= UPLINK_SILENT_S, format!("heartbeat {age_s:.1} s old")),
+        Uplink::Heard { age_s } => (age_s <= UPLINK_PROVEN_S, format!("heartbeat {age_s:.1} s old")),
     };
     Check {
         name: UPLINK_CHECK,
         passed,
         found,
-        required: format!("a heartbeat of the asking station in the last {UPLINK_SILENT_S} s"),
+        required: format!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s"),
     }
 }
 
@@ -232,7 +232,7 @@ mod tests {
             controller_warm: true,
             controller_found: "converged".to_owned(),
             predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
-            uplink: Uplink::Heard { age_s: UPLINK_SILENT_S },
+            uplink: Uplink::Heard { age_s: UPLINK_PROVEN_S },
         }
     }
 

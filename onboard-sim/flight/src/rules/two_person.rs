@@ -18,13 +18,18 @@
 use core::fmt;
 
 use super::operator::Operator;
+use super::phase::UPLINK_SILENT_S;
 use crate::computer::memory::{Memory, Remembers, remembers};
 
 /// How long an ask waits for its confirmation, s.
 pub const CONFIRM_WITHIN_S: f64 = 10.0;
 
-/// The longest time between two taps, s. As long as the silence of a station that holds the countdown.
-pub const TAP_WITHIN_S: f64 = 2.0;
+/// The longest time between two taps, s. As long as the silence of a station that holds the countdown, so that one sum holds
+/// for all that can be lost. Whoever taps twice a second may have one tap lost.
+pub const TAP_WITHIN_S: f64 = UPLINK_SILENT_S;
+
+/// The first tap may come so much later, s: whoever has just confirmed the start has to see the countdown first.
+const FIRST_TAP_LATER_S: f64 = 1.0;
 
 /// The number of the n-th ask from 0, never 0: a command without a number confirms nothing.
 fn ask_number(first: u16, nth: u16) -> u16 {
@@ -229,7 +234,7 @@ impl TwoPerson {
 
     /// The countdown has begun: from now on this operator taps, who is not in command.
     pub fn begin_taps(&mut self, by: Operator, time_s: f64) {
-        self.tapping = Some(Tapping { by, at_s: time_s });
+        self.tapping = Some(Tapping { by, at_s: time_s + FIRST_TAP_LATER_S });
     }
 
     /// Takes a tap; returns whether it counts.
@@ -332,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_confirmer_s_taps_count_and_they_lapse_after_two_seconds() {
+    fn only_the_confirmer_s_taps_count_and_they_lapse() {
         let [range, flight, ..] = people();
         let mut two = TwoPerson::default();
         assert!(!two.tap(range, 0.0), "no countdown");
@@ -341,9 +346,10 @@ mod tests {
         assert_eq!(two.lapsed(12.001), Some(range));
         assert!(!two.tap(flight, 11.0));
         assert!(two.tap(range, 11.5));
-        assert_eq!(two.lapsed(13.5), None);
+        assert_eq!(two.lapsed(12.5), None);
         assert!(two.tap(range, 11.0), "a tap from the past shortens nothing");
-        assert_eq!(two.lapsed(13.5), None);
+        assert_eq!(two.lapsed(12.5), None);
+        assert_eq!(two.lapsed(12.501), Some(range));
         assert_eq!(two.lapsed(f64::NAN), Some(range));
         two.end_taps();
         assert_eq!(two.lapsed(100.0), None);

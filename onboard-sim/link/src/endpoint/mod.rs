@@ -53,6 +53,8 @@ const MAX_KNOWN: usize = 16;
 /// bad link.
 const ABORTED_BEAT_S: f64 = 0.2;
 const ABORTED_BEATS_FOR_S: f64 = 3.0;
+/// In a countdown: the longest interval of flight statuses, s; on a slow line they take half of it.
+const COUNTDOWN_TOLD_S: f64 = 0.2;
 
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
@@ -314,6 +316,13 @@ impl VehicleEndpoint {
         if !told.phase.on_pad() && before.is_some_and(|before| before.phase != told.phase) {
             for lane in &mut self.lanes {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
+            }
+        }
+        // A station that hears nothing of the countdown for 1 s says so, and holds it: also over the slowest line it hears
+        // several of these in that time.
+        if mode.countdown_end_s.is_some() {
+            for lane in &mut self.lanes {
+                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_TOLD_S);
             }
         }
         if !told.interlocks.armed {

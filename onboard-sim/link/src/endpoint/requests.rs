@@ -140,6 +140,7 @@ impl VehicleEndpoint {
             station,
             age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
             by,
+            deaf: self.stations.is_deaf(station),
         });
         (self.stations.best_uplink(time_s), commander)
     }

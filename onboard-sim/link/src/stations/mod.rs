@@ -16,7 +16,7 @@ use flight::rules::operator::Operator;
 use flight::rules::two_person::Station;
 use mavlink::MessageData as _;
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavMessage, MavType, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal,
+    HEARTBEAT_DATA, MavMessage, MavState, MavType, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal,
 };
 use protocol::frame::Frame;
 use protocol::hub::Origin;
@@ -81,6 +81,8 @@ struct Known {
     beats: Vec<(u8, u16)>,
     accepted_at_s: f64,
     heartbeat_at_s: Option<f64>,
+    /// Its last heartbeat says that it hears nothing of the vehicle.
+    deaf: bool,
     /// When the heartbeat of another one under these ids found no place among the known stations.
     crowded_at_s: Option<f64>,
 }
@@ -183,6 +185,7 @@ impl Stations {
         let Some(session) = session else { return };
         known.session = session;
         known.heartbeat_at_s = Some(time_s);
+        known.deaf = is_deaf(frame);
         known.learn(sender.path);
         known.beats.insert(0, (frame.sequence(), frame.crc()));
         known.beats.truncate(MAX_BEATS);
@@ -264,6 +267,7 @@ impl Stations {
             beats: Vec::new(),
             accepted_at_s: time_s,
             heartbeat_at_s: None,
+            deaf: false,
             crowded_at_s: None,
         });
         Some(self.known.len() - 1)
@@ -313,6 +317,11 @@ impl Stations {
         let known = self.known(station)?;
         let at_s = if known.session == 0 { Some(known.accepted_at_s) } else { known.heartbeat_at_s };
         at_s.map(|at_s| time_s - at_s)
+    }
+
+    /// Whether a station says that it hears nothing of the vehicle.
+    pub fn is_deaf(&self, station: Station) -> bool {
+        self.known(station).is_some_and(|known| known.deaf)
     }
 
     /// How well a station's heartbeat is heard.
@@ -392,6 +401,12 @@ fn session_of(frame: &Frame) -> u32 {
         Ok(MavMessage::HEARTBEAT(beat)) if beat.mavtype == MavType::MAV_TYPE_GCS => beat.custom_mode,
         _ => 0,
     }
+}
+
+/// Whether a ground station's heartbeat says that it hears nothing of the vehicle.
+fn is_deaf(beat: &Frame) -> bool {
+    matches!(beat.decode(), Ok(MavMessage::HEARTBEAT(beat))
+        if beat.mavtype == MavType::MAV_TYPE_GCS && beat.system_status == MavState::MAV_STATE_CRITICAL)
 }
 
 fn refusal(why: Rejection) -> TdFrameRefusal {

@@ -37,6 +37,8 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
             Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
             Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
             Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
+            Some((HoldCause::StationDeaf, _)) => TdHold::TD_HOLD_STATION_DEAF,
+            Some((HoldCause::LogFailed, _)) => TdHold::TD_HOLD_LOG_FAILED,
         },
         hold_left_s: snapshot.held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
         phase: td_phase(snapshot.phase),

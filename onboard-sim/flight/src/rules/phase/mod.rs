@@ -228,8 +228,13 @@ impl Mode {
 
 // The hold of a countdown.
 
-/// The station that armed the vehicle counts as silent when no frame of it was accepted for this long, s.
-pub const UPLINK_SILENT_S: f64 = 2.0;
+/// A station that arms, or commands an armed vehicle, was heard in this time, s: two of its heartbeats outside a countdown.
+pub const UPLINK_PROVEN_S: f64 = 2.0;
+
+/// In a countdown the station that armed the vehicle counts as silent when no frame of it was accepted for this long, s. With
+/// ten heartbeats a second nine in a row have to be lost by chance. What is lost is noticed so much later, so with
+/// [`LAST_HOLD_S`] it is the time before the release until which every loss holds.
+pub const UPLINK_SILENT_S: f64 = 1.0;
 
 /// A held vehicle disarms after this long without a new start, s.
 pub const HOLD_LIMIT_S: f64 = 60.0;
@@ -248,6 +253,10 @@ pub enum HoldCause {
     Commanded = 2,
     /// Whoever confirmed the start has not tapped in time.
     TapOverdue = 3,
+    /// The station that armed the vehicle says that it hears nothing of it.
+    StationDeaf = 4,
+    /// The vehicle's log has failed.
+    LogFailed = 5,
 }
 
 impl Remembers for HoldCause {

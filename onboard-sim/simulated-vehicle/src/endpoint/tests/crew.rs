@@ -278,14 +278,14 @@ fn the_start_goes_on_while_the_confirmer_taps() {
     assert_eq!(answer, DENIED);
     assert!(words.contains("tap refused: PAD Dan taps"), "{words}");
     for _ in 0..2 {
-        launch.run(0.8);
         assert_eq!(launch.says(PAD, TAP, 0.0, 0.0).0, ACCEPTED);
+        launch.run(0.4);
     }
     assert_eq!(launch.crew.clone().unwrap().tapped_by, 4);
     launch.sent.clear();
-    launch.run(2.1);
+    launch.run(0.5);
     assert!(launch.armed() && !launch.counts_down(), "held");
-    assert!(texts(&launch.sent).join("; ").contains("no tap of PAD Dan for 2 s"));
+    assert!(texts(&launch.sent).join("; ").contains("no tap of PAD Dan for 1 s"));
     let held = launch.sent.iter().rev().find_map(|frame| match frame.decode() {
         Ok(MavMessage::TD_FLIGHT_STATUS(status)) => Some(status.hold),
         _ => None,
@@ -318,6 +318,29 @@ fn of_the_two_who_start_the_one_who_does_not_command_taps() {
     let (answer, words) = launch.says(RANGE, TAKE_COMMAND, 0.0, 0.0);
     assert_eq!(answer, DENIED);
     assert!(words.contains("RANGE SAFETY Ann taps"), "{words}");
+}
+
+/// What is lost before T-3 s holds; in the last 2 s nothing does.
+#[test]
+fn taps_that_end_before_t_minus_three_seconds_hold_the_countdown() {
+    for tenths in 15..=60 {
+        let mut launch = Launch::armed_by_two();
+        launch.asks(FLIGHT, START);
+        launch.confirms(RANGE, START);
+        let left_s = |launch: &Launch| launch.vehicle.mode().countdown_remaining_s(launch.vehicle.time_s());
+        while left_s(&launch).is_some_and(|left_s| left_s > 0.1 * f64::from(tenths)) {
+            let tap = launch.command(RANGE, TAP, 0.0, 0.0);
+            launch.deliver(&tap);
+            launch.run(0.1);
+        }
+        launch.run(6.5);
+        let flies = !launch.vehicle.phase().on_pad();
+        match tenths {
+            31.. => assert!(!flies, "taps end at T-{tenths} tenths"),
+            ..=20 => assert!(flies, "taps end at T-{tenths} tenths"),
+            _ => {}
+        }
+    }
 }
 
 /// After the release a missing tap means nothing.

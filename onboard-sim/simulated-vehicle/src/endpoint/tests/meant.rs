@@ -5,7 +5,7 @@
 
 use flight::computer::crew::People;
 use flight::rules::operator::{Name, Operator, Role};
-use flight::rules::phase::{LAST_HOLD_S, UPLINK_SILENT_S};
+use flight::rules::phase::{LAST_HOLD_S, UPLINK_PROVEN_S, UPLINK_SILENT_S};
 use flight::rules::two_person::{CONFIRM_WITHIN_S, TAP_WITHIN_S};
 use protocol::dialect::{MavType, TD_UPLINK_DATA};
 use protocol::hub::Origin;
@@ -402,7 +402,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             let alone = range.programs.iter().enumerate().all(|(other, twin)| {
                 other == program || twin.address != of.address || time_s - twin.heard_at_s > 5.0
             });
-            let is_heard = time_s - of.heard_at_s <= UPLINK_SILENT_S;
+            let is_heard = time_s - of.heard_at_s <= UPLINK_PROVEN_S;
             let ours = boot as u32 != BOOT - 1 && !to_all;
             if alone && ours && (is_heard || command != ARM) && of.by.is_some() {
                 heard.push(Heard { program, command, confirms, at_s: time_s });
@@ -445,7 +445,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
         {
             taken += 1;
             let (old_by, new_by) = (old.by.unwrap(), new.by.unwrap());
-            assert!(old.age_s > UPLINK_SILENT_S, "taken from a station that is heard");
+            assert!(old.age_s > UPLINK_PROVEN_S, "taken from a station that is heard");
             assert!(new_by.role == old_by.role || new_by.role == Role::RangeSafety);
         }
         if let Some(end_s) = mode.countdown_end_s {

@@ -2,8 +2,10 @@
 
 use flight::computer::FRAME_S;
 use flight::rules::arming::UPLINK_CHECK;
-use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_SILENT_S};
-use protocol::dialect::{COMMAND_CANCEL_DATA, TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor};
+use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_PROVEN_S, UPLINK_SILENT_S};
+use protocol::dialect::{
+    COMMAND_CANCEL_DATA, MavState, MavType, TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor,
+};
 use protocol::signing::Rejection;
 
 use super::*;
@@ -171,7 +173,7 @@ fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
         assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
         assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
         pad.speaking = vec![OTHER];
-        pad.run(UPLINK_SILENT_S + 0.2);
+        pad.run(UPLINK_PROVEN_S + 0.2);
         assert_eq!(pad.ask(CREW, ARM, 1.0), NOT_NOW);
         assert_eq!(pad.said("arm refused: uplink: found heartbeat 2."), 1);
         assert_eq!(pad.ask(OTHER, ARM, 1.0), ACCEPTED);
@@ -203,7 +205,7 @@ fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
         pad.run(0.4);
         assert!(!pad.counting());
         assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
-        assert_eq!((pad.said("nothing heard of 255/190 for 2 s"), pad.said("HOLD: no countdown")), (1, 1));
+        assert_eq!((pad.said("nothing heard of 255/190 for 1 s"), pad.said("HOLD: no countdown")), (1, 1));
         let status = pad.status();
         assert_eq!((status.hold, status.countdown_ms), (TdHold::TD_HOLD_UPLINK_SILENT, i32::MAX));
         assert!((58..=60).contains(&status.hold_left_s), "{}", status.hold_left_s);
@@ -223,6 +225,68 @@ fn a_countdown_is_held_when_the_station_that_armed_it_falls_silent() {
     }
 }
 
+/// What its own hearing is worth it says in its heartbeats.
+#[test]
+fn a_station_that_hears_nothing_of_the_countdown_holds_it() {
+    let mut pad = Pad::rocket();
+    pad.count_down();
+    let deaf = HEARTBEAT_DATA {
+        mavtype: MavType::MAV_TYPE_GCS,
+        system_status: MavState::MAV_STATE_CRITICAL,
+        ..HEARTBEAT_DATA::default()
+    };
+    for (station, counts) in [(OTHER, true), (CREW, false)] {
+        let beat = pad.stations[station].encode(&MavMessage::HEARTBEAT(deaf.clone()));
+        pad.endpoint.on_frame(0, &beat, &pad.vehicle);
+        pad.run(0.05);
+        assert_eq!(pad.counting(), counts, "the one that armed it is meant");
+    }
+    pad.run(0.5);
+    assert_eq!(pad.status().hold, TdHold::TD_HOLD_STATION_DEAF);
+    assert_eq!(pad.said("255/190 hears nothing of this vehicle"), 1);
+}
+
+#[test]
+fn a_log_that_fails_holds_the_countdown_while_a_hold_works() {
+    let failed = LogState { running: false, space_bytes: 0 };
+    let mut pad = Pad::rocket();
+    pad.count_down();
+    pad.vehicle.set_log_state(failed);
+    pad.run(0.5);
+    assert!(!pad.counting());
+    assert_eq!(pad.status().hold, TdHold::TD_HOLD_LOG_FAILED);
+    assert_eq!(pad.said("the log has failed in the countdown"), 1);
+    assert_eq!(pad.ask(CREW, START, 0.0), DENIED);
+    assert_eq!(pad.said("start refused: the log has failed"), 1);
+    let mut pad = Pad::rocket();
+    pad.count_down();
+    pad.run(pad.vehicle.computer().countdown_s() - 1.0);
+    pad.vehicle.set_log_state(failed);
+    pad.run(2.0);
+    assert!(!pad.vehicle.phase().on_pad(), "in the last 2 s nothing holds");
+}
+
+/// Who starts is who armed, or has taken command: the silence of that station holds the countdown.
+#[test]
+fn only_the_station_that_armed_it_starts_or_the_one_that_has_taken_command() {
+    let mut pad = Pad::rocket();
+    pad.speaking = vec![CREW, OTHER];
+    pad.run(0.5);
+    assert_eq!(pad.ask(CREW, ARM, 1.0), ACCEPTED);
+    assert_eq!(pad.ask(OTHER, START, 0.0), DENIED);
+    let words = "start refused: 255/190 armed it: start there, or take command when it is silent";
+    assert_eq!((pad.said(words), pad.counting()), (1, false));
+    pad.speaking = vec![OTHER];
+    pad.run(2.5);
+    assert_eq!(pad.ask(OTHER, MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0), ACCEPTED);
+    assert_eq!(pad.ask(OTHER, START, 0.0), ACCEPTED);
+    pad.run(1.0);
+    assert!(pad.counting());
+    pad.speaking = vec![CREW];
+    pad.run(UPLINK_SILENT_S + 0.2);
+    assert!(!pad.counting(), "the one who started is watched");
+}
+
 #[test]
 fn after_the_release_silence_holds_nothing() {
     let mut pad = Pad::rocket();
@@ -240,11 +304,10 @@ fn in_the_last_moment_nothing_holds_and_the_crew_is_told_why() {
     pad.count_down();
     assert_eq!(pad.status().last_hold_ms, 2_000);
     pad.run(pad.vehicle.computer().countdown_s() - LAST_HOLD_S - 0.5);
-    // Silent for 2 s at T-0.3 s.
+    // Silent for 1 s at T-1.5 s.
     pad.speaking.clear();
-    pad.run(0.3);
+    pad.run(0.5);
     assert!(pad.counting());
-    pad.run(0.2);
     assert_eq!(pad.ask(CREW, HOLD, 0.0), DENIED);
     assert_eq!(pad.said("hold refused: the last 2 s have begun, and nothing holds any more"), 1);
     assert_eq!(pad.said("asks for a hold"), 0);

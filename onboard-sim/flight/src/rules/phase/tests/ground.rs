@@ -153,7 +153,13 @@ proptest! {
 
 const SILENT: Event = hold(HoldCause::UplinkSilent, StartPoint::Pad);
 const START: Event = Event::StartRequested { countdown_s: 5.0 };
-const CAUSES: [HoldCause; 3] = [HoldCause::UplinkSilent, HoldCause::Commanded, HoldCause::TapOverdue];
+const CAUSES: [HoldCause; 5] = [
+    HoldCause::UplinkSilent,
+    HoldCause::Commanded,
+    HoldCause::TapOverdue,
+    HoldCause::StationDeaf,
+    HoldCause::LogFailed,
+];
 
 const fn hold(cause: HoldCause, start: StartPoint) -> Event {
     Event::Hold { cause, start }
