@@ -14,6 +14,11 @@ use super::{
     is_on_pad, role_name,
 };
 
+/// The three words on approaching a vehicle that is down, or whose countdown was aborted.
+const KEEP_AWAY: &str = "DO NOT APPROACH";
+const ONE_PERSON: &str = "ONE PERSON: PIN IN";
+const MAY_APPROACH: &str = "MAY BE APPROACHED";
+
 /// Why nobody may approach, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Danger {
@@ -66,13 +71,19 @@ impl KeepAway {
         Some(Self { danger, wait_s })
     }
 
-    /// For how long, and the reason: what follows `do not approach`.
+    /// What to do, for how long, and the reason.
+    pub fn sentence(&self) -> String {
+        let words = if self.danger == Danger::LiveWaited { ONE_PERSON } else { KEEP_AWAY };
+        format!("{words}{}", self.reason())
+    }
+
+    /// For how long, and the reason: what follows the words.
     pub fn reason(&self) -> String {
         let left = self.wait_s.filter(|left_s| *left_s > 0);
         let left = left.map_or_else(String::new, |left_s| format!(" for {left_s} s"));
         match self.danger {
             Danger::Live => format!("{left}: LIVE MOTOR"),
-            Danger::LiveWaited => " but to put the pin in: LIVE MOTOR".to_owned(),
+            Danger::LiveWaited => ": the motor is LIVE, and the waiting time is over".to_owned(),
             Danger::Burning => format!("{left}: MOTOR BURNING"),
             Danger::NotReported => format!("{left}: MOTOR NOT REPORTED: treat it as live"),
             Danger::Hot => format!("{left}: MOTOR HOT, burnt out"),
@@ -85,6 +96,8 @@ impl KeepAway {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
     DoNot(KeepAway),
+    /// The waiting time is over, and the motor is live: one person may, to put the pin in.
+    OneForThePin(KeepAway),
     /// They may, for this reason.
     May(&'static str),
 }
@@ -97,6 +110,7 @@ impl Approach {
             return None;
         }
         Some(match (KeepAway::of(vehicle, now), status.motor) {
+            (Some(away), _) if away.danger == Danger::LiveWaited => Self::OneForThePin(away),
             (Some(away), _) => Self::DoNot(away),
             (None, TdMotor::TD_MOTOR_PIN_IN) => Self::May("the pin is in"),
             (None, TdMotor::TD_MOTOR_BURNT) => Self::May("the motor is burnt out and cool"),
@@ -110,15 +124,16 @@ impl Approach {
     /// The words that stand largest on every page.
     pub fn headline(&self) -> &'static str {
         match self {
-            Self::DoNot(_) => "DO NOT APPROACH",
-            Self::May(_) => "MAY BE APPROACHED",
+            Self::DoNot(_) => KEEP_AWAY,
+            Self::OneForThePin(_) => ONE_PERSON,
+            Self::May(_) => MAY_APPROACH,
         }
     }
 
     /// What follows the headline in a sentence: for how long, and the reason.
     pub fn reason(&self) -> String {
         match self {
-            Self::DoNot(away) => away.reason(),
+            Self::DoNot(away) | Self::OneForThePin(away) => away.reason(),
             Self::May(why) => format!(": {why}"),
         }
     }

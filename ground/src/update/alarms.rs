@@ -158,7 +158,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
         found.push((AlarmKind::Rebooted, "the vehicle has REBOOTED".to_owned()));
     }
     if let Some(away) = KeepAway::of(vehicle, now).filter(|away| is_live(away.danger)) {
-        found.push((AlarmKind::LiveMotor, format!("DO NOT APPROACH{}", away.reason())));
+        found.push((AlarmKind::LiveMotor, away.sentence()));
     }
     if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
         found.push((AlarmKind::Held, words));

@@ -118,9 +118,9 @@ pub(super) fn watch_approach(model: &mut Model, now: Duration) {
         (Some(Approach::May(why)), _) => model.info(now, format!("MAY BE APPROACHED: {why}")),
         (_, Some(away)) => {
             let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
-            model.say(now, Speaker::Ground, level, format!("DO NOT APPROACH{}", away.reason()));
+            model.say(now, Speaker::Ground, level, away.sentence());
         }
-        (Some(Approach::DoNot(_)) | None, None) => {}
+        (Some(Approach::DoNot(_) | Approach::OneForThePin(_)) | None, None) => {}
     }
 }
 

@@ -106,8 +106,8 @@ fn one(item: &Item, form: usize, (size, labelled): (Size, u16), theme: Theme, fr
     frame.render_widget(big, below);
 }
 
-// The largest words of every page, when people may be in danger or have waited for the word: DO NOT APPROACH, MAY BE
-// APPROACHED, MAY BE IN THE AIR, LOST. While they stand, no page shows a headline of its own.
+// The largest words of every page, when people may be in danger or have waited for the word: DO NOT APPROACH, ONE
+// PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they stand, no page shows a headline of its own.
 
 /// What is said of a vehicle that may have left the pad unheard.
 pub const MAY_FLY: &str = "MAY BE IN THE AIR";
@@ -133,6 +133,7 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let ending = ending.map_or_else(String::new, |ending| format!("{}; ", ending.word()));
         let role = match approach {
             Approach::DoNot(_) => TextRole::Alarm,
+            Approach::OneForThePin(_) => TextRole::Caution,
             Approach::May(_) => TextRole::Good,
         };
         let words = approach.headline();

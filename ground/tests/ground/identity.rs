@@ -152,11 +152,11 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
         assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text.ends_with("LIVE MOTOR")));
         rig.approach_wait_s = 0;
         rig.run(0.1);
-        stands_on_every_page(
-            &mut rig,
-            "DO NOT APPROACH",
-            "do not approach but to put the pin in: LIVE MOTOR",
-        );
+        let live = "one person: pin in: the motor is LIVE, and the waiting time is over";
+        stands_on_every_page(&mut rig, "ONE PERSON: PIN IN", live);
+        assert!(rig.events().contains("ONE PERSON: PIN IN: the motor is LIVE"), "{}", rig.events());
+        let alarms = rig.model.alarms.list();
+        assert!(alarms.iter().any(|alarm| alarm.text.starts_with("ONE PERSON: PIN IN")), "{alarms:?}");
         rig.motor = TdMotor::TD_MOTOR_PIN_IN;
         rig.run(0.1);
         stands_on_every_page(&mut rig, "MAY BE APPROACHED", "may be approached: the pin is in");
@@ -201,7 +201,7 @@ fn a_waiting_time_goes_on_without_the_link() {
     let mut rig = down(TdMotor::TD_MOTOR_LIVE, 20, TdInterlock::empty());
     rig.speaks = false;
     rig.run(25.0);
-    assert!(large(&rig).contains("do not approach but to put the pin in: LIVE MOTOR"), "{}", large(&rig));
+    assert!(large(&rig).contains("one person: pin in: the motor is LIVE"), "{}", large(&rig));
     let mut rig = down(TdMotor::TD_MOTOR_LIVE, u16::MAX, TdInterlock::empty());
     rig.speaks = false;
     rig.run(200.0);
