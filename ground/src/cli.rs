@@ -72,7 +72,7 @@ pub struct Cli {
     #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
     pub here: Option<Degrees>,
 
-    /// Log to write (MCAP), or `none`. An existing file is not overwritten.
+    /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
     #[arg(long, value_name = "FILE|none", global = true)]

@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::book::{Book, BookKey, CLOSED, Head, Line, OPENED, SignedHead};
 use protocol::log::record::Record;
-use protocol::log::recorder::{Recorder, RecorderError};
+use protocol::log::recorder::{Recorder, RecorderError, TlogName};
 use protocol::log::writer::LogHeader;
 use time::OffsetDateTime;
 use time::macros::format_description;
@@ -20,13 +20,11 @@ use crate::model::{
     parse_checklist, read_geojson, remembered,
 };
 
-/// How many logs may start in the same second.
-const SAME_SECOND_MAX: u32 = 100;
-
-/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted.
+/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that exists is kept: the new one
+/// gets the next free name.
 ///
 /// # Errors
-/// A file exists or cannot be created, or a telemetry log is wanted without a log.
+/// A file cannot be created, or a telemetry log is wanted without a log.
 pub fn open_log(
     choice: Option<&LogChoice>,
     tlog: Option<&LogChoice>,
@@ -39,18 +37,23 @@ pub fn open_log(
             Ok(None)
         }
         Some(LogChoice::File(path)) => {
-            Ok(Some(Recorder::create_with_tlog(path, tlog_path(tlog, path).as_deref(), header)?))
+            Ok(Some(Recorder::create_under_free_name(path, tlog_name(tlog), header)?))
         }
         None => open_named_by_time(Path::new(""), tlog, header).map(Some),
     }
 }
 
-/// The named telemetry log, or the name of the log with the extension `.tlog`.
-fn tlog_path(tlog: Option<&LogChoice>, log: &Path) -> Option<PathBuf> {
+/// What to say if the log has another name than it was given.
+pub(super) fn other_name(choice: Option<&LogChoice>, log: Option<&Path>) -> Option<String> {
+    let (Some(LogChoice::File(asked)), Some(log)) = (choice, log) else { return None };
+    (asked != log).then(|| format!("{} exists and is kept; the log is {}", asked.display(), log.display()))
+}
+
+fn tlog_name(tlog: Option<&LogChoice>) -> Option<TlogName<'_>> {
     match tlog {
-        None => Some(log.with_extension("tlog")),
+        None => Some(TlogName::OfTheLog),
         Some(LogChoice::None) => None,
-        Some(LogChoice::File(path)) => Some(path.clone()),
+        Some(LogChoice::File(path)) => Some(TlogName::Own(path)),
     }
 }
 
@@ -62,18 +65,8 @@ fn open_named_by_time(
     let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
         .context("the system clock is invalid")?;
     let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
-    for number in 1..=SAME_SECOND_MAX {
-        let suffix = if number == 1 { String::new() } else { format!("-{number}") };
-        let path = directory.join(format!("touchdown-{stamp}{suffix}.mcap"));
-        match Recorder::create_with_tlog(&path, tlog_path(tlog, &path).as_deref(), header) {
-            Err(RecorderError::Create { path: refused, source })
-                if refused == path && source.kind() == std::io::ErrorKind::AlreadyExists => {}
-            other => return Ok(other?),
-        }
-    }
-    anyhow::bail!(
-        "touchdown-{stamp}.mcap and {SAME_SECOND_MAX} others exist already; name the log with --log"
-    )
+    let path = directory.join(format!("touchdown-{stamp}.mcap"));
+    Ok(Recorder::create_under_free_name(&path, tlog_name(tlog), header)?)
 }
 
 /// How often the space is looked at; the rate is a mean over this time.
@@ -386,6 +379,29 @@ mod log_tests {
                 "touchdown-20270115-080000-2.mcap",
                 "touchdown-20270115-080000-3.mcap"
             ]
+        );
+    }
+
+    /// The same command again after a crash.
+    #[test]
+    fn a_log_that_exists_is_kept_and_the_new_one_says_its_free_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let header = LogHeader::default();
+        let asked = directory.path().join("flight.mcap");
+        let choice = Some(LogChoice::File(asked.clone()));
+        let open = || open_log(choice.as_ref(), None, &header).unwrap().unwrap().finish().unwrap();
+        assert_eq!(open(), asked);
+        assert_eq!(other_name(choice.as_ref(), Some(&asked)), None);
+        let before = fs::read(&asked).unwrap();
+        // A telemetry log alone also takes its name.
+        fs::write(directory.path().join("flight-2.tlog"), "somebody's").unwrap();
+        let free = directory.path().join("flight-3.mcap");
+        assert_eq!(open(), free);
+        assert!(free.with_extension("tlog").exists() && !directory.path().join("flight-2.mcap").exists());
+        assert_eq!(fs::read(&asked).unwrap(), before);
+        let said = other_name(choice.as_ref(), Some(&free)).unwrap();
+        assert!(
+            said.contains("flight.mcap exists and is kept; the log is ") && said.ends_with("flight-3.mcap")
         );
     }
 

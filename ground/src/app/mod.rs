@@ -41,7 +41,7 @@ use crate::model::{KeyOwner, Model, Role, Seat, Settings};
 use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
-use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log};
+use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name};
 use output::{Output, print};
 use replaying::Again;
 use server::{Server, Watchers, hello};
@@ -198,6 +198,9 @@ async fn start(
         ..Settings::on_screen(links.join(" and "))
     });
     announce(&mut model, auto, clock.now());
+    if let Some(words) = other_name(cli.log.as_ref(), recorder.as_ref().map(Recorder::path)) {
+        model.warn(clock.now(), words);
+    }
     let mut signatures = None;
     if let Some((list, file, told)) = checklist {
         model.checklist = Some(list);

@@ -198,7 +198,7 @@ impl Station {
                 Vec::new()
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
-                let told = stations::stopping(model, force);
+                let told = stations::stopping(model, force, self.clock.now());
                 let stops = matches!(told, ToScreen::Stopping { stops: true, .. });
                 let ending = if stops { "ends" } else { "refused" };
                 self.record_operator("stop", &operator, format!("asked for by {operator}: {ending}"));

@@ -15,7 +15,7 @@ use super::server::read_one;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
 use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
 use crate::exit::Exit;
-use crate::model::{Model, Seat, words};
+use crate::model::{Model, Seat, why_not_stop, words};
 
 /// How long a station may take to answer.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
@@ -54,15 +54,15 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
 }
 
 /// Answers a request to stop this station.
-pub(super) fn stopping(model: &Model, force: bool) -> ToScreen {
-    let refused = model.is_at_risk() && !model.settings.demonstration && !force;
+pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
     let log = model.settings.log_path.as_deref().unwrap_or("none");
-    let words = if refused {
-        "the vehicle is armed or in flight; --force ends the station anyway".to_owned()
-    } else {
-        format!("log: {log}")
-    };
-    ToScreen::Stopping { stops: !refused, words }
+    let free = force || model.settings.demonstration;
+    match why_not_stop(model, now).filter(|_| !free) {
+        Some(why) => {
+            ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") }
+        }
+        None => ToScreen::Stopping { stops: true, words: format!("log: {log}") },
+    }
 }
 
 /// Sends one question to the station on this socket.

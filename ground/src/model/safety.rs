@@ -139,6 +139,14 @@ impl Approach {
     }
 }
 
+/// Why a station is not stopped by a slip: its screens say when people may approach.
+pub fn why_not_stop(model: &Model, now: Duration) -> Option<String> {
+    if model.is_at_risk() {
+        return Some("the vehicle is armed or in flight".to_owned());
+    }
+    KeepAway::of(&model.vehicle, now).map(|away| format!("people must keep away, {}", away.sentence()))
+}
+
 /// Whether the motor matters to people on the ground: the flight is over or does not go as planned, or a waiting time
 /// runs.
 fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {

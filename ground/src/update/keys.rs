@@ -274,14 +274,17 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
 /// Does what a key or an entry of the palette stands for. What commands the vehicle only opens its dialog.
 pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_ladder()) {
-        return model.info(now, why);
+        model.info(now, why);
+        return swallow_word(model, act, why.to_owned(), now);
     }
     let shown = model.page();
     if matches!(act, Act::Arm | Act::Start | Act::Disarm | Act::Tap | Act::TakeCommand)
         && let Some(why) = why_not_here(model)
     {
         let name = act.definition().map_or("do that", |definition| definition.name);
-        return model.warn(now, format!("this screen cannot {name}: {why}"));
+        let why = format!("this screen cannot {name}: {why}");
+        model.warn(now, why.clone());
+        return swallow_word(model, act, why, now);
     }
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
@@ -368,6 +371,17 @@ fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>,
             model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
         }
     }
+}
+
+/// Swallows the word that the crew types on after a key that this screen refuses: no letter of it may act as a key.
+fn swallow_word(model: &mut Model, act: Act, why: String, now: Duration) {
+    let prompt = match act {
+        Act::Arm => Prompt::Arm,
+        Act::Start => Prompt::Start,
+        Act::TakeCommand => Prompt::TakeCommand,
+        _ => return,
+    };
+    model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
 }
 
 fn open(model: &mut Model, prompt: Prompt, now: Duration) {

@@ -92,6 +92,19 @@ fn others_can_command(model: &Model) -> bool {
     model.crew.seats().iter().any(|seat| *seat != model.settings.seat)
 }
 
+/// Each name once, with how many screens have it.
+fn counted(names: Vec<String>) -> Vec<String> {
+    let mut found: Vec<(String, usize)> = Vec::new();
+    for name in names {
+        match found.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => found.push((name, 1)),
+        }
+    }
+    let words = |(name, count)| if count == 1 { name } else { format!("{name} x{count}") };
+    found.into_iter().map(words).collect()
+}
+
 /// Who commands: another station that armed the vehicle, otherwise who can command here.
 fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     if model.link.station_gone_for(now).is_some() {
@@ -116,10 +129,11 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
     let text = match model.settings.role {
         Role::Replaying => "nobody".to_owned(),
-        _ if others_can_command(model) => format!("by {}", model.crew.names().join(",")),
-        Role::Watching => "watches only".to_owned(),
+        // First, whoever else sits at this station: the silence of this station holds the countdown.
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
+        _ if others_can_command(model) => format!("by {}", counted(model.crew.names()).join(",")),
+        Role::Watching => "watches only".to_owned(),
         _ => "commands here".to_owned(),
     };
     theme.plain(format!(" {text}"))

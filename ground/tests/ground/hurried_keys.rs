@@ -4,13 +4,13 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::AGAIN_AFTER;
-use ground::update::Msg;
+use ground::model::{AGAIN_AFTER, KeyOwner, Role, Seat, Settings};
+use ground::update::{Action, Msg};
 use proptest::prelude::*;
 use protocol::dialect::{MavCmd, TdCheck};
 
 use crate::keys::{armed_on_pad, ladder, leaves, quit_ladder, start_ladder};
-use crate::rig::{Rig, is_abort, is_arm, typed};
+use crate::rig::{Rig, is_abort, is_arm, settings, typed};
 
 /// A connection between a keyboard and the station. The order of keys stays.
 #[derive(Debug, Clone)]
@@ -221,6 +221,31 @@ fn what_is_left_of_a_refused_word_does_nothing() {
         // A pause, or another key, and keys are keys again.
         rig.key(Key::Char('5'));
         assert!(rig.screen(80, 24).contains("[5Link]"), "{keys}");
+    }
+}
+
+/// The same where the screen itself may not command: one that watches, and one of another operator.
+#[test]
+fn what_is_left_of_a_word_that_this_screen_refuses_does_nothing() {
+    let watching = Settings { role: Role::Watching, ..settings(false, true) };
+    let owner = KeyOwner { number: 1, name: "Ann".to_owned() };
+    let other = Settings { seat: Seat::new(2, "Bob"), key_owner: Some(owner), ..settings(false, true) };
+    for refused in [watching, other] {
+        for keys in ["AARM", "Aarm", "SSTART", "Sstart", "CTAKE", "Ctake"] {
+            let mut rig = Rig::new(refused.clone());
+            rig.run(6.0);
+            let page = rig.model.page();
+            rig.actions.clear();
+            for key in typed(keys) {
+                rig.now += Duration::from_millis(140);
+                rig.press(key);
+                let last = rig.model.events.newest(1).next().map(|event| event.text.clone());
+                let last = last.unwrap_or_default();
+                assert!(last.contains("this screen "), "{keys}: {last}");
+            }
+            assert_eq!((rig.model.page(), &rig.model.dialog), (page, &None), "{keys}");
+            assert!(!rig.actions.iter().any(|action| matches!(action, Action::ReplayFlight)), "{keys}");
+        }
     }
 }
 

@@ -1,12 +1,14 @@
 //! Who commands, which boot of which vehicle, and whether people may approach it.
 
 use ground::key::Key;
-use ground::model::{Role, Seat, Settings};
+use ground::model::{Role, Seat, Settings, why_not_stop};
 use ground::update::{Action, Msg};
 use protocol::dialect::{
-    MavCmd, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor, TdPhase,
+    MavCmd, MavMessage, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor,
+    TdPhase,
 };
 use protocol::log::record::Record;
+use protocol::mission::MissionHash;
 
 use crate::keys::ladder;
 use crate::rig::{Rig, settings};
@@ -185,6 +187,37 @@ fn each_state_of_the_motor_has_its_warning() {
         let mut rig = down(safe, 0, none);
         stands_on_every_page(&mut rig, "MAY BE APPROACHED", why);
         assert!(!rig.screen(80, 24).contains("MOTOR"), "{}", rig.screen(80, 24));
+    }
+}
+
+/// Whoever ends the station takes the words away.
+#[test]
+fn a_station_is_not_stopped_by_a_slip_while_people_must_keep_away() {
+    let mut rig = down(TdMotor::TD_MOTOR_HOT, 20, TdInterlock::empty());
+    let why = why_not_stop(&rig.model, rig.now).unwrap_or_default();
+    assert_eq!(why, "people must keep away, DO NOT APPROACH for 20 s: MOTOR HOT, burnt out");
+    (rig.motor, rig.approach_wait_s) = (TdMotor::TD_MOTOR_LIVE, 0);
+    rig.run(0.2);
+    let why = why_not_stop(&rig.model, rig.now).unwrap_or_default();
+    assert!(why.starts_with("people must keep away, ONE PERSON: PIN IN"), "{why}");
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(0.2);
+    assert_eq!(why_not_stop(&rig.model, rig.now), None);
+}
+
+/// Without `--mission` only the crew can compare it with what they mean to fly.
+#[test]
+fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
+    let mut rig = Rig::crewed();
+    assert!(!rig.screen(80, 24).contains("mission"), "{}", rig.screen(80, 24));
+    let mut name = [0; 20];
+    name[..3].copy_from_slice(b"mk2");
+    let hash = MissionHash::of("a text");
+    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: hash.0, name: name.into() }));
+    for (columns, rows) in [(80, 24), (120, 36)] {
+        let screen = rig.screen(columns, rows);
+        let line = screen.lines().find(|line| line.contains("mission")).unwrap_or_default();
+        assert!(line.contains("mk2") && line.contains(&hash.to_string()[..9]), "{screen}");
     }
 }
 

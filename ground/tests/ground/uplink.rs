@@ -1,8 +1,8 @@
 //! The uplink: whether the vehicle hears this station.
 
 use ground::key::Key;
-use ground::model::Prompt;
-use ground::update::Action;
+use ground::model::{Prompt, Seat};
+use ground::update::{Action, Msg};
 use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA, TdFrameRefusal, TdPhase};
 use protocol::identity::{Address, GROUND};
 
@@ -96,6 +96,14 @@ fn who_armed_the_vehicle_is_on_the_screen() {
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.run(1.0);
     assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
+    // Whoever else sits here: the silence of this station holds the countdown.
+    let seats = |names: &[&str]| (1..).zip(names).map(|(number, name)| Seat::new(number, *name)).collect();
+    rig.msg(Msg::Crew(seats(&["ann", "ann", "bob", "ann", "ann", "ann"])));
+    assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
+    rig.armed = false;
+    rig.phase = TdPhase::TD_PHASE_PAD_IDLE;
+    rig.run(1.0);
+    assert!(identity(&rig).contains("by ann x5,bob"), "{}", identity(&rig));
     let mut rig = Rig::crewed();
     rig.uplink_of(Address { system_id: 254, component_id: 190 }, 100, true);
     assert!(identity(&rig).contains("armed 254/190"), "{}", identity(&rig));

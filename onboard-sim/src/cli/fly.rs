@@ -26,6 +26,21 @@ use super::text_of;
 /// The strongest mean wind that can be requested, m/s.
 pub(super) const WIND_MAX_M_S: f64 = 30.0;
 
+/// Which log is wanted.
+#[derive(Debug, Clone, PartialEq)]
+enum LogChoice {
+    None,
+    File(PathBuf),
+}
+
+fn log_choice(given: &str) -> Result<LogChoice, String> {
+    match given {
+        "" => Err("the name of the log is empty; give a file or `none`".to_owned()),
+        "none" => Ok(LogChoice::None),
+        path => Ok(LogChoice::File(path.into())),
+    }
+}
+
 #[derive(Args)]
 pub(crate) struct FlyArguments {
     /// Built-in mission or TOML file.
@@ -58,9 +73,10 @@ pub(crate) struct FlyArguments {
     /// Number of this boot on the wire, 1 to 16777215, instead of a random one.
     #[arg(long, value_name = "NUMBER", value_parser = boot_number)]
     boot_number: Option<NonZeroU32>,
-    /// Log to write (MCAP). An existing file is not overwritten.
-    #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
+    /// Log to write (MCAP), or `none`, as without this option. An existing file is kept: the log then gets the next free name,
+    /// and says so.
+    #[arg(long, value_name = "FILE|none", value_parser = log_choice)]
+    log: Option<LogChoice>,
     /// Seed of the dispersions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -131,8 +147,16 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let flight = arguments.flight()?;
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let recorder = match &arguments.log {
-        None => None,
-        Some(path) => Some(Recorder::create(path, &flight.log_header("onboard-sim", unix_ns()))?),
+        None | Some(LogChoice::None) => None,
+        Some(LogChoice::File(path)) => {
+            let header = flight.log_header("onboard-sim", unix_ns());
+            let recorder = Recorder::create_under_free_name(path, None, &header)?;
+            if recorder.path() != path {
+                let (asked, log) = (path.display(), recorder.path().display());
+                writeln!(std::io::stdout(), "{asked} exists and is kept; the log is {log}")?;
+            }
+            Some(recorder)
+        }
     };
     let drawn = OnTheWire::drawn();
     let on_the_wire = OnTheWire {

@@ -100,6 +100,29 @@ impl Drop for FailedByPanic {
     }
 }
 
+/// How many names are tried for a log.
+const NAMES_MAX: u32 = 100;
+
+/// How the telemetry log beside a log is named.
+#[derive(Debug, Clone, Copy)]
+pub enum TlogName<'a> {
+    /// As the log, with the extension `.tlog`.
+    OfTheLog,
+    Own(&'a Path),
+}
+
+/// `flight.mcap` for 1, `flight-2.mcap` for 2.
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    let Some(stem) = path.file_stem().filter(|_| number > 1) else { return path.to_owned() };
+    let mut name = stem.to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
 impl Recorder {
     /// Creates the file and starts the writing thread. An existing file is never overwritten.
     ///
@@ -107,6 +130,35 @@ impl Recorder {
     /// The file exists or cannot be created, or its header cannot be written.
     pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
         Self::create_with_tlog(path, None, header)
+    }
+
+    /// As [`Recorder::create`], under the first free name of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on: the same
+    /// command works again after a crash. The telemetry log is named after the name that was found, or has a name of its own
+    /// that gets the same number.
+    ///
+    /// # Errors
+    /// No name is free, or a file cannot be created.
+    pub fn create_under_free_name(
+        path: &Path,
+        tlog: Option<TlogName<'_>>,
+        header: &LogHeader,
+    ) -> Result<Self, RecorderError> {
+        let mut number = 1;
+        loop {
+            let log = numbered(path, number);
+            let tlog = tlog.map(|name| match name {
+                TlogName::OfTheLog => log.with_extension("tlog"),
+                TlogName::Own(own) => numbered(own, number),
+            });
+            match Self::create_with_tlog(&log, tlog.as_deref(), header) {
+                Err(RecorderError::Create { source, .. })
+                    if source.kind() == std::io::ErrorKind::AlreadyExists && number < NAMES_MAX =>
+                {
+                    number += 1;
+                }
+                other => return other,
+            }
+        }
     }
 
     /// As [`Recorder::create`]; also writes the ground's raw frames into a `.tlog` file.

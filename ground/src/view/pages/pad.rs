@@ -158,6 +158,22 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
+    // Without --mission nothing but the crew compares it with what they mean to fly.
+    lines.extend(
+        model
+            .vehicle
+            .mission
+            .as_ref()
+            .map(|(hash, name)| {
+                let fits = usize::from(CHECK_COLUMNS).saturating_sub(24);
+                theme.plain(format!(
+                    "    {mark}{:<19}{}",
+                    "mission",
+                    status_lines::cut(&format!("{name} {hash}"), fits)
+                ))
+            })
+            .map(Line::from),
+    );
     if !station_log_fails {
         lines.push(station_log);
     }

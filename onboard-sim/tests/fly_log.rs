@@ -1,0 +1,35 @@
+//! The log of `fly`: its name, and none.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// What `fly` prints with this log. A key that does not exist ends it before the flight.
+fn fly(directory: &Path, log: &str) -> String {
+    let program = env!("CARGO_BIN_EXE_onboard-sim");
+    let arguments = ["fly", "--log", log, "--key", "missing.key"];
+    let output = Command::new(program).current_dir(directory).args(arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn fly_with_the_log_none_writes_no_file() {
+    let directory = tempfile::tempdir().unwrap();
+    // A file of that name would be in the way of a log, and is none of ours.
+    fs::write(directory.path().join("none"), "notes").unwrap();
+    assert_eq!(fly(directory.path(), "none"), "");
+    assert_eq!(fs::read_to_string(directory.path().join("none")).unwrap(), "notes");
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+/// The same command again after a crash.
+#[test]
+fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("flight.mcap"), "a flight").unwrap();
+    let said = fly(directory.path(), "flight.mcap");
+    assert_eq!(said, "flight.mcap exists and is kept; the log is flight-2.mcap\n");
+    assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
+}
