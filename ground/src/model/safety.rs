@@ -398,6 +398,13 @@ pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
     })
 }
 
+/// Whether it climbs, and nobody commanded it: people near the pad have seconds.
+pub fn is_liftoff_by_itself(vehicle: &Vehicle) -> bool {
+    let latch = vehicle.status.as_ref().map(|status| status.value.latch);
+    let climbs = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
+    climbs && latch == Some(TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF)
+}
+
 /// The latch in words, with its cause; `None` while nothing is latched. A motor that did not light has words of its own.
 pub fn latch_words(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;

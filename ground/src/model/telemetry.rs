@@ -33,7 +33,15 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         MavMessage::HEARTBEAT(data) => {
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
         }
-        MavMessage::TD_FLIGHT_STATUS(data) => vehicle.status = Some(Sample::new(data.clone(), now)),
+        MavMessage::TD_FLIGHT_STATUS(data) => {
+            let mut data = data.clone();
+            let before_ms = vehicle.status.as_ref().map_or(0, |status| status.value.countdown_ms);
+            // After the touchdown the vehicle tells the time of the contact, which it finds a second later.
+            if before_ms < 0 && data.countdown_ms < 0 {
+                data.countdown_ms = data.countdown_ms.min(before_ms);
+            }
+            vehicle.status = Some(Sample::new(data, now));
+        }
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {
                 vehicle.attitude = Some(Sample::new(attitude, now));
@@ -231,6 +239,20 @@ mod tests {
 
     fn close(found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-5, "{found} is not {expected}");
+    }
+
+    #[test]
+    fn the_time_since_the_release_never_goes_back() {
+        let mut vehicle = Vehicle::default();
+        let mut hear = |countdown_ms| {
+            let status = TD_FLIGHT_STATUS_DATA { boot_number: 7, countdown_ms, ..Default::default() };
+            apply(&mut vehicle, &MavMessage::TD_FLIGHT_STATUS(status), NOW);
+            vehicle.status.as_ref().map(|status| status.value.countdown_ms)
+        };
+        assert_eq!(hear(2_000), Some(2_000));
+        assert_eq!(hear(-22_100), Some(-22_100));
+        assert_eq!(hear(-21_200), Some(-22_100), "the contact is told a second later");
+        assert_eq!(hear(10_000), Some(10_000), "a new countdown");
     }
 
     #[test]

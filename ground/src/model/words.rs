@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdPhase};
+use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase};
 
 use super::telemetry::phase_from_number;
 
@@ -36,6 +36,9 @@ fn without_prefix(value: &impl Debug, prefix: &str) -> String {
 /// What an abort would do now, the consequence first.
 pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
     let words = match status.abort_effect {
+        TdAbortEffect::TD_ABORT_EFFECT_NONE if is_aborted_going_up(status) => {
+            "ABORTED already: parachute at apogee"
+        }
         TdAbortEffect::TD_ABORT_EFFECT_NONE => "nothing is left to abort",
         TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD => "disarm and inhibit on the pad",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "parachute at apogee, landing motor inhibited",
@@ -48,6 +51,11 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
         TdAbortEffect::TD_ABORT_EFFECT_IMPACT => return impact(status.abort_impact_m_s),
     };
     words.to_owned()
+}
+
+fn is_aborted_going_up(status: &TD_FLIGHT_STATUS_DATA) -> bool {
+    let up = matches!(status.phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
+    up && status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED)
 }
 
 /// An impact, with its speed if known.

@@ -13,7 +13,7 @@ use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed};
 use crate::model::{
     Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
-    hold_words, is_on_pad,
+    hold_words, is_liftoff_by_itself, is_on_pad,
 };
 
 /// Columns between two items.
@@ -109,6 +109,8 @@ fn one(item: &Item, form: usize, (size, labelled): (Size, u16), theme: Theme, fr
 // The largest words of every page, when people may be in danger or have waited for the word: DO NOT APPROACH, ONE
 // PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they stand, no page shows a headline of its own.
 
+/// What is said of a vehicle that has left the pad, and nobody commanded it.
+const LIFT_OFF: &str = "LIFT-OFF";
 /// What is said of a vehicle that may have left the pad unheard.
 pub const MAY_FLY: &str = "MAY BE IN THE AIR";
 
@@ -140,10 +142,12 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
         return Some(Banner { words, lead, rest: approach.reason(), role });
     }
-    if ending.is_none()
-        && let Some(since) = may_have_left(vehicle, now)
-    {
-        return Some(may_fly(model, since));
+    if ending.is_none() && may_have_left(vehicle, now).is_some() {
+        return Some(may_fly(model));
+    }
+    if is_liftoff_by_itself(vehicle) {
+        let rest = " that nobody commanded: TAKE COVER, look up".to_owned();
+        return Some(Banner { words: LIFT_OFF, lead: format!(" {LIFT_OFF}"), rest, role: TextRole::Alarm });
     }
     ending.filter(|ending| *ending == Ending::Lost)?;
     let words = Ending::Lost.word();
@@ -151,8 +155,8 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
     Some(Banner { words, lead: format!(" {words}"), rest, role: TextRole::Alarm })
 }
 
-/// Since when, and where it is meant to come down.
-fn may_fly(model: &Model, since: Duration) -> Banner {
+/// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
+fn may_fly(model: &Model) -> Banner {
     let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
     let place = match model.meant_to_come_down() {
         Some(Spot { north_m, east_m, error_m }) if libm::hypot(north_m, east_m) < 1.0 => {
@@ -163,8 +167,7 @@ fn may_fly(model: &Model, since: Duration) -> Banner {
         }
         None => "where is not told".to_owned(),
     };
-    let since_s = since.as_secs_f64();
-    let rest = format!(" since T+{since_s:.1} s, not heard since T-{left_s:.1} s; {place}");
+    let rest = format!(" since T-0, not heard since T-{left_s:.1} s; {place}");
     Banner { words: MAY_FLY, lead: String::new(), rest, role: TextRole::Alarm }
 }
 

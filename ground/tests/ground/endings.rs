@@ -2,7 +2,9 @@
 
 use ground::key::Key;
 use ground::model::Ending;
-use protocol::dialect::{MavSeverity, TdChute, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase};
+use protocol::dialect::{
+    MavSeverity, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+};
 
 use crate::rig::Rig;
 use crate::screens::{counting, descending, powered};
@@ -201,11 +203,11 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     for digit in "123456789?pftvx".chars() {
         rig.key(Key::Char(digit));
         let screen = rig.screen(80, 24);
-        let reason = " since T+12.0 s, not heard since T-1.8 s; meant to land within 120 m of the pad";
+        let reason = " since T-0, not heard since T-1.8 s; meant to land within 120 m of the pad";
         assert!(screen.lines().nth(4).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
         assert!(screen.contains(" IN THE AIR?") && screen.contains("~T+12.0"), "{digit}: {screen}");
         assert!(!screen.contains("~PAD_ARMED"), "{screen}");
-        assert!(rig.screen(60, 12).contains(" MAY BE IN THE AIR since T+12.0 s"), "{}", rig.screen(60, 12));
+        assert!(rig.screen(60, 12).contains(" MAY BE IN THE AIR since T-0"), "{}", rig.screen(60, 12));
     }
     assert!(rig.screen(20, 5).contains("MAY BE IN THE AIR"), "{}", rig.screen(20, 5));
     rig.key(Key::Char('f'));
@@ -233,6 +235,29 @@ fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
     let find = rig.screen(80, 24);
     assert!(find.contains("41 m, bearing 000 deg") && !find.contains("IN THE AIR?"), "{find}");
     assert!(rig.model.outcome.started, "a flight was flown");
+}
+
+/// The largest letters of every page, while it climbs; and the abort does not say that nothing is left.
+#[test]
+fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
+    let mut rig = Rig::crewed();
+    rig.phase = TdPhase::TD_PHASE_BOOST;
+    rig.latch = TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF;
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.run(0.3);
+    for digit in "123456789?pftvx".chars() {
+        rig.key(Key::Char(digit));
+        let screen = rig.screen(80, 24);
+        let reason = " LIFT-OFF that nobody commanded: TAKE COVER";
+        assert!(screen.lines().nth(4).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
+        assert!(screen.contains("abort now: ABORTED already: parachute at apogee"), "{digit}: {screen}");
+    }
+    assert!(rig.screen(20, 5).contains("LIFT-OFF"), "{}", rig.screen(20, 5));
+    rig.key(Key::Char('0'));
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.run(0.3);
+    assert!(!rig.screen(80, 24).contains("TAKE COVER"), "{}", rig.screen(80, 24));
 }
 
 /// The vehicle held its countdown in the silence: when it is heard again, nothing was in the air.

@@ -215,8 +215,8 @@ fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> 
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let place = model.last_place(now).or(model.place);
     let label = |words: &'static str| theme.line(words, TextRole::Label);
-    if let Some(since) = may_have_left(&model.vehicle, now) {
-        return may_have_left_lines(model, since, theme);
+    if may_have_left(&model.vehicle, now).is_some() {
+        return may_have_left_lines(model, theme);
     }
     let Some(place) = place else {
         if model.vehicle.left_pad_at.is_some() {
@@ -254,8 +254,8 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
 }
 
 /// It was last heard on the pad, in a countdown that must have ended.
-fn may_have_left_lines(model: &Model, since: Duration, theme: Theme) -> Vec<Line<'static>> {
-    let words = format!(" MAY BE IN THE AIR since T+{:.1} s", since.as_secs_f64());
+fn may_have_left_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
+    let words = " MAY BE IN THE AIR since T-0".to_owned();
     let mut lines = vec![theme.line(words, TextRole::Alarm)];
     let Some(meant) = model.meant_to_come_down() else {
         let words = " It has not told the fence of its mission: look around the pad.";
