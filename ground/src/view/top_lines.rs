@@ -129,6 +129,7 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
     let text = match model.settings.role {
         Role::Replaying => "nobody".to_owned(),
+        Role::Station | Role::Attached if model.vehicle.as_foreign().is_some() => "ABORT only".to_owned(),
         // First, whoever else sits at this station: the silence of this station holds the countdown.
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
@@ -217,7 +218,9 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let words = format!("STATION SILENT {}s", silence.as_secs());
         return theme.line(words, TextRole::Alarm);
     }
-    let down = model.link.down(now);
+    // Another autopilot dates few of its messages: the age of the last one that it dates says nothing about the link.
+    let foreign = model.vehicle.as_foreign().is_some();
+    let down = if foreign { model.link.state(now) } else { model.link.down(now) };
     if down == LinkState::NeverHeard {
         return theme.line("down: not heard", TextRole::Caution);
     }

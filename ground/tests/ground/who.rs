@@ -333,6 +333,21 @@ fn beside_a_copter() -> Rig {
     rig
 }
 
+/// It dates some of its messages only: the age of the last of those is not that of the link.
+#[test]
+fn a_copter_that_is_heard_ten_times_a_second_is_never_lost() {
+    let mut rig = beside_a_copter();
+    for _ in 0..90 {
+        rig.hear(&copter(1));
+        rig.hear(&MavMessage::VFR_HUD(VFR_HUD_DATA::default()));
+        rig.run(0.1);
+    }
+    let screen = rig.screen(80, 24);
+    assert!(!screen.contains("DOWN LOST") && screen.contains("down 0s"), "{screen}");
+    let line = first_line(&rig, 200, 50);
+    assert!(line.contains("ABORT only") && !line.contains("commands here"), "{line}");
+}
+
 #[test]
 fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
     let mut rig = beside_a_copter();
