@@ -197,10 +197,8 @@ async fn start(
         time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    announce(&mut model, auto, clock.now());
-    if let Some(words) = other_name(cli.log.as_ref(), recorder.as_ref().map(Recorder::path)) {
-        model.warn(clock.now(), words);
-    }
+    let renamed = other_name(cli.log.as_ref(), recorder.as_ref().map(Recorder::path));
+    announce(&mut model, auto, renamed, clock.now());
     let mut signatures = None;
     if let Some((list, file, told)) = checklist {
         model.checklist = Some(list);
@@ -254,12 +252,15 @@ fn drawn_session() -> u32 {
     (RandomState::new().build_hasher().finish() as u32).max(1)
 }
 
-/// Says what the demonstration is, before anything else.
-fn announce(model: &mut Model, auto: bool, now: Duration) {
+/// Says what the demonstration is, before anything else, and if the log has another name than was asked for.
+fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duration) {
     if let Some(name) = &model.settings.vehicle_name {
         let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
         let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
         model.info(now, text);
+    }
+    if let Some(words) = renamed {
+        model.warn(now, words);
     }
 }
 

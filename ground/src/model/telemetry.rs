@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use protocol::dialect::{
     HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase,
+    TD_FLIGHT_STATUS_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase,
 };
 use protocol::mission::MissionHash;
 
@@ -34,13 +34,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
         }
         MavMessage::TD_FLIGHT_STATUS(data) => {
-            let mut data = data.clone();
-            let before_ms = vehicle.status.as_ref().map_or(0, |status| status.value.countdown_ms);
-            // After the touchdown the vehicle tells the time of the contact, which it finds a second later.
-            if before_ms < 0 && data.countdown_ms < 0 {
-                data.countdown_ms = data.countdown_ms.min(before_ms);
-            }
-            vehicle.status = Some(Sample::new(data, now));
+            vehicle.status = Some(Sample::new(never_back(vehicle, data), now));
         }
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {
@@ -120,6 +114,15 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         None => {}
     }
     spoken == MessageBoot::New
+}
+
+/// A status whose time since the release never goes back: after the touchdown the vehicle tells the time of the contact, which it
+/// finds a second later.
+fn never_back(vehicle: &Vehicle, status: &TD_FLIGHT_STATUS_DATA) -> TD_FLIGHT_STATUS_DATA {
+    let before_ms = vehicle.status.as_ref().map_or(0, |status| status.value.countdown_ms);
+    let goes_on = before_ms < 0 && status.countdown_ms < 0;
+    let countdown_ms = if goes_on { status.countdown_ms.min(before_ms) } else { status.countdown_ms };
+    TD_FLIGHT_STATUS_DATA { countdown_ms, ..status.clone() }
 }
 
 /// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a message of our vehicles.
@@ -206,7 +209,7 @@ fn name(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, TD_FLIGHT_STATUS_DATA};
+    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
     const NOW: Duration = Duration::from_secs(1);
 

@@ -159,7 +159,7 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
 fn a_crew_that_returns_in_time_prevents_the_hold() {
     let mut rig = counting();
     rig.msg(Msg::Crew(Vec::new()));
-    rig.run(1.5);
+    rig.run(0.5);
     rig.msg(Msg::Crew(vec![ben()]));
     rig.run(10.0);
     assert_eq!(holds(&mut rig), 0);
@@ -177,7 +177,7 @@ fn a_countdown_of_another_station_and_a_flight_are_not_held() {
     assert_eq!(holds(&mut other), 0, "another crew's countdown");
     let mut released = counting();
     released.msg(Msg::Crew(Vec::new()));
-    released.run(1.5);
+    released.run(0.5);
     released.phase = TdPhase::TD_PHASE_BOOST;
     released.run(10.0);
     assert_eq!(holds(&mut released), 0, "after release the link plays no part");

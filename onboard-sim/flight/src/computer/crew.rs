@@ -408,11 +408,11 @@ impl Computer {
         let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
         // An age that is not a number is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
-        let held = if !is_heard {
+        let held = if is_heard {
+            deaf && self.hold(HoldCause::StationDeaf, || format!("{station} hears nothing of this vehicle"))
+        } else {
             let why = || format!("nothing heard of {station} for {UPLINK_SILENT_S} s");
             self.hold(HoldCause::UplinkSilent, why)
-        } else {
-            deaf && self.hold(HoldCause::StationDeaf, || format!("{station} hears nothing of this vehicle"))
         };
         if held {
             self.crew.held_by = by;
