@@ -199,14 +199,11 @@ async fn start(
     });
     let renamed = other_name(cli.log.as_ref(), recorder.as_ref().map(Recorder::path));
     announce(&mut model, auto, renamed, clock.now());
-    let mut signatures = None;
-    if let Some((list, file, told)) = checklist {
+    let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
-        signatures = Some(file);
-        for text in told {
-            model.warn(clock.now(), text);
-        }
-    }
+        told.into_iter().for_each(|text| model.warn(clock.now(), text));
+        file
+    });
     model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
     if model.place.is_some() {
         model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");

@@ -1,6 +1,7 @@
 //! The link to the vehicle in both directions: what it carries, what was rejected, when the vehicle was heard, and
 //! whether it hears us.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
@@ -11,6 +12,9 @@ use protocol::signing::SigningCounters;
 use serde::{Deserialize, Serialize};
 
 use super::{Model, Role, time_boot_ms};
+
+/// How many TIMESYNC questions may wait for an answer: of 10 s, one a second and those of a range test.
+const ASKED_MAX: usize = 64;
 
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
@@ -80,6 +84,8 @@ pub struct Link {
     pub(crate) content: ContentAge,
     /// Whether the vehicle hears this station.
     pub uplink: Uplink,
+    /// The stamps of the last TIMESYNC questions, ns.
+    asked: VecDeque<i64>,
     /// The round-trip time, measured with TIMESYNC.
     pub round_trip: Option<Duration>,
     /// Since when the vehicle has been heard without a loss of the link.
@@ -91,6 +97,17 @@ pub struct Link {
 }
 
 impl Link {
+    /// Notes the stamp of a TIMESYNC question.
+    pub(crate) fn note_asked(&mut self, stamp: i64) {
+        self.asked.truncate(ASKED_MAX - 1);
+        self.asked.push_front(stamp);
+    }
+
+    /// Whether this station has asked with this stamp.
+    pub(crate) fn has_asked(&self, stamp: i64) -> bool {
+        self.asked.contains(&stamp)
+    }
+
     /// The name of the link that brought the last frame, if there are several.
     pub fn heard_over(&self) -> Option<&str> {
         let report = self.heard_over.and_then(|number| self.reports.get(number));

@@ -181,6 +181,8 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
             target_system: source.system_id,
             target_component: source.component_id,
         })));
+    } else if model.settings.role == Role::Station && !model.link.has_asked(data.ts1) {
+        // The answer to another station under our id: it would make this one's news look old.
     } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
         let round_trip = Duration::from_nanos(nanoseconds);
         // A longer time belongs to a request that was given up.

@@ -84,6 +84,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
 
 /// Asks the vehicle for its time; the answer repeats this stamp, ns.
 pub(super) fn ask_time(model: &mut Model, stamp: i64) {
+    model.link.note_asked(stamp);
     model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: 0,
         ts1: stamp,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ground::model::{Amount, Talk};
 use ground::update::Action;
-use protocol::dialect::{TdCheck, TdLimit, TdPhase};
+use protocol::dialect::{TdCheck, TdLimit, TdMotor, TdPhase};
 
 use crate::rig::{Rig, settings};
 
@@ -47,6 +47,7 @@ fn fly(rig: &mut Rig) {
         }
     }
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+    (rig.motor, rig.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 60);
     rig.run(0.5);
     rig.verdict(true, TdLimit::empty());
     rig.run(0.5);
