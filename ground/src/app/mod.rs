@@ -201,7 +201,9 @@ async fn start(
     announce(&mut model, auto, renamed, clock.now());
     let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
-        told.into_iter().for_each(|text| model.warn(clock.now(), text));
+        for text in told {
+            model.warn(clock.now(), text);
+        }
         file
     });
     model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
