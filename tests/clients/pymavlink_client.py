@@ -26,7 +26,7 @@ class Ground:
         self.me = (system, component)
         self.texts = []
         self.chunks = {}
-        # Whether it sends heartbeats while it waits, and when the next one is due.
+        # Whether it sends heartbeats while it waits, ten a second as a countdown asks, and when the next one is due.
         self.beats = False
         self.beat_at = 0.0
 
@@ -35,7 +35,7 @@ class Ground:
         while time.monotonic() < deadline:
             if self.beats and time.monotonic() >= self.beat_at:
                 self.beat()
-            message = self.link.recv_match(blocking=True, timeout=0.2)
+            message = self.link.recv_match(blocking=True, timeout=0.05)
             if message is None or message.get_type() == "BAD_DATA":
                 continue
             if message.get_type() == "STATUSTEXT":
@@ -58,7 +58,7 @@ class Ground:
         return self.wait(kind, lambda m: m if m.get_type() == kind and m.get_srcSystem() == 1 and wanted(m) else None)
 
     def beat(self):
-        self.beat_at = time.monotonic() + 0.5
+        self.beat_at = time.monotonic() + 0.1
         self.link.mav.heartbeat_send(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4)
 
     def answer_to(self, command, patience_s=PATIENCE_S):
