@@ -44,6 +44,11 @@ impl KeepAway {
     ///
     /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        Self::told(vehicle, now).or_else(|| vehicle.wait_before(now))
+    }
+
+    /// What the vehicle's own state says of it.
+    fn told(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let sample = vehicle.status.as_ref()?;
         let status = &sample.value;
         let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
@@ -81,6 +86,19 @@ impl KeepAway {
     }
 }
 
+/// How long people wait for a vehicle that was reset before it could tell how long, s: its longest waiting time.
+const UNTOLD_WAIT_S: u16 = 60;
+
+impl Vehicle {
+    /// The waiting time that ran before the power cycle, while it lasts.
+    pub(crate) fn wait_before(&self, now: Duration) -> Option<KeepAway> {
+        let before = self.before?;
+        let passed_s = u16::try_from(before.age(now).as_secs()).unwrap_or(u16::MAX);
+        let left_s = before.value.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
+        (left_s > 0).then_some(KeepAway { wait_s: Some(left_s), ..before.value })
+    }
+}
+
 /// Whether people may approach a vehicle that is down, or whose countdown was aborted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
@@ -93,7 +111,7 @@ impl Approach {
     /// `None` in flight, and while a vehicle is being prepared.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let status = &vehicle.status.as_ref()?.value;
-        if vehicle.in_flight() || !concerns(status) {
+        if vehicle.in_flight() || !(concerns(status) || vehicle.wait_before(now).is_some()) {
             return None;
         }
         Some(match (KeepAway::of(vehicle, now), status.motor) {

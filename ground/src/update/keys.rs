@@ -291,7 +291,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
         },
-        Act::HoldCountdown if model.vehicle.is_past_hold(now) && act.works(model, now) => {
+        Act::HoldCountdown
+            if model.every_vehicle(now).all(|vehicle| vehicle.is_past_hold(now)) && act.works(model, now) =>
+        {
             model.warn(now, "too late for a hold: Ctrl-X, then Enter, aborts");
         }
         Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
@@ -609,17 +611,18 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
     match key {
         Key::Escape => return,
         Key::Enter => {
-            let entry = palette_entries(model, &typed).into_iter().nth(chosen);
+            let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
             return match entry.map(|entry| entry.does) {
                 Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
                     drop_run(model, now);
                 }
+                Some(Does::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
                 Some(does) => perform_entry(model, does, now),
                 None => {}
             };
         }
         Key::Up => chosen = chosen.saturating_sub(1),
-        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed).len().saturating_sub(1)),
+        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed, now).len().saturating_sub(1)),
         _ => {
             edit(&mut typed, key);
             chosen = 0;
@@ -642,6 +645,10 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
             };
             model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
         }
+        Does::Choose(boot) => match model.settings.role.why_not_command() {
+            None => request(model, Request::Choose(boot), now),
+            Some(why) => model.info(now, why),
+        },
         Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
         Does::Plot(quantity) => {
             model.pages.plotted = quantity;

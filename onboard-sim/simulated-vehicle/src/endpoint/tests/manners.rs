@@ -13,7 +13,7 @@ use vehicle_link::vehicle::Identity;
 
 use super::*;
 
-const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0 };
+const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0, uid: 5 };
 
 impl Wire {
     /// The answer to a question with these bytes.
