@@ -59,7 +59,7 @@ pub struct RunId(u32);
 /// The last report of a run from one place.
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    place: u16,
+    number: u16,
     /// When the run began on our clock, ms, if nothing has been delayed: the least that was found.
     began_ms: i64,
     words: u32,
@@ -132,11 +132,11 @@ impl Run {
         self.words_at.push_back(now);
         self.words_at.drain(..self.words_at.len().saturating_sub(STEADY_WORDS));
         let began_ms = ms(now) - i64::from(word.clock_ms);
-        let known = self.places.iter_mut().find(|place| place.place == word.place);
+        let known = self.places.iter_mut().find(|place| place.number == word.place);
         let Some(place) = known else {
             self.places.drain(..(self.places.len() + 1).saturating_sub(PLACES_MAX));
-            let Word { place, clock_ms, sequence, .. } = *word;
-            self.places.push(Place { place, began_ms, words: 1, clock_ms, sequence });
+            let Word { place: number, clock_ms, sequence, .. } = *word;
+            self.places.push(Place { number, began_ms, words: 1, clock_ms, sequence });
             return;
         };
         let clock_by_ms = i64::from(word.clock_ms) - i64::from(place.clock_ms);
@@ -165,7 +165,7 @@ impl Run {
     }
 
     fn shares_a_place(&self, other: &Self) -> bool {
-        self.places.iter().any(|place| other.places.iter().any(|others| others.place == place.place))
+        self.places.iter().any(|place| other.places.iter().any(|others| others.number == place.number))
     }
 
     /// Whether it may be the same vehicle after its next power-up.
@@ -291,13 +291,10 @@ impl Heard {
                 && run.is_heard(now)
                 && (is_alone || (near && run.is_busy && !shown.is_busy && run.is_steady(now)))
         };
-        let next = match chosen {
-            Some(chosen) => chosen,
-            None => {
-                let taking = self.runs.iter().filter(takes);
-                taking.max_by_key(|run| (run.is_busy, run.heard_at)).map_or(shown.id, |run| run.id)
-            }
-        };
+        let next = chosen.unwrap_or_else(|| {
+            let taking = self.runs.iter().filter(takes);
+            taking.max_by_key(|run| (run.is_busy, run.heard_at)).map_or(shown.id, |run| run.id)
+        });
         self.chosen = chosen;
         let changed = self.shown.replace(next) != Some(next);
         changed.then_some(next)
@@ -403,8 +400,7 @@ impl Model {
 
 /// Its phase, whether it is armed, and its countdown.
 fn state_words(vehicle: &Vehicle) -> String {
-    let phase =
-        vehicle.phase_now().map_or_else(|| "phase ?".to_owned(), |phase| words::phase(phase).to_owned());
+    let phase = vehicle.phase_now().map_or_else(|| "phase ?".to_owned(), words::phase);
     let armed = match vehicle.armed() {
         None => "armed ?",
         Some(armed) if armed.value => "ARMED",
