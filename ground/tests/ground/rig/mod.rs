@@ -168,7 +168,7 @@ impl Rig {
     }
 
     pub(crate) fn boot_ms(&self) -> u32 {
-        u32::try_from((self.now - self.booted_at).as_millis()).unwrap_or(u32::MAX)
+        u32::try_from(self.now.saturating_sub(self.booted_at).as_millis()).unwrap_or(u32::MAX)
     }
 
     /// The vehicle is switched off and on, with the next boot number.
