@@ -127,7 +127,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     screen.wait_for("GO: every arming check passes");
     screen.type_until(b"0AARM\r", " ARMED ");
     screen.type_until(b"0SSTART\r", "observed yes");
-    let mut spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
+    let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
         assert!(!window.shows("REBOOTED") && !rows[1].contains("PAD_IDLE"), "{rows:?}");
@@ -137,7 +137,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     // A disarm goes to both.
     screen.type_until(b"0D\r", "DISARM");
     first.wait_for_line("PAD_ARMED to PAD_IDLE");
-    for vehicle in [&mut first, &mut spare] {
+    for vehicle in [first, spare] {
         vehicle.signal(Signal::SIGTERM);
         assert!(!vehicle.wait().output.contains("to BOOST"));
     }
@@ -151,15 +151,15 @@ fn two_vehicles_with_one_boot_number_are_two() {
     let link = format!("udpout:127.0.0.1:{port}");
     std::fs::write(folder.path().join("uid"), "4711\n").unwrap();
     let copy = ["--stay", "--profile", "mk2", "--boot-number", "42", "--uid-file", "uid"];
-    let mut first = Running::start(vehicle(folder.path(), &[&link]).args(copy));
+    let first = Running::start(vehicle(folder.path(), &[&link]).args(copy));
     screen.wait_for("GO: every arming check passes");
     // Their clocks differ by more than late messages explain.
     let started = Instant::now();
     screen.wait_until("another clock", |_| (started.elapsed() >= Duration::from_secs(6)).then_some(()));
-    let mut second = Running::start(vehicle(folder.path(), &[&link]).args(copy));
+    let second = Running::start(vehicle(folder.path(), &[&link]).args(copy));
     screen.wait_for("TWO VEHICLES under id 1");
     screen.type_until(b"0AARM\r", "cannot arm: TWO VEHICLES under id 1");
-    for vehicle in [&mut first, &mut second] {
+    for vehicle in [first, second] {
         vehicle.signal(Signal::SIGTERM);
         assert!(!vehicle.wait().output.contains("PAD_ARMED"));
     }
