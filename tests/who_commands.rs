@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use e2e::{ABORT, ARM, Bound, Program, Running, START, Signal, Terminal, keygen, program, vehicle};
 use protocol::command::CommandRequest;
@@ -114,6 +114,54 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
         let ended = vehicle.wait();
         assert_eq!(ended.code, Some(4), "aborted: {}", ended.output);
         assert!(!ended.output.contains("PAD_ARMED"), "{}", ended.output);
+    }
+}
+
+/// A spare is switched on at the same station while the first one counts down.
+#[test]
+fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut screen, port) = listening(folder.path());
+    let link = format!("udpout:127.0.0.1:{port}");
+    let mut first = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
+    screen.wait_for("GO: every arming check passes");
+    screen.type_until(b"0AARM\r", " ARMED ");
+    screen.type_until(b"0SSTART\r", "observed yes");
+    let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
+    screen.wait_until("two vehicles and the one that is armed", |window| {
+        let rows = window.rows();
+        assert!(!window.shows("REBOOTED") && !rows[1].contains("PAD_IDLE"), "{rows:?}");
+        (rows[0].contains("TWO VEHICLES under id 1") && rows[1].contains("PAD_ARMED")).then_some(())
+    });
+    first.wait_for_line("hold");
+    // A disarm goes to both.
+    screen.type_until(b"0D\r", "DISARM");
+    first.wait_for_line("PAD_ARMED to PAD_IDLE");
+    for vehicle in [first, spare] {
+        vehicle.signal(Signal::SIGTERM);
+        assert!(!vehicle.wait().output.contains("to BOOST"));
+    }
+}
+
+/// A copied memory card: one unique id and one boot number.
+#[test]
+fn two_vehicles_with_one_boot_number_are_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut screen, port) = listening(folder.path());
+    let link = format!("udpout:127.0.0.1:{port}");
+    std::fs::write(folder.path().join("uid"), "4711\n").unwrap();
+    let copy = ["--stay", "--profile", "mk2", "--boot-number", "42", "--uid-file", "uid"];
+    let first = Running::start(vehicle(folder.path(), &[&link]).args(copy));
+    screen.wait_for("GO: every arming check passes");
+    // Their clocks differ by more than late messages explain.
+    let started = Instant::now();
+    screen.wait_until("another clock", |_| (started.elapsed() >= Duration::from_secs(6)).then_some(()));
+    let second = Running::start(vehicle(folder.path(), &[&link]).args(copy));
+    screen.wait_for("TWO VEHICLES under id 1");
+    screen.type_until(b"0AARM\r", "cannot arm: TWO VEHICLES under id 1");
+    for vehicle in [first, second] {
+        vehicle.signal(Signal::SIGTERM);
+        assert!(!vehicle.wait().output.contains("PAD_ARMED"));
     }
 }
 

@@ -37,6 +37,37 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
 }
 
+#[test]
+fn a_reset_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() {
+    let mut rig = Rig::new("mk2");
+    rig.arm();
+    rig.start();
+    rig.reboot_vehicle();
+    rig.terminal.wait_for("the vehicle has REBOOTED in the countdown");
+    assert!(!rig.terminal.window().shows("observed yes"));
+    rig.terminal.signal(Signal::SIGTERM);
+    rig.terminal.wait_for_end();
+}
+
+#[test]
+fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
+    let mut rig = Rig::new("mk2");
+    rig.arm();
+    rig.start();
+    rig.abort();
+    rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    rig.terminal.wait_for("do not approach for");
+    rig.reboot_vehicle();
+    rig.terminal.wait_for("the vehicle has REBOOTED");
+    rig.terminal.wait_until("a vehicle that is new and must not be approached", |window| {
+        let fresh = window.rows()[1].contains(" down 0s up 0s");
+        (fresh && window.shows("do not approach for")).then_some(())
+    });
+    rig.type_until(b"0AARM\r", "cannot arm: do not approach for");
+    rig.terminal.signal(Signal::SIGTERM);
+    rig.terminal.wait_for_end();
+}
+
 /// The vehicle listens. It is killed in its descent and started again at the same address.
 #[test]
 fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands() {
@@ -45,6 +76,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
     let vehicle = || {
         let mut command = program(Program::OnboardSim);
         command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:{address}")]);
+        command.arg("--uid-file").arg(folder.path().join("vehicle.uid"));
         Running::start(&mut command)
     };
     let mut first = vehicle();

@@ -36,14 +36,14 @@ impl Rig {
         let link = proxy.ground_link();
         let mut command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
         let terminal = Terminal::start(command.env("TERM", kind), SIZE, tells_repeats);
-        let vehicle = vehicle(profile, &proxy);
+        let vehicle = vehicle(profile, &proxy, folder.path());
         Self { terminal, proxy, vehicle, profile, folder }
     }
 
     /// Kills the vehicle and starts it again.
     pub(crate) fn reboot_vehicle(&mut self) {
         self.vehicle.signal(Signal::SIGKILL);
-        self.vehicle = vehicle(self.profile, &self.proxy);
+        self.vehicle = vehicle(self.profile, &self.proxy, self.folder.path());
     }
 
     /// How often the ground has sent this command with this first parameter.
@@ -103,8 +103,9 @@ pub(crate) struct Pad {
 impl Pad {
     pub(crate) fn new() -> Self {
         let proxy = UdpProxy::new();
-        let vehicle = vehicle("mk2", &proxy);
-        Self { folder: tempfile::tempdir().unwrap(), proxy, _vehicle: vehicle }
+        let folder = tempfile::tempdir().unwrap();
+        let vehicle = vehicle("mk2", &proxy, folder.path());
+        Self { folder, proxy, _vehicle: vehicle }
     }
 
     /// A ground station without a screen that holds the link.
@@ -122,9 +123,11 @@ impl Pad {
     }
 }
 
-fn vehicle(profile: &str, proxy: &UdpProxy) -> Running {
+/// It keeps its unique id, so that it is known again after a reboot.
+fn vehicle(profile: &str, proxy: &UdpProxy, folder: &Path) -> Running {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--stay", "--profile", profile, "--mavlink", &proxy.vehicle_link()]);
+    command.arg("--uid-file").arg(folder.join("vehicle.uid"));
     Running::start(&mut command)
 }
 

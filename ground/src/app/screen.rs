@@ -478,7 +478,7 @@ impl Pace {
         let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
         match msg {
             // These change nothing that must be drawn within the next second.
-            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
+            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) | Msg::HeardFrom(_) => {}
             Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
                 self.wait = self.wait.min(FLIGHT_FRAME);
             }

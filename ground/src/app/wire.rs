@@ -1,5 +1,6 @@
 //! The open links: turns bytes into messages and back, and records every frame.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -31,6 +32,7 @@ pub struct Wire {
     vehicle: Address,
     hub: Hub,
     lockouts: Lockouts,
+    places: Places,
     key_file: Option<KeyFile>,
     saved_at: u64,
     /// Whether a failure to save timestamps was reported.
@@ -115,6 +117,7 @@ impl Wire {
             vehicle,
             hub: Hub::new(open.len(), signing).over(&carried),
             lockouts: Lockouts::default(),
+            places: Places::default(),
             open,
             key_file,
             saved_at: 0,
@@ -202,6 +205,11 @@ impl Wire {
                     self.note_boot(number, &frame, from);
                     if self.open.len() > 1 {
                         msgs.push(Msg::HeardOver(number));
+                    }
+                    if frame.source() == self.vehicle {
+                        // On a link with one peer it is the same place after the line was opened again.
+                        let several = name.starts_with("udp") || name.starts_with("tcpin");
+                        msgs.extend(self.places.turn_to((number, from.filter(|_| several))));
                     }
                     msgs.push(Msg::Frame(frame));
                 }
@@ -354,6 +362,31 @@ fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
         capacity_bytes_s: open.transport.address().capacity_bytes_s(),
         copies: link.copies(),
         trouble: link.trouble().map(str::to_owned),
+    }
+}
+
+/// How many places are told apart; a reboot gives a vehicle that connects by itself another one.
+const PLACES_MAX: usize = 64;
+
+/// From where the vehicle is heard: a number for each link and address.
+#[derive(Default)]
+struct Places {
+    known: VecDeque<((usize, Option<Origin>), u16)>,
+    next: u16,
+    told: u16,
+}
+
+impl Places {
+    /// Frames come from this place from now on. Returns what tells it, if the last ones came from another place.
+    fn turn_to(&mut self, place: (usize, Option<Origin>)) -> Option<Msg> {
+        let known = self.known.iter().find(|(known, _)| *known == place).map(|(_, number)| *number);
+        let number = known.unwrap_or_else(|| {
+            self.next = self.next.wrapping_add(1);
+            self.known.drain(..(self.known.len() + 1).saturating_sub(PLACES_MAX));
+            self.known.push_back((place, self.next));
+            self.next
+        });
+        (std::mem::replace(&mut self.told, number) != number).then_some(Msg::HeardFrom(number))
     }
 }
 

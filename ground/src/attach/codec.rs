@@ -281,6 +281,7 @@ mod tests {
             ToStation::Request(Request::Report),
             ToStation::Request(Request::Download),
             ToStation::Request(Request::RangeTest),
+            ToStation::Request(Request::Choose(4_242)),
             ToStation::Request(Request::WithoutLog),
             ToStation::Request(Request::Sign { step: 7, void: true }),
             ToStation::Key("Ctrl-X".to_owned()),
@@ -358,6 +359,7 @@ mod tests {
             any::<String>().prop_map(Msg::OneLinkDown),
             any::<String>().prop_map(Msg::LinkSays),
             any::<usize>().prop_map(Msg::HeardOver),
+            any::<u16>().prop_map(Msg::HeardFrom),
             (vec(link(), 0..4), option::of(signing()))
                 .prop_map(|(links, signing)| Msg::Links { links, signing }),
             (any::<u64>(), any::<bool>(), any::<Option<(u64, u32)>>()).prop_map(
@@ -370,6 +372,7 @@ mod tests {
             (kind, seat()).prop_map(|(kind, by)| Msg::command(kind, by)),
             vec(seat(), 0..4).prop_map(Msg::Crew),
             seat().prop_map(|by| Msg::Asked { request: Request::RangeTest, by }),
+            (seat(), any::<u32>()).prop_map(|(by, boot)| Msg::Asked { request: Request::Choose(boot), by }),
             seat().prop_map(|by| Msg::Asked { request: Request::WithoutLog, by }),
             Just(Msg::ScreenQuit),
             option::of(any::<String>()).prop_map(Msg::SimulatorEnded),

@@ -11,9 +11,9 @@ use protocol::dialect::TdPhase;
 use serde::Deserialize;
 
 use super::{
-    Model, Page, Role,
+    Model, Page, Role, Vehicle,
     quantity::{self, Quantity},
-    why_not_arm, why_not_check, why_not_here, why_not_start, why_not_take,
+    why_not_arm, why_not_check, why_not_here, why_not_start, why_not_take, words,
 };
 use crate::key::Key;
 
@@ -143,9 +143,10 @@ impl Act {
         match self {
             Self::Arm => acts && why_not_arm(model, now).is_none(),
             Self::Start => acts && why_not_start(model, now).is_none(),
-            Self::Disarm => acts && model.vehicle.is_armed(),
+            Self::Disarm => acts && model.every_vehicle(now).any(Vehicle::is_armed),
             Self::HoldCountdown => {
-                commands && model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
+                let counts = |vehicle: &Vehicle| vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+                commands && model.every_vehicle(now).any(counts)
             }
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
@@ -346,6 +347,8 @@ pub enum Does {
     Act(Act),
     /// Only says which keys abort.
     TellAbort,
+    /// Shows and commands this boot, of several vehicles under one id.
+    Choose(u32),
     Plot(&'static Quantity),
     Pin(&'static Quantity),
 }
@@ -359,14 +362,14 @@ pub struct PaletteEntry {
 }
 
 /// The entries whose words contain every typed word.
-pub fn palette_entries(model: &Model, typed: &str) -> Vec<PaletteEntry> {
+pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<PaletteEntry> {
     let typed = typed.to_lowercase();
     let fits =
         |entry: &PaletteEntry| typed.split_whitespace().all(|word| entry.words.to_lowercase().contains(word));
-    every_entry(model).filter(fits).collect()
+    every_entry(model, now).filter(fits).collect()
 }
 
-fn every_entry(model: &Model) -> impl Iterator<Item = PaletteEntry> {
+fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
     let abort =
         PaletteEntry { words: ABORT_WORDS.to_owned(), key: "Ctrl-X".to_owned(), does: Does::TellAbort };
     let acts = DEFINITIONS.iter().map(|definition| PaletteEntry {
@@ -374,6 +377,19 @@ fn every_entry(model: &Model) -> impl Iterator<Item = PaletteEntry> {
         key: model.settings.keys.name(definition.act),
         does: Does::Act(definition.act),
     });
+    let boots = model.vehicle.boot.number().into_iter().chain(model.other_boots(now));
+    let several = !model.other_boots(now).is_empty();
+    let choices: Vec<PaletteEntry> = boots
+        .filter(|_| several)
+        .map(|boot| PaletteEntry {
+            words: format!(
+                "choose boot {}: show and command this one of several vehicles",
+                words::boot(boot)
+            ),
+            key: String::new(),
+            does: Does::Choose(boot),
+        })
+        .collect();
     let plots = quantity::ALL.iter().map(|quantity| PaletteEntry {
         words: format!("plot {}", quantity.name),
         key: String::new(),
@@ -387,7 +403,7 @@ fn every_entry(model: &Model) -> impl Iterator<Item = PaletteEntry> {
             does: Does::Pin(quantity),
         }
     });
-    std::iter::once(abort).chain(acts).chain(plots).chain(pins)
+    std::iter::once(abort).chain(choices).chain(acts).chain(plots).chain(pins)
 }
 
 #[cfg(test)]

@@ -147,6 +147,20 @@ impl CommandKind {
         }
     }
 
+    /// Whether the vehicle's own state, on its pad, shows that an effect that was observed is no longer so, in words.
+    pub fn no_longer(self, vehicle: &Vehicle, since: Duration) -> Option<&'static str> {
+        let heartbeat = vehicle.heartbeat.filter(|heartbeat| heartbeat.received_at > since)?.value;
+        let status = vehicle.status.as_ref().filter(|status| status.received_at > since)?;
+        let on_pad = is_on_pad(status.value.phase);
+        match self {
+            Self::Arm | Self::ConfirmArm if on_pad && !heartbeat.armed => Some("HEARTBEAT says disarmed"),
+            Self::Start | Self::ConfirmStart if on_pad && status.value.countdown_ms == i32::MAX => {
+                Some("no countdown runs")
+            }
+            _ => None,
+        }
+    }
+
     /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
     pub fn shows_nothing(self) -> bool {
         matches!(self, Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck)
@@ -199,6 +213,8 @@ pub struct TrackedCommand {
     pub acknowledged_at: Option<Duration>,
     /// When the vehicle's own state first showed the effect.
     pub observed_at: Option<Duration>,
+    /// The vehicle's own state shows the effect no longer.
+    pub is_withdrawn: bool,
     pub(crate) ticket: Ticket,
     pub(crate) not_observed_reported: bool,
 }
@@ -211,13 +227,16 @@ impl TrackedCommand {
     /// Commanded, and neither refused nor given up nor observed.
     pub fn is_on_its_way(&self, now: Duration) -> bool {
         let open = matches!(self.acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress);
-        self.observed_at.is_none() && (open || (self.accepted() && !self.disagrees(now)))
+        self.observed_at.is_none()
+            && !self.is_withdrawn
+            && (open || (self.accepted() && !self.disagrees(now)))
     }
 
     /// Accepted, but the vehicle's state does not show the effect in time.
     pub fn disagrees(&self, now: Duration) -> bool {
         self.accepted()
             && self.observed_at.is_none()
+            && !self.is_withdrawn
             && self.acknowledged_at.is_some_and(|at| now.saturating_sub(at) >= OBSERVE_WITHIN)
     }
 }
@@ -257,7 +276,7 @@ impl Commands {
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
-    if vehicle.beside(now).is_some() {
+    if model.beside(now).is_some() && !model.heard.is_chosen(now) {
         return Some(format!("TWO VEHICLES under id {}: switch one off", of.system_id));
     }
     if let Some(foreign) =
@@ -312,6 +331,7 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     let uplink = &model.link.uplink;
     why_not_reached(model, now)
         .or_else(|| model.vehicle.is_armed().then(|| "armed already".to_owned()))
+        .or_else(|| model.vehicle.wait_before(now).map(|away| format!("do not approach{}", away.reason())))
         .or_else(|| {
             (!uplink.is_proven(now)).then(|| format!("the uplink is not proven: {}", uplink.why_unheard()))
         })

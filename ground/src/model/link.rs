@@ -61,6 +61,8 @@ pub struct Link {
     pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
     /// The number of the link that brought the last frame, if there are several.
     pub(crate) heard_over: Option<usize>,
+    /// From where the last frame came: a number for each link and address.
+    pub(crate) place: u16,
     /// What the framer rejected.
     pub framing: FramerCounters,
     /// Frames with a correct checksum whose fields could not be decoded.
@@ -147,13 +149,7 @@ impl Link {
 
     /// Takes the time on the vehicle's clock that a message carries.
     pub(crate) fn date(&mut self, message: &MavMessage, now: Duration) {
-        let clock_ms = match message {
-            MavMessage::TD_FLIGHT_STATUS(data) => Some(data.time_boot_ms),
-            MavMessage::TD_UPLINK(data) => Some(data.time_boot_ms),
-            MavMessage::ATTITUDE(data) => Some(data.time_boot_ms),
-            MavMessage::GLOBAL_POSITION_INT(data) => Some(data.time_boot_ms),
-            _ => time_boot_ms(message),
-        };
+        let clock_ms = time_boot_ms(message).filter(|_| !matches!(message, MavMessage::TIMESYNC(_)));
         if let Some(clock_ms) = clock_ms {
             self.content.hear(Duration::from_millis(clock_ms.into()), now);
         }

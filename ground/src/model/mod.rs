@@ -10,6 +10,7 @@ mod command;
 mod crew;
 pub mod dead_reckoning;
 mod dialog;
+mod heard;
 mod history;
 mod identity;
 mod link;
@@ -24,6 +25,7 @@ pub mod telemetry;
 mod vehicle;
 pub mod words;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -41,6 +43,7 @@ pub use checklist::*;
 pub use command::*;
 pub use crew::*;
 pub use dialog::*;
+pub use heard::*;
 pub use history::*;
 pub use identity::*;
 pub use link::*;
@@ -204,6 +207,10 @@ pub struct Model {
     pub settings: Settings,
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
+    /// Which runs of which vehicles are heard.
+    pub heard: Heard,
+    /// The vehicles of the runs that are not shown.
+    pub(crate) others: BTreeMap<RunId, Vehicle>,
     pub link: Link,
     pub commands: Commands,
     /// The open dialog, if any.
@@ -251,7 +258,8 @@ pub struct Model {
     pub called: Called,
     /// `None` for a live flight.
     pub playing: Option<Playback>,
-    pub(crate) rebooted_at: Option<Duration>,
+    /// When the vehicle rebooted, and what it did then.
+    pub(crate) rebooted: Option<(String, Duration)>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
@@ -391,6 +399,8 @@ pub enum Request {
     Download,
     /// Begin the radio range test.
     RangeTest,
+    /// Show and command this boot, of several vehicles under one id.
+    Choose(u32),
     /// Arm and start although the station's log is unfit.
     WithoutLog,
     /// The crew has signed or voided this step of the checklist, counted from zero.

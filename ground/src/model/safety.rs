@@ -49,6 +49,11 @@ impl KeepAway {
     ///
     /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+        Self::told(vehicle, now).or_else(|| vehicle.wait_before(now))
+    }
+
+    /// What the vehicle's own state says of it.
+    fn told(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let sample = vehicle.status.as_ref()?;
         let status = &sample.value;
         let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
@@ -92,6 +97,19 @@ impl KeepAway {
     }
 }
 
+/// How long people wait for a vehicle that was reset before it could tell how long, s: its longest waiting time.
+const UNTOLD_WAIT_S: u16 = 60;
+
+impl Vehicle {
+    /// The waiting time that ran before the power cycle, while it lasts.
+    pub(crate) fn wait_before(&self, now: Duration) -> Option<KeepAway> {
+        let before = self.before?;
+        let passed_s = u16::try_from(before.age(now).as_secs()).unwrap_or(u16::MAX);
+        let left_s = before.value.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
+        (left_s > 0).then_some(KeepAway { wait_s: Some(left_s), ..before.value })
+    }
+}
+
 /// Whether people may approach a vehicle that is down, or whose countdown was aborted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
@@ -106,7 +124,7 @@ impl Approach {
     /// `None` in flight, and while a vehicle is being prepared.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let status = &vehicle.status.as_ref()?.value;
-        if vehicle.in_flight() || !concerns(status) {
+        if vehicle.in_flight() || !(concerns(status) || vehicle.wait_before(now).is_some()) {
             return None;
         }
         Some(match (KeepAway::of(vehicle, now), status.motor) {
@@ -173,14 +191,23 @@ impl Model {
     /// The time before the release, as it is shown here, from which on a hold comes too late, s: what is shown is old by the way
     /// down, and a hold takes the way up. `None` if the vehicle does not tell it.
     pub fn last_hold_s(&self) -> Option<f64> {
-        let round_trip = self.link.round_trip.unwrap_or_default();
-        self.vehicle.last_hold_s().map(|last_s| last_s + round_trip.as_secs_f64())
+        self.last_hold_of(&self.vehicle)
     }
 
-    /// Whether the countdown runs and a hold comes too late.
+    fn last_hold_of(&self, vehicle: &Vehicle) -> Option<f64> {
+        let round_trip = self.link.round_trip.unwrap_or_default();
+        vehicle.last_hold_s().map(|last_s| last_s + round_trip.as_secs_f64())
+    }
+
+    /// Whether countdowns run, and a hold comes too late for each.
     pub fn is_past_hold(&self, now: Duration) -> bool {
-        let left_s = self.vehicle.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
-        left_s.zip(self.last_hold_s()).is_some_and(|(left_s, last_s)| left_s <= last_s)
+        let counting = |vehicle: &&Vehicle| vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+        let past = |vehicle: &Vehicle| {
+            let left_s = vehicle.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
+            left_s.zip(self.last_hold_of(vehicle)).is_some_and(|(left_s, last_s)| left_s <= last_s)
+        };
+        let mut counted = self.every_vehicle(now).filter(counting).peekable();
+        counted.peek().is_some() && counted.all(past)
     }
 
     /// What a loss does to the countdown, in one sentence: station, screen, tap or link.

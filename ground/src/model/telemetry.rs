@@ -9,25 +9,16 @@ use protocol::dialect::{
 use protocol::mission::MissionHash;
 
 use super::{
-    Attitude, Battery, Deflection, Foreign, Gimbal, Heartbeat, MessageBoot, Motion, PadCheck, Prediction,
-    Sample, Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
+    Attitude, Battery, Deflection, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction, Sample,
+    Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
 };
 
-/// Takes a message of the vehicle into the model. Returns whether the vehicle has rebooted; then everything received
-/// before is dropped first. Messages of a former boot are ignored.
-pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
+/// Takes a message of the vehicle into its model.
+pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     if hear_foreign(vehicle, message, now) {
-        return false;
+        return;
     }
-    let spoken = vehicle.boot.hear(message, now);
-    match spoken {
-        MessageBoot::Present => {}
-        MessageBoot::New => {
-            let (boot, foreign) = (std::mem::take(&mut vehicle.boot), vehicle.foreign.take());
-            *vehicle = Vehicle { boot, foreign, ..Vehicle::default() };
-        }
-        MessageBoot::Former => return false,
-    }
+    vehicle.boot.hear(message);
     vehicle.keep(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => {
@@ -113,7 +104,6 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool
         Some(_) => _ = vehicle.left_pad_at.get_or_insert(now),
         None => {}
     }
-    spoken == MessageBoot::New
 }
 
 /// A status whose time since the release never goes back: after the touchdown the vehicle tells the time of the contact, which it
@@ -294,23 +284,6 @@ mod tests {
         let zero = MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA::default());
         apply(&mut vehicle, &zero, NOW);
         assert!(vehicle.attitude.is_none());
-    }
-
-    #[test]
-    fn a_reboot_drops_old_values_and_late_messages_of_the_former_boot_are_ignored() {
-        let status = |boot_number| {
-            MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA { boot_number, ..Default::default() })
-        };
-        let mut vehicle = Vehicle::default();
-        apply(&mut vehicle, &status(1), NOW);
-        apply(&mut vehicle, &at_pitch(90.0), NOW);
-        let told = |vehicle: &Vehicle| vehicle.told().map(|told| MavMessage::ATTITUDE_QUATERNION(told.value));
-        assert_eq!(told(&vehicle), Some(at_pitch(90.0)));
-        assert!(apply(&mut vehicle, &status(2), NOW));
-        assert!(vehicle.attitude.is_none() && vehicle.boot.number() == Some(2) && told(&vehicle).is_none());
-        let late = 3 * NOW;
-        assert!(!apply(&mut vehicle, &status(1), late));
-        assert_eq!(vehicle.status.map(|status| status.received_at), Some(NOW));
     }
 
     #[test]

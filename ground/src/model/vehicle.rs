@@ -10,9 +10,7 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 
-use super::{
-    Attitude, BodySpeed, Boot, FlownPath, Foreign, GONE_AFTER, Motion, PadCheck, Touchdown, Trend, words,
-};
+use super::{Attitude, BodySpeed, Boot, FlownPath, Foreign, KeepAway, Motion, PadCheck, Touchdown, Trend};
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
@@ -145,6 +143,8 @@ pub struct Vehicle {
     pub left_pad_at: Option<Duration>,
     /// The present boot of the vehicle.
     pub boot: Boot,
+    /// What was said of approaching before a power cycle, and when: a waiting time goes on whatever boots.
+    pub(crate) before: Option<Sample<KeepAway>>,
     /// The vehicle with another autopilot that was heard under this id.
     pub foreign: Option<Foreign>,
 }
@@ -200,18 +200,6 @@ impl Vehicle {
     /// The vehicle, if it is none of ours: it has another autopilot, and has told no flight status.
     pub fn as_foreign(&self) -> Option<&Foreign> {
         self.foreign.as_ref().filter(|_| self.status.is_none())
-    }
-
-    /// The second vehicle that is heard under the same id, in words.
-    pub fn beside(&self, now: Duration) -> Option<String> {
-        let is_heard = |at: Duration| now.saturating_sub(at) < GONE_AFTER;
-        let ours = self.status.as_ref().is_some_and(|status| is_heard(status.received_at));
-        let foreign = self.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
-        match self.boot.of_another_vehicle(now) {
-            Some(0) => Some("one without a boot number".to_owned()),
-            Some(number) => Some(format!("boot {}", words::boot(number))),
-            None => foreign.map(Foreign::name),
-        }
     }
 
     /// Whether it has always reported to be simulated. Unknown counts as real.

@@ -94,8 +94,12 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
 fn identity_conditions(model: &Model, now: Duration) -> Vec<(AlarmKind, String)> {
     let mut found = Vec::new();
     let id = model.settings.vehicle.system_id;
-    if let Some(other) = model.vehicle.beside(now) {
-        let text = format!("TWO VEHICLES under id {id}: also {other}; only aborts are sent: switch one off");
+    if let Some(other) = model.beside(now) {
+        let text = if model.heard.is_chosen(now) {
+            format!("TWO VEHICLES under id {id}: also {other}; the shown one was chosen")
+        } else {
+            format!("TWO VEHICLES under id {id}: also {other}; nothing is armed or started: switch one off")
+        };
         found.push((AlarmKind::TwoVehicles, text));
     } else if let Some(foreign) = model.vehicle.as_foreign() {
         found.push((AlarmKind::Foreign, format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())));
@@ -154,8 +158,10 @@ fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
 
 fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
     let vehicle = &model.vehicle;
-    if model.rebooted_at.is_some_and(|at| now.saturating_sub(at) < REBOOT_SHOWN) {
-        found.push((AlarmKind::Rebooted, "the vehicle has REBOOTED".to_owned()));
+    if let Some((did, at)) = &model.rebooted
+        && now.saturating_sub(*at) < REBOOT_SHOWN
+    {
+        found.push((AlarmKind::Rebooted, format!("the vehicle has REBOOTED{did}")));
     }
     if let Some(away) = KeepAway::of(vehicle, now).filter(|away| is_live(away.danger)) {
         found.push((AlarmKind::LiveMotor, away.sentence()));

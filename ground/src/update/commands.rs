@@ -34,7 +34,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         // The automatic mode ends when a person acts.
         model.auto_step = AutoStep::Done;
     }
-    if kind == CommandKind::Abort && model.vehicle.beside(now).is_some() {
+    if kind == CommandKind::Abort && model.beside(now).is_some() {
         let id = model.settings.vehicle.system_id;
         model.warn(now, format!("the ABORT goes to every vehicle that is heard under id {id}"));
     }
@@ -52,6 +52,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         acknowledged: Acknowledgement::Waiting,
         acknowledged_at: None,
         observed_at: None,
+        is_withdrawn: false,
         ticket,
         not_observed_reported: false,
     });
@@ -209,7 +210,7 @@ fn stop_if_latched(model: &mut Model, now: Duration) {
 
 fn stop_aborting(model: &mut Model, now: Duration) {
     // Of two vehicles under one id nobody knows which one has answered.
-    if model.vehicle.beside(now).is_some() {
+    if model.beside(now).is_some() {
         return;
     }
     if let Some(ticket) = model.commands.of(CommandKind::Abort).map(|track| track.ticket) {
@@ -237,7 +238,13 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
     for track in &mut model.commands.tracks {
         let answered = track.kind.shows_nothing() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
-        if track.observed_at.is_none() && shown {
+        if let Some(since) = track.observed_at {
+            if let Some(why) = track.kind.no_longer(&model.vehicle, since) {
+                (track.observed_at, track.is_withdrawn) = (None, true);
+                let text = format!("{} no longer so: {why}", track.kind.name());
+                seen.push((EventLevel::Warning, track.by.clone(), text));
+            }
+        } else if shown && !track.is_withdrawn {
             track.observed_at = Some(now);
             seen.push((
                 EventLevel::Info,
@@ -378,6 +385,9 @@ const HALF_A_TICK: Duration = Duration::from_millis(50);
 fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
     if !model.settings.auto && model.crew.is_gone(now) {
         return Some("no commanding screen in the countdown");
+    }
+    if model.beside(now).is_some() && !model.heard.is_chosen(now) {
+        return Some("TWO VEHICLES in the countdown");
     }
     let fault = model.log_fault(now).filter(|fault| *fault != LogFault::Full);
     fault.map(|_| "the station's log fails in the countdown")

@@ -10,7 +10,7 @@ use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
 use super::{Action, commands, pad, vehicle_changes};
-use crate::model::{Model, Role, Speaker, telemetry};
+use crate::model::{Model, Role, RunId, Speaker, Word, is_busy, may_be_ours, telemetry, time_boot_ms};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
@@ -73,6 +73,22 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         model.link.undecodable += 1;
         return;
     };
+    if matches!(&message, MavMessage::HEARTBEAT(beat) if may_be_ours(beat))
+        && model.heard.is_stray(frame.sequence(), now)
+    {
+        return;
+    }
+    let speaker = speaker(model, frame, &message, now);
+    if let Some(other) = speaker.filter(|run| model.heard.shown() != Some(*run)) {
+        // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
+        if !matches!(message, MavMessage::STATUSTEXT(_)) {
+            let vehicle = model.others.entry(other).or_default();
+            telemetry::apply(vehicle, &message, now);
+            model.heard.note(other, is_busy(vehicle, now));
+            vehicle_changes::settle(model, now);
+            return;
+        }
+    }
     model.link.date(&message, now);
     if let Some(answer) = answer_to_ping(&message, frame.source()) {
         model.outbox.push(Action::send(answer));
@@ -99,15 +115,33 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     }
     let before = vehicle_changes::Announced::of(&model.vehicle);
     let crew_before = vehicle_changes::CrewTold::of(model);
-    let rebooted = telemetry::apply(&mut model.vehicle, &message, now);
-    if rebooted {
-        vehicle_changes::on_reboot(model, now);
+    telemetry::apply(&mut model.vehicle, &message, now);
+    if let Some(shown) = model.heard.shown() {
+        model.heard.note(shown, is_busy(&model.vehicle, now));
     }
-    let before = if rebooted { vehicle_changes::Announced::default() } else { before };
     vehicle_changes::on_change(model, before, now);
     vehicle_changes::enter_crew_changes(model, &crew_before);
     pad::enter_check(model, now);
     commands::observe(model, now);
+}
+
+/// Which vehicle has sent a message, and since which power-up; `None` before the first flight status.
+fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<RunId> {
+    match message {
+        MavMessage::TD_FLIGHT_STATUS(status) => Some(model.heard.hear(
+            &Word {
+                uid: status.vehicle_uid,
+                boot: status.boot_number,
+                clock_ms: status.time_boot_ms,
+                sequence: frame.sequence(),
+                place: model.link.place,
+            },
+            now,
+        )),
+        // What another autopilot says beside ours is noted at the shown one.
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.heard.shown(),
+        _ => model.heard.speaker(time_boot_ms(message), frame.sequence(), now),
+    }
 }
 
 /// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer itself; answering

@@ -624,17 +624,18 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
     match key {
         Key::Escape => return,
         Key::Enter => {
-            let entry = palette_entries(model, &typed).into_iter().nth(chosen);
+            let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
             return match entry.map(|entry| entry.does) {
                 Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
                     drop_run(model, now);
                 }
+                Some(Does::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
                 Some(does) => perform_entry(model, does, now),
                 None => {}
             };
         }
         Key::Up => chosen = chosen.saturating_sub(1),
-        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed).len().saturating_sub(1)),
+        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed, now).len().saturating_sub(1)),
         _ => {
             edit(&mut typed, key);
             chosen = 0;
@@ -657,6 +658,10 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
             };
             model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
         }
+        Does::Choose(boot) => match model.settings.role.why_not_command() {
+            None => request(model, Request::Choose(boot), now),
+            Some(why) => model.info(now, why),
+        },
         Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
         Does::Plot(quantity) => {
             model.pages.plotted = quantity;

@@ -66,6 +66,8 @@ pub enum Msg {
     ScreenGone,
     /// The next frame came over this link; sent only if there are several links.
     HeardOver(usize),
+    /// The next frames come from this place: a number for each link and address.
+    HeardFrom(u16),
     /// The state of each link, once a second and whenever one goes up or down.
     Links {
         /// In the order of their numbers.
@@ -208,6 +210,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
         Msg::HeardOver(number) => model.link.heard_over = Some(number),
+        Msg::HeardFrom(place) => model.link.place = place,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
         Msg::SimulatorEnded(failure) => {
@@ -242,6 +245,7 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         Request::Parameters => keys::ask_parameters(model),
         Request::Report => write_report(model, now),
         Request::Download => fetch_log(model, now),
+        Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
         Request::WithoutLog => keys::without_log(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),

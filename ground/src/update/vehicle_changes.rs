@@ -10,8 +10,8 @@ use protocol::mission::MissionHash;
 use super::{Action, commands, pad};
 use crate::model::{
     Approach, Danger, Ending, FlightSoFar, FlownPath, History, KeepAway, Maxima, Model, Parameters,
-    RestOfWord, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight, is_on_pad, latch_words,
-    words,
+    RestOfWord, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
+    is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -40,22 +40,71 @@ impl Announced {
     }
 }
 
-pub(super) fn on_reboot(model: &mut Model, now: Duration) {
+/// Shows another run if one takes the screen.
+pub(super) fn settle(model: &mut Model, now: Duration) {
+    let Some(former) = model.heard.shown() else { return };
+    let Some(shown) = model.heard.settle(now) else { return };
+    let vehicle = model.others.remove(&shown).unwrap_or_default();
+    let mut before = std::mem::replace(&mut model.vehicle, vehicle);
+    let away = KeepAway::of(&before, now);
+    model.vehicle.before = away.map(|away| Sample::new(away, now)).or(model.vehicle.before);
+    model.vehicle.foreign = before.foreign.take();
+    let is_reset = model.heard.follows(shown, former);
+    let did = is_reset.then(|| reset_words(&before));
+    model.others.insert(former, before);
+    let Model { heard, others, .. } = model;
+    others.retain(|id, _| heard.knows(*id));
+    on_shown(model, did, now);
+    on_change(model, Announced::default(), now);
+}
+
+/// The crew shows and commands this boot, of several vehicles under one id.
+pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
+    let name = words::boot(boot);
+    if model.heard.choose(boot, now) {
+        model.record_operator(now, "chose", by, &format!("the vehicle of boot {name}{}", by.in_brackets()));
+        model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
+        settle(model, now);
+    } else {
+        model.warn(
+            now,
+            format!("boot {name} is not chosen: it is not heard, or more than one vehicle has it"),
+        );
+    }
+}
+
+/// What a vehicle did when it was reset.
+fn reset_words(vehicle: &Vehicle) -> String {
+    let counted = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    match vehicle.phase_now() {
+        Some(TdPhase::TD_PHASE_PAD_ARMED) if counted => " in the countdown".to_owned(),
+        Some(TdPhase::TD_PHASE_PAD_ARMED) => " while it was armed".to_owned(),
+        Some(phase) if is_flight(phase) => " in flight".to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// Another run has the screen: after a reset, and what the vehicle did then, or of another vehicle.
+fn on_shown(model: &mut Model, reset: Option<String>, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
-    let what = if model.vehicle.boot.is_back() { "is heard alone again" } else { "has rebooted" };
-    let text = format!("the vehicle {what}{which}: all earlier values are dropped");
+    let text = match &reset {
+        Some(did) => format!("the vehicle has rebooted{did}{which}: all earlier values are dropped"),
+        None => format!("another vehicle is shown{which}"),
+    };
     model.warn(now, text);
     model.outcome = FlightSoFar { error: model.outcome.error.take(), ..FlightSoFar::default() };
     model.history = History::default();
     model.parameters = Parameters::default();
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
+    // It has its time to report what it hears.
+    model.link.alive_since = None;
     model.link.content = protocol::link_stats::ContentAge::default();
     // A vehicle that was switched on again has a new log, which keeps nothing yet.
     model.book.kept = 0;
     model.alarms.vehicle_rebooted(now);
-    model.rebooted_at = Some(now).filter(|_| !model.vehicle.boot.is_back());
+    model.rebooted = reset.map(|did| (did, now));
     // An open dialog was opened for the former boot.
     model.rest_of_word = model.dialog.take().and_then(|dialog| {
         let why = format!("{}: cancelled by the reboot", dialog.prompt.name());
@@ -64,7 +113,7 @@ pub(super) fn on_reboot(model: &mut Model, now: Duration) {
     let void = commands::restart_after_reboot(model, now);
     if !void.is_empty() {
         let void = void.join(", ");
-        model.warn(now, format!("void since the reboot: {void}"));
+        model.warn(now, format!("void since then: {void}"));
     }
 }
 

@@ -217,7 +217,7 @@ const FRAME_ROWS: u16 = 3;
 /// Columns of a key.
 const KEY_COLUMNS: usize = 7;
 
-pub fn draw_palette(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
+pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if !matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
         return;
     }
@@ -225,13 +225,13 @@ pub fn draw_palette(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) 
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
     let inside = pop_up("Every action", theme, frame, at);
     let rows = usize::from(at.height.saturating_sub(FRAME_ROWS));
-    draw_lines(frame, inside, &palette_lines(model, theme, rows));
+    draw_lines(frame, inside, &palette_lines(model, theme, now, rows));
 }
 
 /// The typed text and this many of the actions found, the marked one among them. Empty while it is closed.
-pub fn palette_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
+pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
     let Some(TextEntry::Palette { typed, chosen }) = &model.pages.entry else { return Vec::new() };
-    let entries = palette_entries(model, typed);
+    let entries = palette_entries(model, typed, now);
     let head = Line::from(vec![
         theme.key(format!(" :{typed}_")),
         theme.label(format!("   {} found; Up Down choose, Enter does it, Esc closes", entries.len())),

@@ -127,7 +127,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     status_lines::draw_flight_bar(model, theme, (now, shown_at), frame, bar);
     status_lines::draw_alarm_line(model, theme, now, frame, alarm);
     draw_line(frame, names, names_line(model, theme, names.width));
-    dialog::draw_palette(model, theme, frame, body);
+    dialog::draw_palette(model, theme, now, frame, body);
     dialog::draw_dialog(model, theme, now, frame, body);
 }
 
@@ -228,7 +228,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     let mut body = pages::lines(model, page, theme, now, room);
     body.truncate(usize::from(room.height));
     lines.extend(if matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
-        dialog::palette_lines(model, theme, usize::from(room.height).saturating_sub(1))
+        dialog::palette_lines(model, theme, now, usize::from(room.height).saturating_sub(1))
     } else {
         body
     });

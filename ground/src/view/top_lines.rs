@@ -71,7 +71,7 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
 /// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
 fn doubt(model: &Model, now: Duration) -> Option<String> {
     let id = model.settings.vehicle.system_id;
-    if model.vehicle.beside(now).is_some() {
+    if model.beside(now).is_some() {
         return Some(format!("TWO VEHICLES under id {id}"));
     }
     model.vehicle.as_foreign().map(|foreign| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()))
@@ -322,6 +322,7 @@ pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) 
     };
     let (observed, observed_role) = match track.observed_at {
         Some(_) => ("ok", TextRole::Good),
+        None if track.is_withdrawn => ("ended", TextRole::Plain),
         None if track.disagrees(now) => ("NO", TextRole::Alarm),
         None => ("-", TextRole::Plain),
     };
@@ -347,6 +348,7 @@ pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Lin
     };
     let (observed, observed_role) = match track.observed_at {
         Some(_) => ("yes".to_owned(), TextRole::Good),
+        None if track.is_withdrawn => ("no longer so".to_owned(), TextRole::Plain),
         None if track.disagrees(now) => ("NOT OBSERVED".to_owned(), TextRole::Alarm),
         None => ("not yet".to_owned(), TextRole::Plain),
     };
@@ -405,7 +407,11 @@ fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {
 /// The latest command other than an abort, while its effect is not observed yet.
 pub fn open_command(model: &Model, now: Duration) -> Option<&TrackedCommand> {
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    latest.filter(|track| track.observed_at.is_none() && now.saturating_sub(track.commanded_at) < OPEN_SHOWN)
+    latest.filter(|track| {
+        track.observed_at.is_none()
+            && !track.is_withdrawn
+            && now.saturating_sub(track.commanded_at) < OPEN_SHOWN
+    })
 }
 
 /// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the

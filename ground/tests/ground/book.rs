@@ -118,7 +118,7 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("1 entries, head") && screen.contains("signed; 1 at the vehicle"), "{screen}");
     // A vehicle that was switched on again has a new log.
-    rig.boot_number += 1;
+    rig.reboot();
     rig.run(3.0);
     assert!(!heads(&mut rig).is_empty());
 }

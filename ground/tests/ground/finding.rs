@@ -16,7 +16,7 @@ fn choose(rig: &mut Rig, text: &str) {
 #[test]
 fn the_palette_lists_every_action_with_its_key() {
     let rig = on_the_pad();
-    let listed = palette_entries(&rig.model, "");
+    let listed = palette_entries(&rig.model, "", rig.now);
     for definition in &DEFINITIONS {
         let entry = listed.iter().find(|entry| entry.does == Does::Act(definition.act)).unwrap();
         assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.usual.name()));

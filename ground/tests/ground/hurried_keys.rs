@@ -154,8 +154,8 @@ fn hold_and_disarm_act_at_any_speed() {
 fn a_question_closes_when_the_vehicle_reboots_and_checks_again_before_it_sends() {
     let mut rig = Rig::crewed();
     rig.msg(Msg::Keys(ladder()));
-    rig.boot_number += 1;
-    rig.run(1.0);
+    rig.reboot();
+    rig.run(2.5);
     assert_eq!(rig.model.dialog, None);
     let mut rig = Rig::crewed();
     rig.msg(Msg::Keys(ladder()));

@@ -53,8 +53,8 @@ fn a_vehicle_that_contradicts_itself_is_live() {
         rig.run(2.0);
         assert!(!rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" LIVE"));
     }
-    rig.boot_number += 1;
-    rig.run(2.0);
+    rig.reboot();
+    rig.run(4.0);
     assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
 }
 
@@ -78,16 +78,17 @@ fn a_reboot_within_seconds_of_a_boot_voids_earlier_commands() {
     assert!(rig.screen(80, 24).contains("ARM    commanded"));
     assert!(rig.model.commands.tracks[0].observed_at.is_some());
     rig.key(Key::Char('S'));
-    rig.boot_number = 0x0000_00BB;
+    rig.boot_number = 0x0000_00BA;
+    rig.reboot();
     rig.armed = false;
     rig.phase = TdPhase::TD_PHASE_PAD_IDLE;
-    rig.run(0.1);
+    rig.run(2.1);
     let said = rig.events();
-    assert!(said.contains("rebooted, boot 000000BB"), "{said}");
-    assert!(said.contains("void since the reboot: ARM"), "{said}");
-    assert!(rig.model.commands.tracks.is_empty() && rig.model.vehicle.armed().is_none());
+    assert!(said.contains("rebooted while it was armed, boot 000000BB"), "{said}");
+    assert!(said.contains("void since then: ARM"), "{said}");
+    assert!(rig.model.commands.tracks.is_empty() && !rig.model.vehicle.is_armed());
     assert_eq!(rig.model.dialog, None);
-    assert!(rig.screen(80, 24).contains("ALARM the vehicle has REBOOTED"));
+    assert!(rig.screen(80, 24).contains("ALARM the vehicle has REBOOTED while it was armed"));
     rig.keys(&[Key::Enter]);
     assert!(!rig.commands().iter().any(|command| command.command == MavCmd::MAV_CMD_MISSION_START));
     rig.run(2.0);

@@ -69,13 +69,10 @@ fn a_reboot_drops_old_values() {
     rig.boot_number = 0;
     rig.run(11.0);
     rig.state(0.0, 15.0, 0.0, 0.0, 90.0);
-    let mut rebooted = Rig::new(settings(false, true));
-    rebooted.boot_number = 0;
-    rebooted.now = std::time::Duration::from_millis(500);
-    rebooted.model = rig.model;
-    rebooted.flight_status();
-    assert!(rebooted.events().contains("rebooted"));
-    assert!(rebooted.model.vehicle.attitude.is_none());
+    rig.switch_on();
+    rig.run(2.5);
+    assert!(rig.events().contains("rebooted"));
+    assert!(rig.model.vehicle.attitude.is_none());
 }
 
 #[test]

@@ -88,14 +88,116 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
 fn two_vehicles_end_when_one_is_silent() {
     let mut rig = Rig::crewed();
     beside(&mut rig, 9, 2);
-    assert_eq!(rig.model.vehicle.boot.number(), Some(9));
+    assert_eq!(rig.model.vehicle.boot.number(), Some(0x1A2B_3C4D), "the first one keeps the screen");
     rig.run(11.0);
     assert!(first_line(&rig, 80, 24).contains("boot 1A2B3C4D"), "{}", first_line(&rig, 80, 24));
-    assert!(rig.events().contains("is heard alone again, boot 1A2B3C4D"), "{}", rig.events());
+    assert!(!rig.events().contains("rebooted"), "{}", rig.events());
     assert!(rig.screen(80, 24).contains(" GO: every arming check passes"), "{}", rig.screen(80, 24));
     rig.take_commands();
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
+}
+
+/// A rig whose vehicle counts down, armed from here.
+fn counting() -> Rig {
+    let mut rig = Rig::crewed();
+    (rig.armed, rig.phase, rig.countdown_ms) = (true, TdPhase::TD_PHASE_PAD_ARMED, 8_000);
+    rig.run(1.0);
+    rig.take_commands();
+    rig
+}
+
+/// A spare is switched on with its clock at zero, on the same channel.
+#[test]
+fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_it() {
+    let mut rig = counting();
+    for step in 0..60 {
+        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+            boot_number: 9,
+            vehicle_uid: 5,
+            time_boot_ms: 100 * step,
+            phase: TdPhase::TD_PHASE_PAD_IDLE,
+            countdown_ms: i32::MAX,
+            ..TD_FLIGHT_STATUS_DATA::default()
+        }));
+        let screen = rig.screen(140, 45);
+        let [first, second] = [0, 1].map(|row| screen.lines().nth(row).unwrap_or_default());
+        assert!(first.contains("TWO VEHICLES under id 1"), "{step}: {screen}");
+        assert!(
+            second.contains("PAD_ARMED") && second.contains("ARMED") && second.contains("T-8.0"),
+            "{screen}"
+        );
+        assert!(screen.contains("also 00000009 PAD_IDLE") && !screen.contains("REBOOTED"), "{screen}");
+        rig.run(0.1);
+    }
+    let sent = rig.take_commands();
+    assert!(sent.iter().any(|sent| sent.command == MavCmd::MAV_CMD_DO_PAUSE_CONTINUE), "{sent:?}");
+    assert!(rig.events().contains("TWO VEHICLES in the countdown: HOLD"), "{}", rig.events());
+}
+
+#[test]
+fn one_of_two_vehicles_is_chosen_by_name_and_then_armed() {
+    let mut rig = Rig::crewed();
+    beside(&mut rig, 9, 1);
+    rig.keys(&[vec![Key::Char(':')], typed("choose boot 00000009"), vec![Key::Enter]].concat());
+    beside(&mut rig, 9, 1);
+    assert_eq!(rig.model.vehicle.boot.number(), Some(9), "{}", rig.screen(80, 24));
+    assert!(first_line(&rig, 80, 24).contains("TWO VEHICLES"), "it is still said");
+    assert!(ground::model::why_nothing_moves(&rig.model, rig.now).is_none());
+}
+
+#[test]
+fn a_reset_in_the_countdown_is_an_alarm_and_withdraws_what_was_observed() {
+    for fixed in [false, true] {
+        let mut rig = counting();
+        rig.msg(Msg::command(CommandKind::Start, Seat::default()));
+        rig.answer(START, 0);
+        rig.run(6.0);
+        assert!(rig.screen(140, 45).contains("observed yes"), "{}", rig.screen(140, 45));
+        if fixed {
+            rig.switch_on();
+        } else {
+            rig.reboot();
+        }
+        (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
+        rig.run(2.5);
+        let screen = rig.screen(140, 45);
+        assert!(screen.contains("REBOOTED in the countdown") && !screen.contains("observed yes"), "{screen}");
+        assert!(rig.events().contains("void since then: START"), "{}", rig.events());
+    }
+}
+
+#[test]
+fn what_was_observed_and_is_no_longer_so_is_withdrawn() {
+    let mut rig = counting();
+    rig.msg(Msg::command(CommandKind::Start, Seat::default()));
+    rig.answer(START, 0);
+    rig.run(1.0);
+    rig.countdown_ms = i32::MAX;
+    rig.run(2.0);
+    assert!(rig.events().contains("START no longer so: no countdown runs"), "{}", rig.events());
+    assert!(!rig.screen(140, 45).contains("observed yes"), "{}", rig.screen(140, 45));
+}
+
+#[test]
+fn a_power_cycle_does_not_end_the_waiting_time_after_an_abort() {
+    let mut rig = counting();
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
+    (rig.pad_wait_s, rig.approach_wait_s) = (58, 58);
+    rig.run(1.0);
+    rig.reboot();
+    rig.interlocks = TdInterlock::TD_INTERLOCK_PIN_OUT;
+    (rig.pad_wait_s, rig.approach_wait_s) = (0, 0);
+    rig.run(4.0);
+    let screen = rig.screen(80, 24);
+    assert!(rig.events().contains("rebooted") && screen.contains("do not approach"), "{screen}");
+    rig.take_commands();
+    rig.keys(&ladder());
+    assert_eq!(rig.take_commands(), []);
+    assert!(rig.events().contains("cannot arm: do not approach for 5"), "{}", rig.events());
+    rig.run(60.0);
+    assert!(rig.screen(80, 24).contains(" GO: every arming check passes"), "{}", rig.screen(80, 24));
 }
 
 #[test]

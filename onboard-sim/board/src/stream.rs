@@ -54,6 +54,9 @@ pub struct OnTheAir {
     /// Bytes per second that the radio carries.
     #[prost(uint32, required, tag = "4")]
     pub budget_bytes_s: u32,
+    /// The vehicle's unique id, the same at each power-up.
+    #[prost(uint32, required, tag = "5")]
+    pub uid: u32,
 }
 
 /// What a board has heard over its radio for its next frame.

@@ -49,6 +49,8 @@ pub mod vehicle {
     pub struct Identity {
         pub kind: VehicleKind,
         pub boot_number: u32,
+        /// A random number of the vehicle, the same after each power-up; 0: not told.
+        pub uid: u32,
     }
 
     /// Which mission or profile a vehicle flies.

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
@@ -73,6 +73,10 @@ pub(crate) struct FlyArguments {
     /// Number of this boot on the wire, 1 to 16777215, instead of a random one.
     #[arg(long, value_name = "NUMBER", value_parser = boot_number)]
     boot_number: Option<NonZeroU32>,
+    /// Keep the vehicle's unique id, a random number, in this file, so that a station knows the vehicle again after a power
+    /// cycle. Without it each start is another vehicle.
+    #[arg(long, value_name = "FILE")]
+    uid_file: Option<PathBuf>,
     /// Log to write (MCAP), or `none`, as without this option. An existing file is kept: the log then gets the next free name,
     /// and says so.
     #[arg(long, value_name = "FILE|none", value_parser = log_choice)]
@@ -159,8 +163,10 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         }
     };
     let drawn = OnTheWire::drawn();
+    let uid = arguments.uid_file.as_deref().map(|file| kept_uid(file, drawn.uid)).transpose()?;
     let on_the_wire = OnTheWire {
         boot_number: arguments.boot_number.unwrap_or(drawn.boot_number),
+        uid: uid.unwrap_or(drawn.uid),
         network_bytes_s: arguments.network_budget,
         serial_bytes_s: arguments.serial_budget,
     };
@@ -232,6 +238,26 @@ pub(super) async fn interrupted() {
 fn boot_number(text: &str) -> Result<NonZeroU32, String> {
     let number = text.parse().ok().filter(|number: &NonZeroU32| number.get() <= LARGEST_BOOT_NUMBER);
     number.ok_or_else(|| format!("must be a whole number from 1 to {LARGEST_BOOT_NUMBER}"))
+}
+
+/// The unique id in the file; a new file gets the drawn one.
+fn kept_uid(file: &Path, drawn: NonZeroU32) -> anyhow::Result<NonZeroU32> {
+    let name = file.display();
+    match std::fs::read_to_string(file) {
+        Ok(text) => text.trim().parse().map_err(|_wrong| {
+            anyhow::anyhow!(
+                "{name}: `{}` is no unique id; it must be a whole number from 1 to {}",
+                text.trim(),
+                u32::MAX
+            )
+        }),
+        Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
+            std::fs::write(file, format!("{drawn}\n"))
+                .with_context(|| format!("{name} cannot be written"))?;
+            Ok(drawn)
+        }
+        Err(why) => Err(why).with_context(|| format!("{name} cannot be read")),
+    }
 }
 
 fn report_event(time_s: f64, event: &VehicleEvent) {

@@ -145,14 +145,14 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
     let all = TdCheck::all();
     let (station_log_fails, station_log) = station_log(model, theme, now);
-    let mut lines: Vec<Line> = all
-        .iter_names()
-        .filter(|(_, bit)| fails(*bit))
-        .map(|check| row(" NO ", check, failure(check.1)))
-        .collect();
+    let several = model.vehicle_rows(now).into_iter();
+    let several = several.map(|words| theme.line(format!(" {words}"), TextRole::Alarm));
+    let mut lines: Vec<Line> = several.collect();
     if station_log_fails {
-        lines.insert(0, station_log.clone());
+        lines.push(station_log.clone());
     }
+    let failing = all.iter_names().filter(|(_, bit)| fails(*bit));
+    lines.extend(failing.map(|check| row(" NO ", check, failure(check.1))));
     let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
     let count = format!(" GO {mark}{pass} of {of} checks");
     lines.push(theme.line(count, TextRole::Good));

@@ -42,6 +42,7 @@ pub(crate) struct Rig {
     pub(crate) checks_failed: u16,
     pub(crate) pad_wait_s: u16,
     pub(crate) boot_number: u32,
+    pub(crate) uid: u32,
     /// Whether both of its flags are set.
     pub(crate) simulated: bool,
     /// Whether the heartbeat of a simulated vehicle says so, too.
@@ -57,6 +58,8 @@ pub(crate) struct Rig {
     /// Whether it was this station that armed it.
     pub(crate) armed_here: bool,
     heard_at: Duration,
+    /// When the vehicle was switched on.
+    booted_at: Duration,
     encoder: Encoder,
 }
 
@@ -74,6 +77,7 @@ impl Rig {
             checks_failed: 0,
             pad_wait_s: 0,
             boot_number: 0x1A2B_3C4D,
+            uid: 77,
             simulated: true,
             hil: true,
             motor: TdMotor::TD_MOTOR_LIVE,
@@ -84,6 +88,7 @@ impl Rig {
             hears: true,
             armed_here: true,
             heard_at: Duration::ZERO,
+            booted_at: Duration::ZERO,
             encoder: Encoder::new(VEHICLE),
         }
     }
@@ -163,7 +168,18 @@ impl Rig {
     }
 
     pub(crate) fn boot_ms(&self) -> u32 {
-        u32::try_from(self.now.as_millis()).unwrap_or(u32::MAX)
+        u32::try_from(self.now.saturating_sub(self.booted_at).as_millis()).unwrap_or(u32::MAX)
+    }
+
+    /// The vehicle is switched off and on, with the next boot number.
+    pub(crate) fn reboot(&mut self) {
+        self.boot_number += 1;
+        self.switch_on();
+    }
+
+    /// The same with a fixed boot number.
+    pub(crate) fn switch_on(&mut self) {
+        self.booted_at = self.now;
     }
 
     pub(crate) fn hear(&mut self, message: &MavMessage) {
@@ -218,6 +234,7 @@ impl Rig {
             hold: self.hold,
             latch: self.latch,
             last_hold_ms: 2_000,
+            vehicle_uid: self.uid,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
         };
         self.hear(&MavMessage::TD_FLIGHT_STATUS(status));

@@ -135,7 +135,7 @@ impl VehicleEndpoint {
     fn over(kind: VehicleKind, streams: Streams, signature_len: usize) -> Self {
         Self {
             us: VEHICLE,
-            identity: Identity { kind, boot_number: 0 },
+            identity: Identity { kind, boot_number: 0, uid: 0 },
             lanes: vec![Lane::new(vec![0], streams, Encoder::new(VEHICLE), signature_len)],
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
             text_id: 0,
@@ -159,6 +159,12 @@ impl VehicleEndpoint {
     #[must_use]
     pub fn booted(self, boot_number: u32) -> Self {
         Self { identity: Identity { boot_number, ..self.identity }, ..self }
+    }
+
+    /// Sets the unique id of the vehicle, which it keeps from one power-up to the next.
+    #[must_use]
+    pub fn known_as(self, uid: u32) -> Self {
+        Self { identity: Identity { uid, ..self.identity }, ..self }
     }
 
     /// Sets the links by their budgets in bytes per second. All carry the same frames, limited by the slowest link,

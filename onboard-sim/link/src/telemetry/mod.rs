@@ -50,7 +50,7 @@ pub fn message(message_id: u32, snapshot: &Snapshot, identity: Identity) -> Opti
         LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
         VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
         CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
-        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(identity.boot_number)),
+        AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(identity.uid)),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
         ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
         TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, identity)),
@@ -210,9 +210,8 @@ fn current_mode(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-/// A simulated vehicle is a new one at each power-up: its unique id is the number of its boot, below two letters, so that it is
-/// never zero.
-fn autopilot_version(boot_number: u32) -> MavMessage {
+/// The unique id stands below two letters, so that it is never zero.
+fn autopilot_version(uid: u32) -> MavMessage {
     let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
@@ -222,7 +221,7 @@ fn autopilot_version(boot_number: u32) -> MavMessage {
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST,
         // Major, minor, patch, then 0 for a development version.
         flight_sw_version: version.take(3).fold(0, |packed, part| (packed << 8) | (part & 0xff)) << 8,
-        uid: u64::from_be_bytes(*b"TD\0\0\0\0\0\0") | u64::from(boot_number),
+        uid: u64::from_be_bytes(*b"TD\0\0\0\0\0\0") | u64::from(uid),
         flight_custom_version: version_hash(),
         ..AUTOPILOT_VERSION_DATA::default()
     })

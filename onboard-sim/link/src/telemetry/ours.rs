@@ -45,6 +45,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
         abort_effect,
         abort_impact_m_s,
         boot_number: identity.boot_number,
+        vehicle_uid: identity.uid,
         vehicle_flags: match identity.kind {
             VehicleKind::Simulated => TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
             VehicleKind::Real => TdVehicleFlag::empty(),

@@ -212,6 +212,8 @@ impl OnBoard {
 pub struct OnTheWire {
     /// Random number drawn once at each power-up: a different number means a different boot.
     pub boot_number: NonZeroU32,
+    /// Random number of the vehicle, the same after each power-up if it is kept.
+    pub uid: NonZeroU32,
     /// Budget of each network link, bytes per second.
     pub network_bytes_s: u32,
     /// Budget of each serial link, bytes per second, as far as four fifths of its baud rate go: what a radio behind it carries.
@@ -219,12 +221,19 @@ pub struct OnTheWire {
 }
 
 impl OnTheWire {
-    /// A random boot number, a network's budget on network links and a radio's on serial ones.
+    /// A random boot number and unique id, a network's budget on network links and a radio's on serial ones.
     pub fn drawn() -> Self {
         // The standard library's random hash keys differ in every process.
-        let drawn = RandomState::new().build_hasher().finish() as u32 & LARGEST_BOOT_NUMBER;
-        let boot_number = NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN);
-        Self { boot_number, network_bytes_s: NETWORK_BUDGET_BYTES_S, serial_bytes_s: RADIO_BUDGET_BYTES_S }
+        let [boot_number, uid] = [LARGEST_BOOT_NUMBER, u32::MAX].map(|largest| {
+            let drawn = RandomState::new().build_hasher().finish() as u32 & largest;
+            NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN)
+        });
+        Self {
+            boot_number,
+            uid,
+            network_bytes_s: NETWORK_BUDGET_BYTES_S,
+            serial_bytes_s: RADIO_BUDGET_BYTES_S,
+        }
     }
 
     pub(super) fn capacity_bytes_s(self, link: &LinkAddress) -> u32 {

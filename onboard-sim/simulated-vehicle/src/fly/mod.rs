@@ -210,6 +210,7 @@ fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
     let endpoint = endpoint
         .of_system(options.system_id)
         .booted(options.on_the_wire.boot_number.get())
+        .known_as(options.on_the_wire.uid.get())
         .over_links(&capacities_bytes_s);
     if options.auto_start { endpoint.starting_by_itself() } else { endpoint }
 }
@@ -239,6 +240,7 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
         system_id: u32::from(options.system_id),
         boot_number: options.on_the_wire.boot_number.get(),
         budget_bytes_s: options.on_the_wire.serial_bytes_s,
+        uid: options.on_the_wire.uid.get(),
     };
     Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
 }

@@ -13,7 +13,7 @@ use vehicle_link::vehicle::Identity;
 
 use super::*;
 
-const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0 };
+const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0, uid: 5 };
 
 impl Wire {
     /// The answer to a question with these bytes.
@@ -232,7 +232,7 @@ fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
 #[test]
 fn the_version_announces_files_and_has_an_id_and_a_hash() {
     let mut wire = Wire::new();
-    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(77);
+    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).known_as(77);
     assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
     let sent = wire.run(1.0);
     let version = find(&sent, |message| match message {
@@ -244,7 +244,7 @@ fn the_version_announces_files_and_has_an_id_and_a_hash() {
     let now = vehicle_link::telemetry::message(
         AUTOPILOT_VERSION_DATA::ID,
         &snapshot,
-        Identity { boot_number: 77, ..SIMULATED },
+        Identity { uid: 77, ..SIMULATED },
     );
     let Some(MavMessage::AUTOPILOT_VERSION(now)) = now else { panic!("it always has content") };
     assert!(version.is_none_or(|version| version == now));

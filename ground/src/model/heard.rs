@@ -1,0 +1,615 @@
+//! Which power-ups of which vehicles are heard under the id, and which one of them the screen shows.
+//!
+//! A *run* is one vehicle from one power-up on. Only `TD_FLIGHT_STATUS` names its run: by the vehicle's unique id, the number
+//! of the boot and the vehicle's clock. What else is heard belongs to the run whose clock, or whose sequence numbers, it fits.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use protocol::dialect::TdPhase;
+
+use super::{Foreign, KeepAway, Model, Vehicle, words};
+
+/// Messages of a slow and a fast link mix: a vehicle's clock, ms, may go back by this much.
+const REORDERED_MS: i64 = 5_000;
+/// Two runs of one vehicle follow each other. This much of an overlap, ms, are the delays of its links.
+const OVERLAP_MS: i64 = 500;
+/// Over different links one clock arrives with different delays, up to this, ms; beyond it there are two clocks.
+const LINKS_APART_MS: i64 = 2_000;
+/// Of several vehicles under one id, one that is silent for this long is gone.
+pub const GONE_AFTER: Duration = Duration::from_secs(10);
+/// A vehicle that was shown, and whose next run is heard from the same place, was reset if it is silent for this long: twenty
+/// reports on a network, and more than one on the slowest line.
+const RESET_AFTER: Duration = Duration::from_secs(2);
+/// How many runs are remembered: the shown one, and a few that stand beside it or came before it.
+const RUNS_MAX: usize = 4;
+/// How many reports in [`STEADY_WITHIN`] show that a run goes on: a single frame that anybody may have sent does not.
+const STEADY_WORDS: usize = 3;
+const STEADY_WITHIN: Duration = Duration::from_secs(3);
+/// Fewer frames than [`STRAY_FROM`] fit into this time.
+const FRESH_WITHIN: Duration = Duration::from_millis(500);
+const STRAY_FROM: i64 = 64;
+/// How many places of one run are told apart.
+const PLACES_MAX: usize = 4;
+/// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
+/// between them.
+const NEAR_MS: i64 = 500;
+/// How often they contradict each other within [`GONE_AFTER`] until they are those of two vehicles.
+const CONTRADICTIONS: usize = 3;
+
+/// What a flight status says of its sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Word {
+    /// The vehicle's unique id; 0: not told.
+    pub uid: u32,
+    /// The number of its boot; 0: not told.
+    pub boot: u32,
+    /// The time on its clock, ms.
+    pub clock_ms: u32,
+    /// The sequence number of the frame.
+    pub sequence: u8,
+    /// From where the frame came: a number for each link and address.
+    pub place: u16,
+}
+
+/// Names a run for as long as the station runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RunId(u32);
+
+/// The last report of a run from one place.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    number: u16,
+    /// When the run began on our clock, ms, if nothing has been delayed: the least that was found.
+    began_ms: i64,
+    words: u32,
+    clock_ms: u32,
+    sequence: u8,
+}
+
+#[derive(Debug, Clone)]
+struct Run {
+    id: RunId,
+    uid: u32,
+    boot: u32,
+    places: Vec<Place>,
+    /// The latest time on its clock, ms.
+    clock_ms: u32,
+    heard_at: Duration,
+    /// When its last reports came.
+    words_at: VecDeque<Duration>,
+    /// When its clock and its sequence numbers last contradicted each other.
+    contradicted_at: VecDeque<Duration>,
+    /// Armed, in a countdown, in flight, or down and not yet safe.
+    is_busy: bool,
+}
+
+fn ms(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
+}
+
+fn is_within(at: Duration, limit: Duration, now: Duration) -> bool {
+    now.saturating_sub(at) < limit
+}
+
+impl Run {
+    fn new(id: RunId, word: &Word, now: Duration) -> Self {
+        let mut run = Self {
+            id,
+            uid: word.uid,
+            boot: word.boot,
+            places: Vec::new(),
+            clock_ms: word.clock_ms,
+            heard_at: now,
+            words_at: VecDeque::new(),
+            contradicted_at: VecDeque::new(),
+            is_busy: false,
+        };
+        run.hear(word, now);
+        run
+    }
+
+    fn is_heard(&self, now: Duration) -> bool {
+        is_within(self.heard_at, GONE_AFTER, now)
+    }
+
+    /// How far a time on a clock is from where this run's clock should be by now, ms.
+    fn away_ms(&self, clock_ms: u32, now: Duration) -> i64 {
+        i64::from(clock_ms) - i64::from(self.clock_ms) - ms(now.saturating_sub(self.heard_at))
+    }
+
+    /// Whether a report may be one of this run.
+    fn fits(&self, word: &Word, now: Duration) -> bool {
+        let is_late = i64::from(word.clock_ms) + REORDERED_MS < i64::from(self.clock_ms);
+        (self.uid, self.boot) == (word.uid, word.boot)
+            && !is_late
+            && self.away_ms(word.clock_ms, now) <= REORDERED_MS
+    }
+
+    fn hear(&mut self, word: &Word, now: Duration) {
+        self.heard_at = now;
+        self.clock_ms = self.clock_ms.max(word.clock_ms);
+        self.words_at.push_back(now);
+        self.words_at.drain(..self.words_at.len().saturating_sub(STEADY_WORDS));
+        let began_ms = ms(now) - i64::from(word.clock_ms);
+        let known = self.places.iter_mut().find(|place| place.number == word.place);
+        let Some(place) = known else {
+            self.places.drain(..(self.places.len() + 1).saturating_sub(PLACES_MAX));
+            let Word { place: number, clock_ms, sequence, .. } = *word;
+            self.places.push(Place { number, began_ms, words: 1, clock_ms, sequence });
+            return;
+        };
+        let clock_by_ms = i64::from(word.clock_ms) - i64::from(place.clock_ms);
+        let sequence_by = i64::from(word.sequence.wrapping_sub(place.sequence).cast_signed());
+        if clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() != sequence_by.signum() {
+            self.contradicted_at.push_back(now);
+            self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
+        }
+        place.began_ms = place.began_ms.min(began_ms);
+        place.words = place.words.saturating_add(1);
+        (place.clock_ms, place.sequence) = (word.clock_ms, word.sequence);
+    }
+
+    /// How many frames after its last report a sequence number comes.
+    fn behind(&self, sequence: u8) -> i64 {
+        self.places.iter().map(|place| i64::from(sequence.wrapping_sub(place.sequence))).min().unwrap_or(0)
+    }
+
+    /// When it began, and what its clock has shown last, ms on our clock.
+    fn began_ms(&self) -> i64 {
+        self.places.iter().map(|place| place.began_ms).min().unwrap_or(0)
+    }
+
+    fn said_ms(&self) -> i64 {
+        self.began_ms() + i64::from(self.clock_ms)
+    }
+
+    fn shares_a_place(&self, other: &Self) -> bool {
+        self.places.iter().any(|place| other.places.iter().any(|others| others.number == place.number))
+    }
+
+    /// Whether it may be the same vehicle after its next power-up.
+    fn follows(&self, former: &Self) -> bool {
+        self.uid == former.uid && self.began_ms() + OVERLAP_MS >= former.said_ms()
+    }
+
+    fn is_steady(&self, now: Duration) -> bool {
+        self.words_at.len() == STEADY_WORDS
+            && self.words_at.iter().all(|at| is_within(*at, STEADY_WITHIN, now))
+    }
+
+    /// Whether two vehicles speak with this unique id and this boot: a copied memory card.
+    fn is_of_two(&self, now: Duration) -> bool {
+        let contradicts = self.contradicted_at.len() == CONTRADICTIONS
+            && self.contradicted_at.iter().all(|at| is_within(*at, GONE_AFTER, now));
+        let clocks = || self.places.iter().filter(|place| place.words > 5).map(|place| place.began_ms);
+        let apart_ms = clocks().max().zip(clocks().min()).map_or(0, |(last, first)| last - first);
+        contradicts || apart_ms > LINKS_APART_MS
+    }
+}
+
+/// Another vehicle beside the shown one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beside {
+    /// This run; its boot, 0 if it tells none.
+    Run(RunId, u32),
+    /// One that has the unique id and the boot of the shown one.
+    Twin,
+}
+
+/// The runs that are heard.
+#[derive(Debug, Clone, Default)]
+pub struct Heard {
+    runs: Vec<Run>,
+    shown: Option<RunId>,
+    /// The run that the crew has chosen by name.
+    chosen: Option<RunId>,
+    next_id: u32,
+}
+
+impl Heard {
+    fn of(&self, id: RunId) -> Option<&Run> {
+        self.runs.iter().find(|run| run.id == id)
+    }
+
+    fn shown_run(&self) -> Option<&Run> {
+        self.of(self.shown?)
+    }
+
+    pub fn shown(&self) -> Option<RunId> {
+        self.shown
+    }
+
+    /// Whether this run may be the shown vehicle after a reset, rather than another vehicle.
+    pub fn follows(&self, id: RunId, former: RunId) -> bool {
+        self.of(id).zip(self.of(former)).is_some_and(|(run, former)| run.follows(former))
+    }
+
+    /// Takes a flight status, and says which run it comes from. The first one is shown.
+    pub fn hear(&mut self, word: &Word, now: Duration) -> RunId {
+        let fitting = self.runs.iter_mut().filter(|run| run.fits(word, now));
+        if let Some(run) = fitting.min_by_key(|run| run.away_ms(word.clock_ms, now).abs()) {
+            run.hear(word, now);
+            return run.id;
+        }
+        let id = RunId(self.next_id);
+        self.next_id = self.next_id.wrapping_add(1);
+        if self.runs.len() == RUNS_MAX {
+            let kept = [self.shown, self.chosen];
+            let oldest = (0..RUNS_MAX)
+                .filter(|place| !kept.contains(&Some(self.runs[*place].id)))
+                .min_by_key(|place| (self.runs[*place].is_busy, self.runs[*place].heard_at));
+            self.runs.remove(oldest.unwrap_or(0));
+        }
+        self.runs.push(Run::new(id, word, now));
+        self.shown.get_or_insert(id);
+        id
+    }
+
+    /// Which run another message comes from, by its clock or its sequence number; `None` before the first flight status.
+    /// Whatever fits several goes to the shown one.
+    pub fn speaker(&self, clock_ms: Option<u32>, sequence: u8, now: Duration) -> Option<RunId> {
+        let shown = self.shown_run()?;
+        let off = |run: &Run| match clock_ms {
+            Some(clock_ms) => run.away_ms(clock_ms, now).abs(),
+            None => run.behind(sequence),
+        };
+        let others = self.runs.iter().filter(|run| run.id != shown.id && run.is_steady(now));
+        let nearest = others.min_by_key(|run| off(run)).filter(|run| off(run) < off(shown));
+        Some(nearest.unwrap_or(shown).id)
+    }
+
+    /// Whether a frame without a clock is of none of these runs: it comes out of sequence while the shown one reports steadily.
+    /// Somebody else beats under this id, and has not said yet who it is.
+    pub fn is_stray(&self, sequence: u8, now: Duration) -> bool {
+        self.shown_run().is_some_and(|shown| is_within(shown.heard_at, FRESH_WITHIN, now))
+            && self.runs.iter().filter(|run| run.is_heard(now)).all(|run| run.behind(sequence) > STRAY_FROM)
+    }
+
+    /// Notes whether a run is armed, in a countdown, in flight, or down and not yet safe.
+    pub fn note(&mut self, id: RunId, is_busy: bool) {
+        if let Some(run) = self.runs.iter_mut().find(|run| run.id == id) {
+            run.is_busy = is_busy;
+        }
+    }
+
+    /// Decides which run is shown. Returns the one that takes the screen.
+    ///
+    /// The shown one keeps it for as long as it is heard, and a single frame of whomever never takes it. It goes to a run that
+    /// was chosen by name; to the next run of the same vehicle, after a reset; and from an idle vehicle to one from the same
+    /// place that is armed or flies.
+    pub fn settle(&mut self, now: Duration) -> Option<RunId> {
+        let shown = self.shown_run()?;
+        let chosen = self.chosen.and_then(|id| self.of(id)).filter(|run| run.is_heard(now)).map(|run| run.id);
+        let silence = now.saturating_sub(shown.heard_at);
+        let takes = |run: &&Run| {
+            let words = run.words_at.iter().filter(|at| **at > shown.heard_at).count();
+            let near = run.shares_a_place(shown);
+            let after = if near && run.follows(shown) { RESET_AFTER } else { GONE_AFTER };
+            let is_alone = silence >= after && words > 1;
+            run.id != shown.id
+                && run.is_heard(now)
+                && (is_alone || (near && run.is_busy && !shown.is_busy && run.is_steady(now)))
+        };
+        let next = chosen.unwrap_or_else(|| {
+            let taking = self.runs.iter().filter(takes);
+            taking.max_by_key(|run| (run.is_busy, run.heard_at)).map_or(shown.id, |run| run.id)
+        });
+        self.chosen = chosen;
+        let changed = self.shown.replace(next) != Some(next);
+        changed.then_some(next)
+    }
+
+    /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of its number.
+    pub fn choose(&mut self, boot: u32, now: Duration) -> bool {
+        let named: Vec<RunId> =
+            self.runs.iter().filter(|run| run.boot == boot && run.is_heard(now)).map(|run| run.id).collect();
+        if let [only] = named[..] {
+            self.chosen = Some(only);
+        }
+        named.len() == 1
+    }
+
+    /// Other vehicles that are heard beside the shown one.
+    pub fn beside(&self, now: Duration) -> Vec<Beside> {
+        let Some(shown) = self.shown_run().filter(|shown| shown.is_heard(now)) else { return Vec::new() };
+        let is_other = |run: &&Run| {
+            let is_same = run.shares_a_place(shown) && (run.follows(shown) || shown.follows(run));
+            run.id != shown.id && run.is_heard(now) && !is_same
+        };
+        let others = self.runs.iter().filter(is_other).map(|run| Beside::Run(run.id, run.boot));
+        let twin = self.runs.iter().any(|run| run.is_heard(now) && run.is_of_two(now));
+        others.chain(twin.then_some(Beside::Twin)).collect()
+    }
+
+    /// Whether the crew has chosen the shown one among several, and a command can name it: its boot has a number that no
+    /// other one has.
+    pub fn is_chosen(&self, now: Duration) -> bool {
+        let Some(shown) = self.shown_run() else { return false };
+        let same = self.runs.iter().filter(|run| run.boot == shown.boot && run.is_heard(now)).count();
+        self.chosen == self.shown && shown.boot > 0 && same == 1 && !shown.is_of_two(now)
+    }
+
+    /// How long ago a run was heard.
+    pub fn age(&self, id: RunId, now: Duration) -> Option<Duration> {
+        self.of(id).map(|run| now.saturating_sub(run.heard_at))
+    }
+
+    /// Whether a run is still remembered.
+    pub fn knows(&self, id: RunId) -> bool {
+        self.of(id).is_some()
+    }
+}
+
+// The vehicles of these runs: the shown one is the model's, and the others are kept beside it.
+
+impl Model {
+    /// The vehicles that are heard beside the shown one, in words; `None` if it is alone.
+    pub fn beside(&self, now: Duration) -> Option<String> {
+        let is_heard = |at: Duration| is_within(at, GONE_AFTER, now);
+        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_heard(status.received_at));
+        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
+        let words = self.heard.beside(now).into_iter().map(|other| match other {
+            Beside::Run(_, 0) => "one without a boot number".to_owned(),
+            Beside::Run(id, boot) => {
+                let state =
+                    self.others.get(&id).map_or_else(String::new, |of| format!(" {}", state_words(of)));
+                format!("boot {}{state}", words::boot(boot))
+            }
+            Beside::Twin => "another one with the same boot and unique id".to_owned(),
+        });
+        let words: Vec<String> = words.chain(foreign.map(Foreign::name)).collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    }
+
+    /// A row for each vehicle while there are several: its boot, phase, whether it is armed, its countdown and its age.
+    pub fn vehicle_rows(&self, now: Duration) -> Vec<String> {
+        let beside = self.heard.beside(now);
+        let row = |lead: &str, vehicle: &Vehicle, age: Option<Duration>| {
+            let boot = vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
+            let age = age.map_or_else(String::new, |age| format!(" {}s", age.as_secs()));
+            format!("{lead} {boot} {}{age}", state_words(vehicle))
+        };
+        let others = beside.iter().filter_map(|other| match other {
+            Beside::Run(id, _) => Some(row("also", self.others.get(id)?, self.heard.age(*id, now))),
+            Beside::Twin => Some("also one with the same boot and unique id".to_owned()),
+        });
+        let shown = self.heard.shown().filter(|_| !beside.is_empty());
+        let shown = shown.map(|id| row("this", &self.vehicle, self.heard.age(id, now)));
+        shown.into_iter().chain(others).collect()
+    }
+
+    /// Other boots that are heard, which the crew may choose by name.
+    pub fn other_boots(&self, now: Duration) -> Vec<u32> {
+        let boot = |other| match other {
+            Beside::Run(_, boot) if boot > 0 => Some(boot),
+            _ => None,
+        };
+        self.heard.beside(now).into_iter().filter_map(boot).collect()
+    }
+
+    /// The vehicles that are heard: the shown one, and those beside it.
+    pub fn every_vehicle(&self, now: Duration) -> impl Iterator<Item = &Vehicle> {
+        let heard = self
+            .others
+            .iter()
+            .filter(move |(id, _)| self.heard.age(**id, now).is_some_and(|age| age < GONE_AFTER));
+        std::iter::once(&self.vehicle).chain(heard.map(|(_, vehicle)| vehicle))
+    }
+}
+
+/// Its phase, whether it is armed, and its countdown.
+fn state_words(vehicle: &Vehicle) -> String {
+    let phase = vehicle.phase_now().map_or_else(|| "phase ?".to_owned(), words::phase);
+    let armed = match vehicle.armed() {
+        None => "armed ?",
+        Some(armed) if armed.value => "ARMED",
+        Some(_) => "disarmed",
+    };
+    let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
+    let left = left.map_or_else(String::new, |left| format!(" T-{:.0}", left.value));
+    format!("{phase} {armed}{left}")
+}
+
+/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it keeps the screen.
+pub(crate) fn is_busy(vehicle: &Vehicle, now: Duration) -> bool {
+    let is_armed_on_pad = vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
+    vehicle.is_armed() || is_armed_on_pad || vehicle.in_flight() || KeepAway::of(vehicle, now).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// A vehicle that was switched on at this time, ms.
+    #[derive(Debug, Clone, Copy)]
+    struct Sender {
+        uid: u32,
+        boot: u32,
+        on_ms: u64,
+        place: u16,
+        sequence: u8,
+    }
+
+    impl Sender {
+        const fn new(uid: u32, boot: u32, on_ms: u64) -> Self {
+            Self { uid, boot, on_ms, place: 0, sequence: (on_ms % 251) as u8 }
+        }
+
+        /// Its report of this time; six frames of other kinds lie between two of them.
+        fn word(&mut self, said_ms: u64) -> Word {
+            self.sequence = self.sequence.wrapping_add(7);
+            let clock_ms = (said_ms - self.on_ms) as u32;
+            Word { uid: self.uid, boot: self.boot, clock_ms, sequence: self.sequence, place: self.place }
+        }
+    }
+
+    fn boots(heard: &Heard, now: Duration) -> usize {
+        heard.beside(now).len()
+    }
+
+    #[test]
+    fn a_second_vehicle_is_one_at_once_and_does_not_take_the_screen() {
+        let mut heard = Heard::default();
+        let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 20_000)];
+        let shown = heard.hear(&first.word(10_000), at(10_000));
+        for ms in (10_000..60_000).step_by(100) {
+            heard.hear(&first.word(ms), at(ms));
+            if ms >= 20_000 {
+                heard.hear(&second.word(ms), at(ms));
+                assert_eq!(boots(&heard, at(ms)), 1, "{ms}");
+            }
+            assert_eq!((heard.settle(at(ms)), heard.shown()), (None, Some(shown)));
+        }
+        // The shown one is switched off: 10 s later the other one is alone, and has the screen.
+        for ms in (60_000..71_000).step_by(100) {
+            let run = heard.hear(&second.word(ms), at(ms));
+            let takes = heard.settle(at(ms));
+            assert_eq!(takes, (ms == 69_900).then_some(run), "{ms}");
+        }
+        assert_eq!(boots(&heard, at(70_000)), 0);
+    }
+
+    #[test]
+    fn a_reset_with_a_fixed_boot_number_is_seen_by_the_clock() {
+        let mut heard = Heard::default();
+        let [mut before, mut after] = [Sender::new(1, 7, 0), Sender::new(1, 7, 30_500)];
+        for ms in (0..30_000).step_by(100) {
+            heard.hear(&before.word(ms), at(ms));
+        }
+        let taken = (31_000..34_000).step_by(100).find(|ms| {
+            heard.hear(&after.word(*ms), at(*ms));
+            assert_eq!(boots(&heard, at(*ms)), 0, "{ms}");
+            heard.settle(at(*ms)).is_some()
+        });
+        assert_eq!(taken, Some(31_900), "2 s after its last word");
+    }
+
+    #[test]
+    fn two_vehicles_with_one_boot_and_one_unique_id_are_told_by_their_clocks_or_sequence_numbers() {
+        for (apart_ms, places) in
+            [(0, [0, 0]), (300, [0, 0]), (3_000, [0, 1]), (60_000, [0, 0]), (60_000, [0, 1])]
+        {
+            let mut heard = Heard::default();
+            let mut both = [Sender::new(1, 7, 0), Sender::new(1, 7, apart_ms)];
+            (both[0].place, both[1].place, both[1].sequence) = (places[0], places[1], 100);
+            for ms in (100_000..103_000).step_by(100) {
+                let two = &mut both;
+                two.iter_mut().for_each(|sender| _ = heard.hear(&sender.word(ms), at(ms)));
+                heard.settle(at(ms));
+            }
+            assert!(boots(&heard, at(103_000)) > 0, "{apart_ms} {places:?}");
+            assert!(!heard.choose(7, at(103_000)) || !heard.is_chosen(at(103_000)), "no command can name it");
+        }
+    }
+
+    #[test]
+    fn a_chosen_boot_is_shown_while_it_is_heard() {
+        let mut heard = Heard::default();
+        let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 0)];
+        for ms in (10_000..20_000).step_by(100) {
+            heard.hear(&first.word(ms), at(ms));
+            heard.hear(&second.word(ms), at(ms));
+            if ms == 15_000 {
+                assert!(!heard.choose(8, at(ms)) && heard.choose(9, at(ms)));
+            }
+            assert_eq!(heard.settle(at(ms)).is_some(), ms == 15_000);
+            assert_eq!(heard.is_chosen(at(ms)), ms >= 15_000);
+        }
+    }
+
+    proptest! {
+        /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen while it is heard.
+        #[test]
+        fn nothing_takes_the_screen_from_a_vehicle_that_is_heard(
+            others in prop::collection::vec(
+                (0_u32..3, 0_u32..4, 0_u64..100_000, 0_u16..2, any::<bool>(), any::<u8>()), 1..300,
+            ),
+            gaps_ms in prop::collection::vec(1_u64..1_900, 20..60),
+            is_busy in any::<bool>(),
+        ) {
+            let mut heard = Heard::default();
+            let mut ours = Sender::new(9, 9, 0);
+            let shown = heard.hear(&ours.word(100_000), at(100_000));
+            heard.note(shown, true);
+            let mut now_ms = 100_000;
+            let mut others = others.iter().cycle();
+            for gap_ms in gaps_ms {
+                let mut left_ms = gap_ms;
+                while left_ms > 0 {
+                    let step_ms = left_ms.min(97);
+                    (left_ms, now_ms) = (left_ms - step_ms, now_ms + step_ms);
+                    if let Some((uid, boot, clock_ms, place, _, sequence)) = others.next() {
+                        let clock_ms = *clock_ms as u32;
+                        let word = Word { uid: *uid, boot: *boot, clock_ms, sequence: *sequence, place: *place };
+                        let run = heard.hear(&word, at(now_ms));
+                        heard.note(run, is_busy);
+                        prop_assert_eq!(heard.settle(at(now_ms)), None);
+                    }
+                    prop_assert!(heard.runs.len() <= RUNS_MAX && heard.shown() == Some(shown));
+                }
+                prop_assert_eq!(heard.hear(&ours.word(now_ms), at(now_ms)), shown);
+            }
+        }
+
+        /// An unsigned frame every 4 s that says it is the same vehicle, or another one, with any boot, clock and place.
+        #[test]
+        fn a_forged_frame_now_and_then_takes_nothing(
+            forged in prop::collection::vec((0_u32..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
+            is_busy in any::<bool>(),
+        ) {
+            let mut heard = Heard::default();
+            let mut ours = Sender::new(1, 1, 0);
+            let shown = heard.hear(&ours.word(100_000), at(100_000));
+            let mut forged = forged.into_iter();
+            for ms in (100_100..120_000).step_by(100) {
+                if ms % 4_000 == 0 && let Some((uid, boot, clock_ms, place, sequence)) = forged.next() {
+                    let run = heard.hear(&Word { uid, boot, clock_ms, sequence, place }, at(ms));
+                    if run != shown {
+                        heard.note(run, is_busy);
+                    }
+                }
+                let word = ours.word(ms);
+                prop_assert_eq!(heard.hear(&word, at(ms)), shown);
+                // Everything else that ours says is still taken for ours.
+                prop_assert_eq!(heard.speaker(None, word.sequence.wrapping_add(1), at(ms)), Some(shown));
+                prop_assert_eq!(heard.settle(at(ms)), None);
+            }
+        }
+
+        /// One vehicle that reboots, over a link that is late by any time up to 4 s and 0.4 s more or less, is never two, and
+        /// its last boot is shown in the end.
+        #[test]
+        fn one_vehicle_is_never_two(
+            boots_s in prop::collection::vec(5_u64..60, 1..6),
+            late_ms in 0_u64..4_000,
+            more_ms in prop::collection::vec(0_u64..400, 100),
+            fixed in any::<bool>(),
+        ) {
+            let mut sent = Vec::new();
+            let mut on_ms = 0;
+            for (number, runs_s) in boots_s.iter().enumerate() {
+                let mut vehicle = Sender::new(1, if fixed { 7 } else { number as u32 + 1 }, on_ms);
+                for said_ms in (on_ms..on_ms + 1_000 * runs_s).step_by(500) {
+                    let more = more_ms[sent.len() % more_ms.len()];
+                    sent.push((at(said_ms + late_ms + more), vehicle.word(said_ms)));
+                }
+                on_ms += 1_000 * runs_s + 600;
+            }
+            let mut heard = Heard::default();
+            for (now, word) in &sent {
+                heard.hear(word, *now);
+                heard.settle(*now);
+                prop_assert_eq!(heard.beside(*now), vec![]);
+            }
+            let (now, word) = sent[sent.len() - 1];
+            let last = heard.hear(&word, now);
+            prop_assert_eq!(heard.shown(), Some(last));
+        }
+    }
+}
