@@ -67,7 +67,7 @@ pub fn stream(data: &[u8]) {
 pub fn frames(data: &[u8]) {
     let mut texts = Reassembler::new();
     let mut stats = LinkStats::new();
-    let mut sender = CommandSender::new();
+    let mut sender = CommandSender::new(0);
     let (mut files, mut download) = (Server::default(), Download::new(None, None, 0));
     let mut rest = data;
     let mut now = Duration::ZERO;

@@ -18,6 +18,9 @@ pub const VEHICLE: Address = Address { system_id: 1, component_id: 1 };
 /// id.
 pub const GROUND: Address = Address { system_id: 255, component_id: 190 };
 
+/// A SiK radio's reports about itself (RADIO_STATUS) come from here, on every line that has one.
+pub const RADIO: Address = Address { system_id: 51, component_id: 68 };
+
 /// Bytes per second that the default telemetry may use: a SiK radio at 57,600 baud carries this much downwards
 /// without error correction.
 pub const RADIO_BUDGET_BYTES_S: u32 = 2_000;

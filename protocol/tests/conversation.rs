@@ -23,14 +23,14 @@ fn answer(command: MavCmd, result: MavResult) -> CommandAnswer {
 
 /// Polls for `seconds` without an answer; returns the times of sending and the events.
 fn unanswered(resend: Resend, seconds: u64) -> (Vec<u64>, Vec<CommandEvent>) {
-    let mut sender = CommandSender::new();
+    let mut sender = CommandSender::new(0);
     sender.submit(VEHICLE, ARM, [1.0; 7], resend, ms(0));
     let times = (0..seconds * 100).map(|tick| tick * 10).filter(|now| !sender.poll(ms(*now)).is_empty());
     (times.collect(), sender.take_events())
 }
 
 #[test]
-fn an_arm_is_sent_once_and_given_up() {
+fn a_command_for_one_moment_is_sent_once_and_given_up() {
     let (times, events) = unanswered(Resend::Never, 5);
     assert_eq!(times, [0]);
     assert_eq!(events.last(), Some(&CommandEvent::TimedOut { command: 400, attempts: 1 }));
@@ -45,7 +45,7 @@ fn an_ordinary_command_is_sent_again_three_times_half_a_second_apart() {
 
 #[test]
 fn an_abort_is_sent_until_it_is_withdrawn() {
-    let mut sender = CommandSender::new();
+    let mut sender = CommandSender::new(0);
     let ticket = sender.submit(VEHICLE, ABORT, [1.0; 7], Resend::UntilWithdrawn, ms(0));
     let mut confirmations = Vec::new();
     for now in (0..200_000).step_by(50) {
@@ -66,7 +66,7 @@ fn an_abort_is_sent_until_it_is_withdrawn() {
 
 #[test]
 fn a_command_in_progress_gets_three_more_seconds_and_no_resend() {
-    let mut sender = CommandSender::new();
+    let mut sender = CommandSender::new(0);
     sender.submit(VEHICLE, ARM, [0.0; 7], Resend::Times(3), ms(0));
     assert_eq!(sender.poll(ms(0)).len(), 1);
     sender.on_answer(&answer(ARM, MavResult::MAV_RESULT_IN_PROGRESS), ms(100));

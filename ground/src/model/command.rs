@@ -108,18 +108,14 @@ impl CommandKind {
         !matches!(self, Self::Hold | Self::Abort | Self::EndCheck)
     }
 
-    /// How often the command is resent. ARM never is: a late duplicate could arm a vehicle believed to be safe. A
-    /// confirmation is for one ask, and a tap for one moment. A check is not repeated either: it would move what somebody
-    /// has just laid hands on.
+    /// How often the command is resent. A repetition has the number of the command, and the vehicle does it once: a late one arms
+    /// nothing that was disarmed since. A tap is for one moment. A check is not repeated either: it would move what somebody has
+    /// just laid hands on.
     pub fn resend(self) -> Resend {
         match self {
-            Self::Arm
-            | Self::ConfirmArm
-            | Self::ConfirmStart
-            | Self::Tap
-            | Self::Check
-            | Self::CheckStill => Resend::Never,
-            Self::Disarm | Self::Start | Self::Hold | Self::TakeCommand | Self::EndCheck => Resend::Times(3),
+            Self::Tap | Self::Check | Self::CheckStill => Resend::Never,
+            Self::Arm | Self::ConfirmArm | Self::Start | Self::ConfirmStart => Resend::Times(4),
+            Self::Disarm | Self::Hold | Self::TakeCommand | Self::EndCheck => Resend::Times(3),
             Self::Abort => Resend::UntilWithdrawn,
         }
     }
@@ -250,6 +246,11 @@ pub struct Commands {
 }
 
 impl Commands {
+    /// The session decides where the numbers of the commands begin.
+    pub fn of_session(session: u32) -> Self {
+        Self { sender: CommandSender::new(session), ..Self::default() }
+    }
+
     pub fn latest(&self) -> Option<&TrackedCommand> {
         self.tracks.last()
     }

@@ -277,7 +277,8 @@ impl Model {
     pub fn new(settings: Settings) -> Self {
         let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
         let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
-        Self { settings, alarms, ..Self::default() }
+        let commands = Commands::of_session(settings.session);
+        Self { settings, alarms, commands, ..Self::default() }
     }
 
     /// The history has been received. Alarms that still hold ring from now on; ended ones do not.

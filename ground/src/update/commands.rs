@@ -88,7 +88,7 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
-    model.asked_to_confirm = answer.detail > 0;
+    model.asked_to_confirm = answer.asks();
     let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
         track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledgement::GivenUp);

@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA};
 use protocol::frame::Frame;
-use protocol::identity::Address;
+use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
 
@@ -22,7 +22,9 @@ const STRANGERS_MAX: usize = 8;
 pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.stats.on_frame(frame, now);
     if frame.message_id() == RADIO_STATUS_ID {
-        if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
+        if frame.source() == RADIO
+            && let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode()
+        {
             if let Some(test) = &mut model.range_test {
                 test.hear_radio(&radio);
             }

@@ -147,7 +147,9 @@ pub const STANDARD: &[Standard] = &[
     // For other clients. A radio has no room for all of them: the messages above already have this data.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0).on_network(1.0),
-    standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0).cut_to(ACTUATOR_PAYLOAD_LEN),
+    standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0)
+        .cut_to(ACTUATOR_PAYLOAD_LEN)
+        .on_network(1.0),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0).on_network(1.0),
     standard::<ATTITUDE_DATA>("RATE_EULER", 0.0).on_network(4.0),
     standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.0).on_network(4.0),

@@ -72,6 +72,12 @@ impl CommandRequest {
         })
     }
 
+    /// The number of this command, in parameter 2: its repetitions have the same one. `None` from other ground stations, which
+    /// leave it at 0 or NaN, or put a force code or the number of a mission item there.
+    pub fn number(&self) -> Option<u32> {
+        number_in(self.params[1])
+    }
+
     /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0 or NaN.
     pub fn meant_boot(&self) -> MeantBoot {
         let param7 = self.params[6];
@@ -90,6 +96,17 @@ impl CommandRequest {
     pub fn is(&self, command: MavCmd) -> bool {
         self.command == command as u16
     }
+}
+
+/// Numbers of commands begin here, above every force code and every number of an ask.
+pub const FIRST_NUMBER: u32 = 65_536;
+/// A parameter is a float, which holds whole numbers below this one exactly.
+const NUMBERS_END: u32 = 1 << 24;
+
+fn number_in(param2: f32) -> Option<u32> {
+    let whole = libm::truncf(param2).to_bits() == param2.to_bits();
+    let fits = (FIRST_NUMBER as f32..NUMBERS_END as f32).contains(&param2);
+    (whole && fits).then_some(param2 as u32)
 }
 
 /// The boot of a vehicle that a command is meant for.
@@ -111,7 +128,8 @@ pub struct CommandAnswer {
     pub result: u8,
     /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
     pub progress: u8,
-    /// RESULT_PARAM2: here the number of the ask that a second person has to confirm; 0 if there is none.
+    /// RESULT_PARAM2: the number of the command, negative if a second person has to confirm it. Of a command without a number
+    /// it is the number of the ask that has to be confirmed; 0 if there is none.
     pub detail: i32,
     /// The component that the answer is for.
     pub target: Address,
@@ -123,9 +141,26 @@ impl CommandAnswer {
             command: request.command,
             result: result as u8,
             progress: 0,
-            detail: 0,
+            detail: request.number().and_then(|number| i32::try_from(number).ok()).unwrap_or(0),
             target: request.source,
         }
+    }
+
+    /// The same, for a command that a second person has to confirm by the number of this ask.
+    #[must_use]
+    pub fn asking(self, ask: u16) -> Self {
+        let detail = if self.detail == 0 { ask.into() } else { -self.detail };
+        Self { detail, ..self }
+    }
+
+    /// The number of the command that it answers, if it is told.
+    fn number(&self) -> Option<u32> {
+        Some(self.detail.unsigned_abs()).filter(|number| *number >= FIRST_NUMBER)
+    }
+
+    /// Whether a second person has to confirm the command.
+    pub fn asks(&self) -> bool {
+        self.detail < 0 || (self.detail > 0 && self.number().is_none())
     }
 
     /// Encodes the answer as a COMMAND_ACK frame.

@@ -4,16 +4,16 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::CommandAnswer;
+use super::{CommandAnswer, FIRST_NUMBER, NUMBERS_END, number_in};
 use crate::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
 use crate::identity::Address;
 
 /// How often an unanswered command is sent again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resend {
-    /// Sent once. For arming: a late duplicate must never arm a vehicle that the crew takes for safe.
+    /// Sent once: what is meant for one moment.
     Never,
-    /// Sent this many further times.
+    /// Sent this many further times, under one number: the vehicle does it once.
     Times(u8),
     /// Sent until it is withdrawn, whatever the answer is: twenty times a second until it is accepted, then five times a
     /// second. For aborting: if half of the frames are lost, all twenty of a second are lost once in a million times, and
@@ -60,7 +60,7 @@ pub enum CommandEvent {
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
 /// After the answer "in progress" a command waits this long for the final answer.
 const PROGRESS_TIMEOUT: Duration = Duration::from_secs(3);
-/// The answer to a command that was sent once may arrive up to this much later.
+/// The answer to a command that nobody waits for any more may arrive up to this much later.
 const LATE_ANSWER_WITHIN: Duration = Duration::from_secs(10);
 
 /// Identifies one submitted command among others with the same number.
@@ -71,8 +71,11 @@ pub struct Ticket(u64);
 #[derive(Debug)]
 struct Late {
     command: MavCmd,
+    number: Option<u32>,
     ticket: Ticket,
     until: Duration,
+    /// Its repetitions may be answered again.
+    is_answered: bool,
 }
 
 #[derive(Debug)]
@@ -104,13 +107,20 @@ impl Pending {
         self.answered == Some(MavResult::MAV_RESULT_ACCEPTED as u8)
     }
 
-    /// Returns the answer that may still come when this command is no longer waited for. Only for a command that is
-    /// sent once is the number of outstanding answers known.
+    fn number(&self) -> Option<u32> {
+        number_in(self.message.param2)
+    }
+
+    /// The answer that may still come when this command is no longer waited for.
     fn into_late(self, now: Duration) -> Option<Late> {
-        let outstanding = self.resend == Resend::Never && self.attempts > 0;
-        let late =
-            Late { command: self.message.command, ticket: self.ticket, until: now + LATE_ANSWER_WITHIN };
-        outstanding.then_some(late)
+        let late = Late {
+            command: self.message.command,
+            number: self.number(),
+            ticket: self.ticket,
+            until: now + LATE_ANSWER_WITHIN,
+            is_answered: false,
+        };
+        (late.number.is_some() && self.attempts > 0).then_some(late)
     }
 }
 
@@ -119,9 +129,9 @@ impl Pending {
 /// A command that is sent until it is withdrawn may be answered many times; each answer that differs from the one
 /// before is reported.
 ///
-/// An answer names its command only by number, and arming and disarming share one. So a late answer to an arming is
-/// still expected after a disarming has replaced it, and is not taken for the answer to the disarming. If the late
-/// answer was lost instead, the disarming is sent once more than necessary.
+/// MAVLink's answers name the kind of their command alone, and arming and disarming are one kind. So each command but one that is
+/// sent until it is withdrawn has a number in parameter 2, which our vehicles repeat in the answer: a late answer to an arming is
+/// not taken for that to the disarming which has replaced it. Whoever answers without a number answers the command that waits.
 #[derive(Debug, Default)]
 pub struct CommandSender {
     pending: Vec<Pending>,
@@ -129,14 +139,23 @@ pub struct CommandSender {
     events: Vec<CommandEvent>,
     submitted: u64,
     heard_at: Option<Duration>,
+    /// Where the numbers begin: another station with the same address should begin elsewhere.
+    begin: u32,
 }
 
 impl CommandSender {
-    pub fn new() -> Self {
-        Self::default()
+    /// Commands get numbers that begin at a place that `seed` decides.
+    pub fn new(seed: u32) -> Self {
+        Self { begin: seed, ..Self::default() }
     }
 
-    /// Queues a command. A pending command with the same number is replaced.
+    fn next_number(&self) -> u32 {
+        let counted = u64::from(self.begin) + self.submitted;
+        FIRST_NUMBER + (counted % u64::from(NUMBERS_END - FIRST_NUMBER)) as u32
+    }
+
+    /// Queues a command. A pending command of the same kind is replaced. Parameter 2 is the number, unless it is sent until it is
+    /// withdrawn.
     pub fn submit(
         &mut self,
         target: Address,
@@ -146,9 +165,10 @@ impl CommandSender {
         now: Duration,
     ) -> Ticket {
         self.withdraw(now, |pending| pending.message.command == command);
+        let numbered = resend != Resend::UntilWithdrawn;
         let message = COMMAND_LONG_DATA {
             param1: params[0],
-            param2: params[1],
+            param2: if numbered { self.next_number() as f32 } else { params[1] },
             param3: params[2],
             param4: params[3],
             param5: params[4],
@@ -247,23 +267,20 @@ impl CommandSender {
     /// Notes an answer, and returns whether any command could still be answered by it.
     pub fn on_answer(&mut self, answer: &CommandAnswer, now: Duration) -> bool {
         let final_answer = answer.result != MavResult::MAV_RESULT_IN_PROGRESS as u8;
-        let waiting = self.pending.iter().position(|p| p.message.command as u16 == answer.command);
-        // Answers arrive in the order of their commands. A second arming repeats the same question, so the first
-        // answer that arrives answers it, too.
-        let repeats = waiting.is_some_and(|index| self.pending[index].resend == Resend::Never);
-        let late = self
-            .late
-            .iter()
-            .position(|late| late.command as u16 == answer.command && now < late.until && !repeats);
-        if let Some(index) = late {
-            if final_answer {
-                let Late { ticket, .. } = self.late.remove(index);
-                let (command, result) = (answer.command, answer.result);
+        let answers = |command: MavCmd, number: Option<u32>| {
+            command as u16 == answer.command && (answer.number().is_none() || answer.number() == number)
+        };
+        let waiting =
+            self.pending.iter().position(|pending| answers(pending.message.command, pending.number()));
+        let Some(index) = waiting else {
+            let late = |late: &&mut Late| answers(late.command, late.number) && now < late.until;
+            let Some(late) = self.late.iter_mut().find(late) else { return false };
+            if final_answer && !core::mem::replace(&mut late.is_answered, true) {
+                let (command, result, ticket) = (answer.command, answer.result, late.ticket);
                 self.events.push(CommandEvent::AnsweredLate { command, result, ticket });
             }
             return true;
-        }
-        let Some(index) = waiting else { return false };
+        };
         if self.pending[index].resend == Resend::UntilWithdrawn {
             self.note_answer(index, *answer, final_answer);
         } else if final_answer {
@@ -315,23 +332,25 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// Submits an arming at 0 and a disarming at `disarmed_ms`; answers arrive at `answers_ms`. Returns the events
-    /// about answers.
-    fn events(disarmed_ms: u64, answers_ms: &[u64]) -> Vec<CommandEvent> {
-        let answer = CommandAnswer { command: ARM as u16, result: 0, progress: 0, detail: 0, target: GROUND };
-        let mut sender = CommandSender::new();
-        sender.submit(VEHICLE, ARM, [1.0; 7], Resend::Never, ms(0));
+    /// Submits an arming at 0 and a disarming at `disarmed_ms`; of the two, the first or the second is answered at these times, ms.
+    /// Returns the events about answers.
+    fn events(disarmed_ms: u64, answers_ms: &[(u64, i32)]) -> Vec<CommandEvent> {
+        let mut sender = CommandSender::new(7);
+        sender.submit(VEHICLE, ARM, [1.0; 7], Resend::Times(4), ms(0));
         for now in (0..20_000).step_by(100) {
             if now == disarmed_ms {
                 sender.submit(VEHICLE, ARM, [0.0; 7], Resend::Times(3), ms(now));
             }
             sender.poll(ms(now));
-            if answers_ms.contains(&now) {
+            for (_, of) in answers_ms.iter().filter(|(at, _)| *at == now) {
+                let detail = FIRST_NUMBER as i32 + 7 + of;
+                let answer =
+                    CommandAnswer { command: ARM as u16, result: 0, progress: 0, detail, target: GROUND };
                 sender.on_answer(&answer, ms(now));
             }
         }
         let is_answer = |event: &CommandEvent| {
-            !matches!(event, CommandEvent::Sent { .. } | CommandEvent::TimedOut { attempts: 1, .. })
+            !matches!(event, CommandEvent::Sent { .. } | CommandEvent::TimedOut { attempts: 5, .. })
         };
         sender.take_events().into_iter().filter(is_answer).collect()
     }
@@ -339,7 +358,7 @@ mod tests {
     /// Polls every 10 ms; returns the time of each sending, ms, and the other events.
     fn aborts_ms(answered: &[(u64, MavResult)], withdrawn_ms: u64) -> (Vec<u64>, Vec<CommandEvent>) {
         let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
-        let mut sender = CommandSender::new();
+        let mut sender = CommandSender::new(0);
         let ticket = sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
         let mut sent = Vec::new();
         for now in (0..3_000).step_by(10) {
@@ -376,7 +395,7 @@ mod tests {
     #[test]
     fn what_is_heard_after_a_silence_lets_an_abort_leave_at_once() {
         let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
-        let mut sender = CommandSender::new();
+        let mut sender = CommandSender::new(0);
         sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
         let mut sent = Vec::new();
         // The vehicle is heard every 10 ms, except between 500 and 1,230 ms.
@@ -420,7 +439,7 @@ mod tests {
                     (now < at).then_some(*alive)
                 })
             };
-            let mut sender = CommandSender::new();
+            let mut sender = CommandSender::new(0);
             sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
             let arrived = (0..10_000).find(|now| {
                 let up = alive(*now) == Some(true);
@@ -446,16 +465,18 @@ mod tests {
     }
 
     #[test]
-    fn a_late_answer_belongs_to_the_replaced_arming() {
+    fn each_answer_belongs_to_the_command_whose_number_it_has() {
         let (command, result) = (ARM as u16, 0);
         let late = CommandEvent::AnsweredLate { command, result, ticket: Ticket(1) };
         let answered = CommandEvent::Answered { command, result };
         for disarmed_ms in [200, 3_000] {
-            let (first, second) = (disarmed_ms + 100, disarmed_ms + 700);
-            assert_eq!(events(disarmed_ms, &[first, second]), [late, answered]);
+            let [first, second, third] = [100, 200, 700].map(|after| disarmed_ms + after);
+            // A repeated arming is answered twice.
+            assert_eq!(events(disarmed_ms, &[(first, 0), (second, 0), (third, 1)]), [late, answered]);
+            assert_eq!(events(disarmed_ms, &[(first, 1), (second, 0)]), [answered, late]);
             let given_up = CommandEvent::TimedOut { command, attempts: 4 };
-            assert_eq!(events(disarmed_ms, &[first]), [late, given_up]);
+            assert_eq!(events(disarmed_ms, &[(first, 0)]), [late, given_up]);
         }
-        assert_eq!(events(12_000, &[12_100]), [answered], "the answer to the arming is lost by then");
+        assert_eq!(events(15_000, &[(15_100, 1)]), [answered], "the answer to the arming is lost by then");
     }
 }

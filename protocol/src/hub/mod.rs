@@ -16,6 +16,7 @@ use core::time::Duration;
 use self::line::Line;
 use crate::duplicate::Duplicates;
 use crate::frame::{Frame, Framer, FramerCounters, SIGNATURE_LEN};
+use crate::identity::RADIO;
 use crate::link_stats::LinkStats;
 use crate::signing::{Rejection, Signing, SigningCounters};
 
@@ -204,6 +205,7 @@ impl Hub {
             return News::Rejected(frame, rejection);
         }
         if frame.message_id() == RADIO_STATUS_ID
+            && frame.source() == RADIO
             && let Some(line) = &mut self.links[link].line
         {
             line.on_radio(frame.padded_payload()[TXBUF_AT], now);

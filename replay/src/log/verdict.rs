@@ -103,7 +103,7 @@ impl Heard {
             failure: if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken },
         };
         Some(v1::LandingVerdict {
-            time_s: f64::from(verdict.time_boot_ms) / 1e3,
+            time_s: f64::from(verdict.contact_ms) / 1e3,
             state: v1::PlanarState {
                 x_m: f64::from(verdict.x_m),
                 z_m: f64::from(verdict.altitude_m),

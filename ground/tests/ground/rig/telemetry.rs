@@ -237,6 +237,7 @@ impl Rig {
         let [x_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = figures;
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             time_boot_ms: self.boot_ms(),
+            contact_ms: self.boot_ms(),
             x_m,
             altitude_m: 0.0,
             pitch_rad,

@@ -12,7 +12,7 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 use protocol::hub::line::{SHARE, slowed};
-use protocol::identity::Address;
+use protocol::identity::{Address, NETWORK_BUDGET_BYTES_S};
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
@@ -30,6 +30,9 @@ const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
 const ABORT_ANSWERED_S: f64 = 0.09;
 /// The same on a line slower than a radio, s.
 const SLOW_ABORT_ANSWERED_S: f64 = 0.3;
+/// Bytes per second of files over a link that carries at least a network's telemetry: 15 % of the slowest Wi-Fi (802.11b,
+/// 11 Mbit/s). A smaller budget may be that of a radio somewhere on the way; files then use what telemetry leaves of it.
+const NETWORK_FILES_BYTES_S: f64 = 200_000.0;
 /// A piece of a file that would hold a line for longer than this is not sent, s.
 const LINE_HOLDS_S: f64 = 0.3;
 
@@ -290,7 +293,10 @@ impl Lane {
     /// Sends pieces of files in all the room that is left, evenly spread.
     fn send_pieces(&mut self, now_s: f64, files: &mut FileService, frames: &mut Vec<Frame>) {
         let longest = PIECE_FRAME_LEN + self.signature_len;
-        let spacing_s = longest as f64 / f64::from(self.streams.capacity_bytes_s());
+        let has_own_room = self.granted_bytes_s >= NETWORK_BUDGET_BYTES_S;
+        let bytes_s =
+            if has_own_room { NETWORK_FILES_BYTES_S } else { f64::from(self.streams.capacity_bytes_s()) };
+        let spacing_s = longest as f64 / bytes_s;
         if self.line_takes_s(longest) > LINE_HOLDS_S {
             return;
         }
@@ -298,12 +304,12 @@ impl Lane {
         self.piece_due_s = self.piece_due_s.max(now_s - spacing_s);
         while now_s >= self.piece_due_s
             && self.is_line_free(now_s)
-            && self.room() >= longest
+            && (has_own_room || self.room() >= longest)
             && let Some(message) = files.next_piece(&self.links, now_s)
         {
             let frame = self.encoder.encode(&message);
             self.piece_due_s += spacing_s;
-            self.put(frame, now_s, frames);
+            if has_own_room { frames.push(frame) } else { self.put(frame, now_s, frames) }
         }
     }
 

@@ -9,7 +9,7 @@ mod questions;
 mod requests;
 
 use alloc::borrow::ToOwned as _;
-use alloc::collections::BTreeSet;
+use alloc::collections::{BTreeSet, VecDeque};
 use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
@@ -29,7 +29,7 @@ use protocol::dialect::{
     TD_OPERATOR_DATA, TD_TOUCHDOWN_LIMITS_DATA, TIMESYNC_DATA,
 };
 use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
-use protocol::identity::{Address, RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::identity::{Address, RADIO, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
 
@@ -37,7 +37,7 @@ use self::lane::{Answer, Lane};
 use self::questions::FileService;
 pub use self::questions::gives_out_its_log;
 pub use self::requests::Heard;
-use self::requests::{Refusals, Waiting, Warnings};
+use self::requests::{Answered, Refusals, Waiting, Warnings};
 use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
@@ -73,6 +73,8 @@ pub struct VehicleEndpoint {
     starts_by_itself: bool,
     /// Commands that the vehicle decides in its next frame.
     waiting: Vec<Waiting>,
+    /// The newest first.
+    answered: VecDeque<Answered>,
     /// Sources that have sent anything; a new one gets the constant data at once.
     known: BTreeSet<Address>,
     refusals: Refusals,
@@ -145,6 +147,7 @@ impl VehicleEndpoint {
             stations: Stations::default(),
             starts_by_itself: false,
             waiting: Vec::new(),
+            answered: VecDeque::new(),
             refusals: Refusals::default(),
             warnings: Warnings::default(),
             told: None,
@@ -201,7 +204,9 @@ impl VehicleEndpoint {
         let path = path.into();
         let link = path.link;
         if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
-            self.lane(link).on_radio(radio.txbuf, vehicle.time_s());
+            if frame.source() == RADIO {
+                self.lane(link).on_radio(radio.txbuf, vehicle.time_s());
+            }
             return;
         }
         self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s());
@@ -398,7 +403,7 @@ impl VehicleEndpoint {
             }
             Ok(Command::SendMessage { message_id, of }) => self.send_message(link, message_id, of, vehicle),
         };
-        self.acknowledge(link, request, (result, 0));
+        self.acknowledge(link, request, (result, None));
         if let Some(reason) = reason {
             self.say(Severity::Warning, &reason);
         }
@@ -417,12 +422,18 @@ impl VehicleEndpoint {
             let station = self.stations.of(&Sender { address: cancelled.source, key, path });
             self.put(path.link, (cancelled, by, station), Asked::EndCheck, vehicle);
         } else {
-            self.acknowledge(path.link, cancelled, (MavResult::MAV_RESULT_DENIED, 0));
+            self.acknowledge(path.link, cancelled, (MavResult::MAV_RESULT_DENIED, None));
         }
     }
 
     /// Answers a command. Repeated refusals to one station are not answered every time.
-    fn acknowledge(&mut self, link: usize, request: &CommandRequest, (result, detail): (MavResult, i32)) {
+    /// `ask` is the number of the ask that a second person has to confirm.
+    fn acknowledge(
+        &mut self,
+        link: usize,
+        request: &CommandRequest,
+        (result, ask): (MavResult, Option<u16>),
+    ) {
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
         if !refused
             || self.refusals.may_answer(
@@ -431,7 +442,8 @@ impl VehicleEndpoint {
                 self.now_s,
             )
         {
-            let answer = CommandAnswer { detail, ..CommandAnswer::to(request, result) };
+            let answer = CommandAnswer::to(request, result);
+            let answer = ask.map_or(answer, |ask| answer.asking(ask));
             self.lane(link).answer(Answer::Command(answer));
         }
     }

@@ -21,8 +21,11 @@ use super::VehicleEndpoint;
 use crate::commands;
 use crate::vehicle::Vehicle;
 
-/// Most commands that may wait for one frame (some milliseconds); more are ignored.
+/// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many aborts of no operator may
+/// wait beside them; one would do.
 const MAX_WAITING: usize = 64;
+/// How many answers are remembered, in case their commands are repeated.
+const MAX_ANSWERED: usize = 16;
 
 /// What a frame of the vehicle is told of its links, and asked by its crew.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +46,25 @@ pub(super) struct Waiting {
     request: Request,
 }
 
+/// A command with a number that was answered.
+#[derive(Debug, Clone)]
+pub(super) struct Answered {
+    command: CommandRequest,
+    by: Option<Operator>,
+    answer: (MavResult, Option<u16>),
+}
+
+/// Whether both are one command: a repetition has the same number.
+fn is_repeated(
+    (one, by): (&CommandRequest, Option<Operator>),
+    of: (&CommandRequest, Option<Operator>),
+) -> bool {
+    let (other, other_by) = of;
+    one.number().is_some()
+        && (one.source, one.command, one.number(), by)
+            == (other.source, other.command, other.number(), other_by)
+}
+
 impl VehicleEndpoint {
     /// Configures a vehicle that starts by itself: no station has to be heard, and the silence of a station does not
     /// hold it.
@@ -59,9 +81,30 @@ impl VehicleEndpoint {
         asked: Asked,
         vehicle: &dyn Vehicle,
     ) {
-        // Other commands never displace an abort.
-        if self.waiting.len() >= MAX_WAITING && asked != Asked::Abort {
-            return;
+        // What moves something is done once, whatever arrives late; what stops is done every time.
+        if may_move(asked) {
+            if self
+                .waiting
+                .iter()
+                .any(|waiting| is_repeated((command, by), (&waiting.command, waiting.request.by)))
+            {
+                return;
+            }
+            let answered =
+                self.answered.iter().find(|done| is_repeated((command, by), (&done.command, done.by)));
+            if let Some(Answered { answer, .. }) = answered.cloned() {
+                return self.acknowledge(link, command, answer);
+            }
+        }
+        // Other commands never displace an abort, and nobody's aborts that of an operator.
+        let is_abort = |waiting: &&Waiting| waiting.request.asked == Asked::Abort;
+        let aborts = self.waiting.iter().filter(is_abort).count();
+        let is_full = match asked {
+            Asked::Abort => by.is_none() && aborts >= MAX_WAITING,
+            _ => self.waiting.len() - aborts >= MAX_WAITING,
+        };
+        if is_full {
+            return self.acknowledge(link, command, (MavResult::MAV_RESULT_TEMPORARILY_REJECTED, None));
         }
         let uplink = if self.starts_by_itself {
             Uplink::NotNeeded
@@ -106,7 +149,12 @@ impl VehicleEndpoint {
             } else {
                 let asked = vehicle.computer().crew().two_person.waiting(vehicle.time_s());
                 let asked = asked.filter(|_| answer.ending == Ending::Asked);
-                self.acknowledge(link, &command, (result, asked.map_or(0, |ask| i32::from(ask.number))));
+                let answer = (result, asked.map(|ask| ask.number));
+                if may_move(request.asked) && command.number().is_some() {
+                    self.answered.truncate(MAX_ANSWERED - 1);
+                    self.answered.push_front(Answered { command, by: request.by, answer });
+                }
+                self.acknowledge(link, &command, answer);
             }
         }
     }
@@ -143,6 +191,16 @@ impl VehicleEndpoint {
             deaf: self.stations.is_deaf(station),
         });
         (self.stations.best_uplink(time_s), commander)
+    }
+}
+
+/// Whether a request can make something move or light.
+fn may_move(asked: Asked) -> bool {
+    match asked {
+        Asked::Arm | Asked::Start | Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill => {
+            true
+        }
+        Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck => false,
     }
 }
 

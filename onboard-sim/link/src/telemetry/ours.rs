@@ -217,7 +217,8 @@ pub(super) fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
     let judged = snapshot.judged.as_ref()?;
     let impact = &judged.impact;
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
-        time_boot_ms: boot_ms(impact.time_s),
+        time_boot_ms: boot_ms(snapshot.time_s),
+        contact_ms: boot_ms(impact.time_s),
         x_m: impact.state.x_m as f32,
         altitude_m: impact.state.z_m as f32,
         pitch_rad: impact.state.theta_rad as f32,

@@ -184,6 +184,82 @@ fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight(
 }
 
 /// Clients find out in this way what a vehicle can do.
+impl Wire {
+    /// A command of the station with this number; returns the answers.
+    fn numbered(&mut self, param1: f32, number: u32) -> Vec<CommandAnswer> {
+        let command = COMMAND_LONG_DATA {
+            param1,
+            param2: number as f32,
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let frame = self.ground.encode(&MavMessage::COMMAND_LONG(command));
+        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
+    }
+}
+
+#[test]
+fn a_repeated_arming_is_answered_again_and_arms_nothing_that_was_disarmed_or_aborted_since() {
+    let mut wire = Wire::new();
+    wire.beats = true;
+    wire.run(1.0);
+    let told = |answers: Vec<CommandAnswer>| {
+        answers.iter().map(|answer| (answer.result, answer.detail)).collect::<Vec<_>>()
+    };
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)]);
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)]);
+    assert!(wire.vehicle.mode().interlocks.armed);
+    assert_eq!(told(wire.numbered(0.0, 70_001)), [(0, 70_001)]);
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)], "it was done");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    assert_eq!(told(wire.numbered(1.0, 70_002)), [(0, 70_002)], "another one");
+    assert!(wire.vehicle.mode().interlocks.armed);
+    assert_eq!(wire.ask(185, 1.0, 0.0).0, 0);
+    for number in [70_000, 70_002] {
+        wire.numbered(1.0, number);
+        assert!(!wire.vehicle.mode().interlocks.armed);
+    }
+}
+
+#[test]
+fn a_radio_s_report_from_another_address_thins_nothing() {
+    let mut wire = Wire::new();
+    let report = MavMessage::RADIO_STATUS(protocol::dialect::RADIO_STATUS_DATA::default());
+    let before = wire.run(10.0).len();
+    let sent: usize = (0..10)
+        .map(|_| {
+            let full = wire.ground.encode(&report);
+            wire.endpoint.on_frame(0, &full, &wire.vehicle);
+            wire.run(1.0).len()
+        })
+        .sum();
+    assert!(sent + 5 > before, "{sent} of {before} frames");
+}
+
+#[test]
+fn every_command_of_a_flood_is_answered_or_refused_and_no_flood_of_aborts_grows_without_end() {
+    let mut wire = Wire::new();
+    for system_id in 2..=254 {
+        for component_id in [1, 190] {
+            let mut sender = Encoder::new(Address { system_id, component_id });
+            let abort = COMMAND_LONG_DATA {
+                param1: 1.0,
+                command: MavCmd::MAV_CMD_DO_FLIGHTTERMINATION,
+                ..COMMAND_LONG_DATA::default()
+            };
+            let frame = sender.encode(&MavMessage::COMMAND_LONG(abort));
+            wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        }
+    }
+    let heard = wire.endpoint.heard(wire.vehicle.time_s());
+    assert_eq!(heard.requests.len(), 64);
+    wire.run(0.1);
+    assert!(wire.vehicle.mode().interlocks.abort_latched);
+}
+
 #[test]
 fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
     let mut wire = Wire::new();
