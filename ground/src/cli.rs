@@ -82,8 +82,9 @@ pub struct Cli {
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
     pub profile: Option<String>,
 
-    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one.
-    #[arg(long, value_name = "START", conflicts_with = "connect", global = true)]
+    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
+    /// --mission: where that flight should begin; arming is refused if it begins elsewhere.
+    #[arg(long, value_name = "START", global = true)]
     pub start: Option<StartPoint>,
 
     /// Demonstration: seed of its dispersions. Default: 1.
@@ -291,7 +292,7 @@ impl Cli {
     pub fn describes_demonstration(&self) -> bool {
         self.demo
             || self.profile.is_some()
-            || self.start.is_some()
+            || (self.start.is_some() && self.mission.is_none())
             || self.seed.is_some()
             || self.speed.is_some()
     }

@@ -183,6 +183,7 @@ async fn start(
         role: Role::Station,
         seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
         key_owner: owner,
+        start: cli.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
         pad: cli.pad,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    Model, is_flight,
+    FlownMission, Model, is_flight,
     quantity::{self, Quantity},
 };
 
@@ -227,8 +227,8 @@ impl Model {
         let checklist = self.checklist.as_ref()?;
         if let Some(mission) = &checklist.mission {
             match &self.vehicle.mission {
-                Some((_, flies)) if flies == mission => {}
-                Some((_, flies)) => {
+                Some(FlownMission { name, .. }) if name == mission => {}
+                Some(FlownMission { name: flies, .. }) => {
                     return Some(format!("the checklist is for {mission}, the vehicle flies {flies}"));
                 }
                 None => {

@@ -403,11 +403,18 @@ fn why_no_key(model: &Model) -> Option<String> {
 /// Why the vehicle is not the one that this station is prepared for.
 pub fn why_other_mission(model: &Model) -> Option<String> {
     let ours = model.settings.mission?;
-    match &model.vehicle.mission {
-        Some((theirs, _)) if *theirs == ours => None,
-        Some((theirs, name)) => Some(format!("the vehicle flies {name} {theirs}, --mission is {ours}")),
-        None => Some(format!("the vehicle has not said whether it flies {ours} (--mission)")),
+    let Some(flown) = &model.vehicle.mission else {
+        return Some(format!("the vehicle has not said whether it flies {ours} (--mission)"));
+    };
+    if flown.hash != ours {
+        let theirs = flown.hash;
+        return Some(format!("the vehicle flies {} {theirs}, --mission is {ours}", flown.name));
     }
+    let start = model.settings.start.as_deref()?;
+    (flown.start != Some(start)).then(|| {
+        let begins = flown.start.unwrap_or("where it does not say");
+        format!("the flight begins at: {begins}, --start is {start}")
+    })
 }
 
 // How far the automatic mode has come.

@@ -41,7 +41,7 @@ const CONTRADICTIONS: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Word {
     /// The vehicle's unique id; 0: not told.
-    pub uid: u32,
+    pub uid: u16,
     /// The number of its boot; 0: not told.
     pub boot: u32,
     /// The time on its clock, ms.
@@ -70,7 +70,7 @@ struct Place {
 #[derive(Debug, Clone)]
 struct Run {
     id: RunId,
-    uid: u32,
+    uid: u16,
     boot: u32,
     places: Vec<Place>,
     /// The latest time on its clock, ms.
@@ -429,7 +429,7 @@ mod tests {
     /// A vehicle that was switched on at this time, ms.
     #[derive(Debug, Clone, Copy)]
     struct Sender {
-        uid: u32,
+        uid: u16,
         boot: u32,
         on_ms: u64,
         place: u16,
@@ -437,7 +437,7 @@ mod tests {
     }
 
     impl Sender {
-        const fn new(uid: u32, boot: u32, on_ms: u64) -> Self {
+        const fn new(uid: u16, boot: u32, on_ms: u64) -> Self {
             Self { uid, boot, on_ms, place: 0, sequence: (on_ms % 251) as u8 }
         }
 
@@ -528,7 +528,7 @@ mod tests {
         #[test]
         fn nothing_takes_the_screen_from_a_vehicle_that_is_heard(
             others in prop::collection::vec(
-                (0_u32..3, 0_u32..4, 0_u64..100_000, 0_u16..2, any::<bool>(), any::<u8>()), 1..300,
+                (0_u16..3, 0_u32..4, 0_u64..100_000, 0_u16..2, any::<bool>(), any::<u8>()), 1..300,
             ),
             gaps_ms in prop::collection::vec(1_u64..1_900, 20..60),
             is_busy in any::<bool>(),
@@ -560,7 +560,7 @@ mod tests {
         /// An unsigned frame every 4 s that says it is the same vehicle, or another one, with any boot, clock and place.
         #[test]
         fn a_forged_frame_now_and_then_takes_nothing(
-            forged in prop::collection::vec((0_u32..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
+            forged in prop::collection::vec((0_u16..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
             is_busy in any::<bool>(),
         ) {
             let mut heard = Heard::default();

@@ -9,14 +9,14 @@ use protocol::dialect::{
 };
 use protocol::identity::LARGEST_BOOT_NUMBER;
 
-use super::{Sample, words};
+use super::{Model, Sample, words};
 
 /// What a vehicle tells of itself and its boot.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Boot {
     number: Option<NonZeroU32>,
     /// The vehicle's unique id; 0: not told.
-    uid: u32,
+    uid: u16,
     /// Whether every HEARTBEAT so far had the HIL flag set; `None` before the first.
     hil: Option<bool>,
     /// The same for the simulated flag of `TD_FLIGHT_STATUS`.
@@ -30,7 +30,7 @@ impl Boot {
     }
 
     /// The vehicle's unique id; `None` if it has not reported one.
-    pub fn uid(&self) -> Option<u32> {
+    pub fn uid(&self) -> Option<u16> {
         (self.uid > 0).then_some(self.uid)
     }
 
@@ -90,6 +90,25 @@ pub(crate) fn time_boot_ms(message: &MavMessage) -> Option<u32> {
         MavMessage::GLOBAL_POSITION_INT(data) => Some(data.time_boot_ms),
         MavMessage::TIMESYNC(data) if data.tc1 > 0 => u32::try_from(data.tc1 / 1_000_000).ok(),
         _ => None,
+    }
+}
+
+/// A vehicle of ours sends its status at least once a second, on any line. For so long it may be lost.
+const NO_STATUS_FOR: Duration = Duration::from_secs(3);
+/// A vehicle with another version of the dialect sends more frames that do not fit in that time.
+const MISFITS: u64 = 10;
+
+impl Model {
+    /// Whether the vehicle beats as one of ours, but what it says fits no message of this station's: the other has another
+    /// version of the dialect.
+    pub fn speaks_another_version(&self, now: Duration) -> bool {
+        let link = &self.link;
+        let misfits = link.framing.crc_errors + link.framing.unknown_ids + link.undecodable;
+        self.vehicle.status.is_none()
+            && self.vehicle.foreign.is_none()
+            && self.vehicle.heartbeat.is_some()
+            && link.first_heartbeat_at.is_some_and(|at| now.saturating_sub(at) >= NO_STATUS_FOR)
+            && misfits >= MISFITS
     }
 }
 

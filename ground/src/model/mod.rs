@@ -89,6 +89,8 @@ pub struct Settings {
     pub key_owner: Option<KeyOwner>,
     /// The mission that the vehicle should fly, if the station knows it.
     pub mission: Option<MissionHash>,
+    /// Where that flight should begin: pad, apogee or drone; `None` if nobody has said it.
+    pub start: Option<String>,
     /// The people of the crew file by name, with their roles; empty without one.
     #[serde(skip)]
     pub crew_roles: Vec<(String, TdRole)>,
@@ -133,6 +135,7 @@ impl Default for Settings {
             seat: Seat::default(),
             key_owner: None,
             mission: None,
+            start: None,
             crew_roles: Vec::new(),
             pad: None,
             here: None,

@@ -58,7 +58,7 @@ impl KeepAway {
         let status = &sample.value;
         let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
         let passed_s = u16::try_from(sample.age(now).as_secs()).unwrap_or(u16::MAX);
-        let wait_s = told_s.map(|told_s| told_s.max(status.pad_wait_s).saturating_sub(passed_s));
+        let wait_s = told_s.map(|told_s| told_s.max(status.pad_wait_s.into()).saturating_sub(passed_s));
         let danger = match status.motor {
             _ if !concerns(status) => return None,
             TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,

@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use protocol::dialect::{
     HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    TD_FLIGHT_STATUS_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase,
+    TD_FLIGHT_STATUS_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 
 use super::{
-    Attitude, Battery, Deflection, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction, Sample,
-    Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
+    Attitude, Battery, Deflection, FlownMission, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction,
+    Sample, Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
 };
 
 /// Takes a message of the vehicle into its model.
@@ -76,7 +76,14 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
         }
         MavMessage::TD_MISSION(data) => {
-            vehicle.mission = Some((MissionHash(data.hash), name(&data.name[..])));
+            let start = match data.start {
+                TdStart::TD_START_UNKNOWN => None,
+                TdStart::TD_START_PAD => Some("pad"),
+                TdStart::TD_START_APOGEE => Some("apogee"),
+                TdStart::TD_START_DRONE => Some("drone"),
+            };
+            let (hash, name) = (MissionHash(data.hash), name(&data.name[..]));
+            vehicle.mission = Some(FlownMission { hash, name, start });
         }
         MavMessage::EXTENDED_SYS_STATE(data) => {
             let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;

@@ -94,6 +94,22 @@ pub struct Battery {
     pub percent: Option<u8>,
 }
 
+/// `TD_MISSION`: what it flies, and where the flight begins if it tells that.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FlownMission {
+    pub hash: MissionHash,
+    pub name: String,
+    pub start: Option<&'static str>,
+}
+
+impl FlownMission {
+    /// As in `mk2 from pad`.
+    pub fn in_words(&self) -> String {
+        let start = self.start.map_or_else(String::new, |start| format!(" from {start}"));
+        format!("{}{start}", self.name)
+    }
+}
+
 /// The vehicle's own verdict on its landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
@@ -123,7 +139,7 @@ pub struct Vehicle {
     /// `TD_OPERATOR`: role and name, by the number of the key.
     pub operators: BTreeMap<u8, (TdRole, String)>,
     /// `TD_MISSION`: the hash and the name of what it flies.
-    pub mission: Option<(MissionHash, String)>,
+    pub mission: Option<FlownMission>,
     /// `EXTENDED_SYS_STATE`: on the ground or not.
     pub on_ground: Option<Sample<bool>>,
     /// `SYS_STATUS`: whether the vehicle's arming checks pass.
@@ -174,8 +190,10 @@ impl Vehicle {
     }
 
     /// The phase, from the newer of its two sources.
+    /// Only our vehicles send a flight status: before it the mode of a heartbeat may be anything of another maker's.
     pub fn phase(&self) -> Option<Sample<TdPhase>> {
         let status = self.status.as_ref().map(|status| Sample::new(status.value.phase, status.received_at));
+        status.as_ref()?;
         let heartbeat = self.heartbeat.and_then(|heartbeat| {
             heartbeat.value.phase.map(|phase| Sample::new(phase, heartbeat.received_at))
         });
@@ -234,8 +252,8 @@ impl Vehicle {
 
     /// The time before the release, s, from which on nothing holds the countdown; `None` if the vehicle does not tell it.
     pub fn last_hold_s(&self) -> Option<f64> {
-        let told_ms = self.status.as_ref()?.value.last_hold_ms;
-        (told_ms > 0).then(|| f64::from(told_ms) / 1_000.0)
+        let told_ds = self.status.as_ref()?.value.last_hold_ds;
+        (told_ds > 0).then(|| f64::from(told_ds) / 10.0)
     }
 
     /// Position and velocity, from the better of its two sources.

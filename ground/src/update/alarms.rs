@@ -103,6 +103,9 @@ fn identity_conditions(model: &Model, now: Duration) -> Vec<(AlarmKind, String)>
         found.push((AlarmKind::TwoVehicles, text));
     } else if let Some(foreign) = model.vehicle.as_foreign() {
         found.push((AlarmKind::Foreign, format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())));
+    } else if model.speaks_another_version(now) {
+        let text = "ANOTHER VERSION: the vehicle is heard, but its messages do not fit this station's; take one version on both";
+        found.push((AlarmKind::Foreign, text.to_owned()));
     }
     if model.link.shares_our_id(now) {
         let Address { system_id, component_id } = model.settings.us;

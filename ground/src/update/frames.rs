@@ -180,7 +180,7 @@ fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     let to_all = target == Address { system_id: 0, component_id: 0 };
     let status = model.vehicle.status.as_ref();
-    let is_old = status.is_some_and(|status| status.value.last_hold_ms == 0);
+    let is_old = status.is_some_and(|status| status.value.last_hold_ds == 0);
     let Model { settings, link, .. } = model;
     link.uplink.tells_sessions |= data.session != 0;
     if !settings.us.accepts(target) {

@@ -5,13 +5,12 @@ use std::time::Duration;
 use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TdAct, TdHold, TdPhase};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
-use protocol::mission::MissionHash;
 
 use super::{Action, commands, pad};
 use crate::model::{
-    Approach, Danger, Ending, FlightSoFar, FlownPath, History, KeepAway, Maxima, Model, Parameters,
-    RestOfWord, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
-    is_on_pad, latch_words, words,
+    Approach, Danger, Ending, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Maxima, Model,
+    Parameters, RestOfWord, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted,
+    is_flight, is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -242,7 +241,7 @@ pub(super) struct CrewTold {
     tapped_by: u8,
     commanded_by: u8,
     held_by: u8,
-    mission: Option<(MissionHash, String)>,
+    mission: Option<FlownMission>,
 }
 
 impl CrewTold {
@@ -286,8 +285,8 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewTold) {
             lines.push((after, words.to_owned()));
         }
     }
-    if let Some((hash, name)) = after.mission.filter(|mission| before.mission.as_ref() != Some(mission)) {
-        lines.push((0, format!("it flies the mission {name} {hash}")));
+    if let Some(mission) = after.mission.filter(|mission| before.mission.as_ref() != Some(mission)) {
+        lines.push((0, format!("it flies the mission {} {}", mission.in_words(), mission.hash)));
     }
     for (by, words) in lines {
         let who = if by > 0 { model.operator(by) } else { String::new() };

@@ -74,7 +74,10 @@ fn doubt(model: &Model, now: Duration) -> Option<String> {
     if model.beside(now).is_some() {
         return Some(format!("TWO VEHICLES under id {id}"));
     }
-    model.vehicle.as_foreign().map(|foreign| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()))
+    if let Some(foreign) = model.vehicle.as_foreign() {
+        return Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()));
+    }
+    model.speaks_another_version(now).then(|| "ANOTHER VERSION: its messages do not fit".to_owned())
 }
 
 fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {

@@ -7,7 +7,7 @@ use ground::model::{Checklist, ChecklistEntry, Mark, Role, Seat, Settings, parse
 use ground::update::{Action, Msg, Request};
 use ground::view::theme::{Palette, Theme};
 use protocol::crew_file::CrewFile;
-use protocol::dialect::{MavMessage, TD_MISSION_DATA, TdPhase, TdRole};
+use protocol::dialect::{MavMessage, TD_MISSION_DATA, TdPhase, TdRole, TdStart};
 use protocol::mission::MissionHash;
 
 use crate::rig::{Rig, is_arm, settings, typed};
@@ -270,7 +270,11 @@ fn the_checklist_of_another_mission_is_no_go() {
         let mut bytes = [0; 20];
         bytes[..3].copy_from_slice(name.as_bytes());
         let hash = MissionHash::of(name).0;
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash, name: bytes.into() }));
+        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+            hash,
+            name: bytes.into(),
+            start: TdStart::TD_START_PAD,
+        }));
         upright(&mut rig, 90.0);
         assert_eq!(arms(&mut rig), arms_now, "{}", rig.events());
     }

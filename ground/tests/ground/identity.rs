@@ -5,7 +5,7 @@ use ground::model::{Role, Seat, Settings, why_not_stop};
 use ground::update::{Action, Msg};
 use protocol::dialect::{
     MavCmd, MavMessage, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor,
-    TdPhase,
+    TdPhase, TdStart,
 };
 use protocol::log::record::Record;
 use protocol::mission::MissionHash;
@@ -214,11 +214,15 @@ fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
     let mut name = [0; 20];
     name[..3].copy_from_slice(b"mk2");
     let hash = MissionHash::of("a text");
-    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: hash.0, name: name.into() }));
+    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+        hash: hash.0,
+        name: name.into(),
+        start: TdStart::TD_START_PAD,
+    }));
     for (columns, rows) in [(80, 24), (120, 36)] {
         let screen = rig.screen(columns, rows);
         let line = screen.lines().find(|line| line.contains("mission")).unwrap_or_default();
-        assert!(line.contains("mk2") && line.contains(&hash.to_string()[..9]), "{screen}");
+        assert!(line.contains("mk2 from pad") && line.contains(&hash.to_string()[..9]), "{screen}");
     }
 }
 

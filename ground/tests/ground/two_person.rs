@@ -5,7 +5,7 @@ use ground::model::{KeyOwner, Seat, Settings};
 use ground::update::Msg;
 use protocol::dialect::{
     COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult, TD_CREW_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TdAct,
-    TdHold, TdInterlock, TdPhase, TdRole,
+    TdHold, TdInterlock, TdPhase, TdRole, TdStart,
 };
 use protocol::identity::{Address, GROUND};
 use protocol::mission::MissionHash;
@@ -232,7 +232,8 @@ fn another_mission_is_not_armed_and_both_hashes_are_named() {
     let ours = MissionHash::of("the right one").to_string();
     let fly = |rig: &mut Rig, text: &str| {
         let name = characters::<20>("mk2").into();
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: MissionHash::of(text).0, name }));
+        let (hash, start) = (MissionHash::of(text).0, TdStart::TD_START_APOGEE);
+        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash, name, start }));
         rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
         rig.take_commands()
     };
@@ -242,6 +243,10 @@ fn another_mission_is_not_armed_and_both_hashes_are_named() {
     let theirs = MissionHash::of("another one").to_string();
     assert!(rig.events().contains(&theirs) && rig.events().contains(&ours), "{}", rig.events());
     assert!(rig.screen(80, 24).contains("NO-GO: the vehicle flies mk2"), "{}", rig.screen(80, 24));
+    rig.model.settings.start = Some("pad".to_owned());
+    assert_eq!(fly(&mut rig, "the right one"), []);
+    assert!(rig.events().contains("the flight begins at: apogee, --start is pad"), "{}", rig.events());
+    rig.model.settings.start = Some("apogee".to_owned());
     assert_eq!(fly(&mut rig, "the right one").len(), 1);
     // An attached screen asks its station, which knows the same mission.
     rig.msg(Msg::Tick);

@@ -72,10 +72,14 @@ impl Crewed {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
         let endpoint = VehicleEndpoint::new(kind)
             .booted(on_the_air.boot_number)
-            .known_as(on_the_air.uid)
+            .known_as(u16::try_from(on_the_air.uid).unwrap_or(0))
             .over_links(&[on_the_air.budget_bytes_s])
             .of_system(system_id);
-        let name = MissionName { name: on_the_air.mission.clone(), hash: MissionHash::of(toml) };
+        let name = MissionName {
+            name: on_the_air.mission.clone(),
+            hash: MissionHash::of(toml),
+            start: Some(mission.start.at),
+        };
         Self {
             heard: endpoint.heard(0.0),
             endpoint,

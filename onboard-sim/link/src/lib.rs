@@ -32,7 +32,7 @@ pub mod vehicle {
     use flight::computer::crew::People;
     use flight::rules::operator::Operator;
     use flight::rules::phase::{Mode, Phase};
-    use flight::vehicle::mission::StateWeights;
+    use flight::vehicle::mission::{StartPoint, StateWeights};
     use protocol::mission::MissionHash;
 
     use crate::snapshot::Snapshot;
@@ -50,7 +50,7 @@ pub mod vehicle {
         pub kind: VehicleKind,
         pub boot_number: u32,
         /// A random number of the vehicle, the same after each power-up; 0: not told.
-        pub uid: u32,
+        pub uid: u16,
     }
 
     /// Which mission or profile a vehicle flies.
@@ -58,11 +58,13 @@ pub mod vehicle {
     pub struct MissionName {
         pub name: String,
         pub hash: MissionHash,
+        /// Where the flight begins, which the hash leaves out.
+        pub start: Option<StartPoint>,
     }
 
     impl Default for MissionName {
         fn default() -> Self {
-            Self { name: String::new(), hash: MissionHash::of("") }
+            Self { name: String::new(), hash: MissionHash::of(""), start: None }
         }
     }
 

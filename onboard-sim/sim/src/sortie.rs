@@ -192,6 +192,8 @@ impl Sortie {
             }
             return Flown { output: None, took: Duration::ZERO };
         }
+        // Without a sample there is no frame; what was commanded goes on.
+        let Some(sensed) = sensed else { return Flown { output: None, took: Duration::ZERO } };
         let abort = [Request::of_the_programme(Asked::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {

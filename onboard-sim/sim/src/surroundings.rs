@@ -63,8 +63,9 @@ impl Surroundings {
         self.actuators = at_rest(mission);
     }
 
-    /// The world moves for one frame, and the sensors measure it.
-    pub(crate) fn feel(&mut self) -> Sensed {
+    /// The world moves for one frame, and the sensors measure it. `None` if they have given no sample: what is true is then known to
+    /// nobody. Without sensors the computer is told the true state.
+    pub(crate) fn feel(&mut self) -> Option<Sensed> {
         let mut measured = None;
         for _ in 0..FRAME_MS {
             self.world.step(&self.actuators);
@@ -76,7 +77,10 @@ impl Surroundings {
             [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
         self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
         self.measured = measured;
-        measured.map_or_else(|| Sensed::Known(known(&self.world)), Sensed::Measured)
+        match self.sensors {
+            Some(_) => measured.map(Sensed::Measured),
+            None => Some(Sensed::Known(known(&self.world))),
+        }
     }
 
     /// What feedback and switches say after the frame; `released`: contact counts.

@@ -1,7 +1,7 @@
 //! `onboard-sim fly`: one flight, over MAVLink links or without them.
 
 use std::io::Write as _;
-use std::num::NonZeroU32;
+use std::num::{NonZeroU16, NonZeroU32};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -241,14 +241,14 @@ fn boot_number(text: &str) -> Result<NonZeroU32, String> {
 }
 
 /// The unique id in the file; a new file gets the drawn one.
-fn kept_uid(file: &Path, drawn: NonZeroU32) -> anyhow::Result<NonZeroU32> {
+fn kept_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
     let name = file.display();
     match std::fs::read_to_string(file) {
         Ok(text) => text.trim().parse().map_err(|_wrong| {
             anyhow::anyhow!(
                 "{name}: `{}` is no unique id; it must be a whole number from 1 to {}",
                 text.trim(),
-                u32::MAX
+                u16::MAX
             )
         }),
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => {

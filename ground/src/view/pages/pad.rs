@@ -164,12 +164,12 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             .vehicle
             .mission
             .as_ref()
-            .map(|(hash, name)| {
+            .map(|mission| {
                 let fits = usize::from(CHECK_COLUMNS).saturating_sub(24);
                 theme.plain(format!(
                     "    {mark}{:<19}{}",
                     "mission",
-                    status_lines::cut(&format!("{name} {hash}"), fits)
+                    status_lines::cut(&format!("{} {}", mission.in_words(), mission.hash), fits)
                 ))
             })
             .map(Line::from),

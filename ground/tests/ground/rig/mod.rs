@@ -40,9 +40,9 @@ pub(crate) struct Rig {
     pub(crate) abort_effect: TdAbortEffect,
     pub(crate) interlocks: TdInterlock,
     pub(crate) checks_failed: u16,
-    pub(crate) pad_wait_s: u16,
+    pub(crate) pad_wait_s: u8,
     pub(crate) boot_number: u32,
-    pub(crate) uid: u32,
+    pub(crate) uid: u16,
     /// Whether both of its flags are set.
     pub(crate) simulated: bool,
     /// Whether the heartbeat of a simulated vehicle says so, too.
@@ -233,7 +233,7 @@ impl Rig {
             abort_impact_m_s: 0,
             hold: self.hold,
             latch: self.latch,
-            last_hold_ms: 2_000,
+            last_hold_ds: 20,
             vehicle_uid: self.uid,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
         };

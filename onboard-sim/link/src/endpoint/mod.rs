@@ -166,7 +166,7 @@ impl VehicleEndpoint {
 
     /// Sets the unique id of the vehicle, which it keeps from one power-up to the next.
     #[must_use]
-    pub fn known_as(self, uid: u32) -> Self {
+    pub fn known_as(self, uid: u16) -> Self {
         Self { identity: Identity { uid, ..self.identity }, ..self }
     }
 

@@ -124,15 +124,21 @@ impl InSpace<'_> {
         let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
         let height_m = place.z - feet_m;
         let rising = phase.before_apogee();
-        let touchdown = if rising {
-            touchdown_from_below_m(place, velocity)
-        } else {
-            touchdown_m(place, velocity, height_m)
-        };
         let motor = pilot.motor();
         let deciding = phase.in_descent();
         let weights_felt = estimate.specific_force_m_s2.norm() / self.mission.gravity_m_s2;
         let carried = velocity.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS;
+        // Where a parachute takes it is known once it drifts with the wind.
+        let awaits_chute = if rising {
+            self.known.computer.mode().interlocks.abort_latched
+        } else {
+            phase == Phase::Chute && !carried
+        };
+        let touchdown = match (awaits_chute, rising) {
+            (true, _) => Vector2::repeat(f64::NAN),
+            (false, true) => touchdown_from_below_m(place, velocity),
+            (false, false) => touchdown_m(place, velocity, height_m),
+        };
         DescentFacts {
             height_m,
             vertical_m_s: velocity.z,

@@ -211,7 +211,7 @@ fn current_mode(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// The unique id stands below two letters, so that it is never zero.
-fn autopilot_version(uid: u32) -> MavMessage {
+fn autopilot_version(uid: u16) -> MavMessage {
     let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2

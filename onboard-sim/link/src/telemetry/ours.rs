@@ -6,6 +6,7 @@ use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::two_person::Act;
+use flight::vehicle::mission::StartPoint;
 use mavlink::types::CharArray;
 use num_traits::FromPrimitive as _;
 use protocol::dialect::{
@@ -13,7 +14,7 @@ use protocol::dialect::{
     TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA, TD_PREDICTED_PATH_DATA,
     TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct, TdCheck, TdControlLevel,
     TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict,
-    TdPhase, TdRole, TdSolverStatus, TdVehicleFlag,
+    TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
@@ -29,7 +30,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
         countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
         interlocks: interlocks(locks),
         checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
-        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| libm::ceil(s) as u16),
+        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| libm::ceil(s) as u8),
         approach_wait_s: snapshot.approach_wait_s.map_or(u16::MAX, |s| libm::ceil(s) as u16),
         motor: td_motor(snapshot.motor),
         hold: match snapshot.held {
@@ -51,7 +52,7 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
             VehicleKind::Real => TdVehicleFlag::empty(),
         },
         latch: td_latch(snapshot.latch),
-        last_hold_ms: snapshot.last_hold_s.map_or(0, |s| libm::round(1000.0 * s) as u16),
+        last_hold_ds: snapshot.last_hold_s.map_or(0, |s| libm::ceil(10.0 * s) as u8),
     })
 }
 
@@ -248,7 +249,13 @@ pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
 
 pub(super) fn mission(snapshot: &Snapshot) -> MavMessage {
     let name = characters(&snapshot.mission.name);
-    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name })
+    let start = match snapshot.mission.start {
+        None => TdStart::TD_START_UNKNOWN,
+        Some(StartPoint::Pad) => TdStart::TD_START_PAD,
+        Some(StartPoint::Apogee) => TdStart::TD_START_APOGEE,
+        Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
+    };
+    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name, start })
 }
 
 pub(super) fn crew(snapshot: &Snapshot) -> Option<MavMessage> {

@@ -13,7 +13,7 @@
 use std::fs::{File, OpenOptions};
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::{Read as _, Write as _};
-use std::num::NonZeroU32;
+use std::num::{NonZeroU16, NonZeroU32};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -213,7 +213,7 @@ pub struct OnTheWire {
     /// Random number drawn once at each power-up: a different number means a different boot.
     pub boot_number: NonZeroU32,
     /// Random number of the vehicle, the same after each power-up if it is kept.
-    pub uid: NonZeroU32,
+    pub uid: NonZeroU16,
     /// Budget of each network link, bytes per second.
     pub network_bytes_s: u32,
     /// Budget of each serial link, bytes per second, as far as four fifths of its baud rate go: what a radio behind it carries.
@@ -224,10 +224,9 @@ impl OnTheWire {
     /// A random boot number and unique id, a network's budget on network links and a radio's on serial ones.
     pub fn drawn() -> Self {
         // The standard library's random hash keys differ in every process.
-        let [boot_number, uid] = [LARGEST_BOOT_NUMBER, u32::MAX].map(|largest| {
-            let drawn = RandomState::new().build_hasher().finish() as u32 & largest;
-            NonZeroU32::new(drawn).unwrap_or(NonZeroU32::MIN)
-        });
+        let drawn = || RandomState::new().build_hasher().finish();
+        let boot_number = NonZeroU32::new(drawn() as u32 & LARGEST_BOOT_NUMBER).unwrap_or(NonZeroU32::MIN);
+        let uid = NonZeroU16::new(drawn() as u16).unwrap_or(NonZeroU16::MIN);
         Self {
             boot_number,
             uid,

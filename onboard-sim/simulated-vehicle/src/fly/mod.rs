@@ -240,7 +240,7 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
         system_id: u32::from(options.system_id),
         boot_number: options.on_the_wire.boot_number.get(),
         budget_bytes_s: options.on_the_wire.serial_bytes_s,
-        uid: options.on_the_wire.uid.get(),
+        uid: options.on_the_wire.uid.get().into(),
     };
     Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
 }

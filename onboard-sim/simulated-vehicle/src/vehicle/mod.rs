@@ -157,7 +157,8 @@ impl Vehicle {
     /// Sets the name and the text of the mission that it flies.
     #[must_use]
     pub fn of_mission(self, name: &str, text: &str) -> Self {
-        let mission = MissionName { name: name.to_owned(), hash: MissionHash::of(text) };
+        let start = Some(self.sortie.mission().start.at);
+        let mission = MissionName { name: name.to_owned(), hash: MissionHash::of(text), start };
         Self { mission, ..self }
     }
 

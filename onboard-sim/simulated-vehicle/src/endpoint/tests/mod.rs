@@ -76,7 +76,8 @@ impl Wire {
     fn new() -> Self {
         let mut wire = Self {
             vehicle: rocket(),
-            endpoint: VehicleEndpoint::new(VehicleKind::Simulated),
+            // Every field has a value: no frame is shorter than it is in use.
+            endpoint: VehicleEndpoint::new(VehicleKind::Simulated).booted(0x00AB_CDEF).known_as(0xABCD),
             ground: Encoder::new(GROUND),
             beats: false,
         };
