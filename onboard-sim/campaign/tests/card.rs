@@ -1,5 +1,4 @@
 //! What a card tells the range safety officer.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use campaign::hazard::{Flights, Impact, Rule, Way, studies};
 use campaign::motors::card::{Card, Day, Order};

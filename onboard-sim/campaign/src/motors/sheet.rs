@@ -463,36 +463,44 @@ fn write_html(sides: &[Side], out: &mut String) -> fmt::Result {
 fn write_content(content: &Content, out: &mut String) -> fmt::Result {
     match content {
         Content::Table(heads, rows) => {
-            let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| {
-                let cells: String = cells.map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect();
-                format!("<tr>{cells}</tr>\n")
-            };
             writeln!(out, "<table class=\"c{}\">", rows.first().map_or(0, Vec::len))?;
             if !heads.is_empty() {
-                write!(out, "{}", cells("th", &mut heads.iter().copied()))?;
+                write!(out, "<tr>")?;
+                write_each(out, ["<th>", "</th>"], heads.iter().copied())?;
+                writeln!(out, "</tr>")?;
             }
-            rows.iter()
-                .try_for_each(|row| write!(out, "{}", cells("td", &mut row.iter().map(String::as_str))))?;
+            for row in rows {
+                write!(out, "<tr>")?;
+                write_each(out, ["<td>", "</td>"], row.iter().map(String::as_str))?;
+                writeln!(out, "</tr>")?;
+            }
             writeln!(out, "</table>")
         }
         Content::Checks(checks) => {
-            let items: String = checks.iter().map(|check| format!("<li>{}</li>\n", escaped(check))).collect();
-            writeln!(out, "<ul>\n{items}</ul>")
+            writeln!(out, "<ul>")?;
+            write_each(out, ["<li>", "</li>\n"], checks.iter().map(String::as_str))?;
+            writeln!(out, "</ul>")
         }
         Content::Plan(plan, words) => {
-            let words: String = words.iter().map(|words| format!("<p>{}</p>\n", escaped(words))).collect();
-            writeln!(
-                out,
-                "<div class=\"plan\">{}<div>{words}</div></div>",
-                plan.as_deref().unwrap_or_default()
-            )
+            write!(out, "<div class=\"plan\">{}<div>", plan.as_deref().unwrap_or_default())?;
+            write_each(out, ["<p>", "</p>\n"], words.iter().map(String::as_str))?;
+            writeln!(out, "</div></div>")
         }
         Content::Blanks(rows) => rows.iter().try_for_each(|row| {
-            let blanks: String =
-                row.iter().map(|word| format!("<span>{}</span><i></i>", escaped(word))).collect();
-            writeln!(out, "<div class=\"b\">{blanks}</div>")
+            write!(out, "<div class=\"b\">")?;
+            write_each(out, ["<span>", "</span><i></i>"], row.iter().copied())?;
+            writeln!(out, "</div>")
         }),
     }
+}
+
+/// Writes each text between two tags.
+fn write_each<'a>(
+    out: &mut String,
+    tags: [&str; 2],
+    mut texts: impl Iterator<Item = &'a str>,
+) -> fmt::Result {
+    texts.try_for_each(|text| write!(out, "{}{}{}", tags[0], escaped(text), tags[1]))
 }
 
 /// Text without markup.
