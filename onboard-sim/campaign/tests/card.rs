@@ -87,7 +87,7 @@ proptest! {
         let number = |node: roxmltree::Node<'_, '_>, name| node.attribute(name).unwrap().parse::<f64>().unwrap();
         let of_class = |class| document.descendants().filter(move |node| node.attribute("class") == Some(class));
         let line = of_class("downwind").next().unwrap();
-        prop_assert_eq!(["x1", "y1"].map(|name| line.attribute(name)), [Some("0.0"); 2], "from the pad");
+        prop_assert!(["x1", "y1"].into_iter().all(|name| number(line, name).abs() < 1e-9), "from the pad");
         let (x, y) = (number(line, "x2"), number(line, "y2"));
         let length = libm::hypot(x, y);
         prop_assert!((x / length - sin).abs() < 0.01 && (y / length + cos).abs() < 0.01, "{} {} {}", from_deg, x, y);
@@ -109,7 +109,7 @@ fn circle(wind_m_s: f64, keep_out_m: f64) -> InWind {
     in_winds(&[(wind_m_s, impacts)], &rule()).remove(0)
 }
 
-/// Wind from the west: the line goes to the right, and its end says 90 degrees. Without a direction downwind is up.
+/// Wind from the west: the line goes to the right, with north up. Without a direction downwind is up.
 #[test]
 fn val_compass_the_line_of_a_west_wind_points_east() {
     let winds = [circle(3.0, 310.0)];
@@ -117,14 +117,11 @@ fn val_compass_the_line_of_a_west_wind_points_east() {
     let tip = |svg: &str| {
         svg.split("x2=").nth(1).unwrap().split("/>").next().unwrap().replace('"', "").replace("y2=", "")
     };
-    assert!(
-        tip(&west).starts_with("86.0 ") && west.contains("downwind, 090\u{b0}") && west.contains(">N<"),
-        "{west}"
-    );
+    assert!(tip(&west).starts_with("84.0 ") && west.contains(">N<"), "{west}");
     let unknown = plan(&winds, None).unwrap();
-    assert_eq!(tip(&unknown), "0.0 -86.0");
+    assert_eq!(tip(&unknown), "0.0 -84.0");
     assert!(
-        unknown.contains(">downwind<") && unknown.contains("3 m/s: 310 m") && !unknown.contains(">N<"),
+        unknown.contains(">downwind<") && unknown.contains(">3 m/s<") && !unknown.contains(">N<"),
         "{unknown}"
     );
 }

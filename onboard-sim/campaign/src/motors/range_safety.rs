@@ -111,61 +111,73 @@ pub fn aborts(start: StartPoint) -> Vec<[&'static str; 2]> {
     before.iter().chain(&[4, 5, 6]).map(|row| ABORTS[*row]).collect()
 }
 
-/// Half the side of the plan and the radius of its widest circle, in its own units.
-const HALF: f64 = 100.0;
-const WIDEST: f64 = 70.0;
-/// Where the names of the circles stand on them, from the crosswind line towards downwind, degrees: so that they do not overlap.
-const NAMED_DEG: [f64; 4] = [15.0, 165.0, 50.0, 130.0];
+/// Half the width and half the height of the plan, the radius of its widest circle and the length of its line, in its own units.
+const HALF: [f64; 2] = [140.0, 98.0];
+const WIDEST: f64 = 72.0;
+const LINE: f64 = 84.0;
+/// Room of a circle's name across the wind.
+const NAME: f64 = 28.0;
 
-/// The circles from above, to scale, with the line downwind. `wind_from_deg` is where the wind comes from, clockwise from north,
-/// which is up then; without it up is downwind. `None` without a circle.
+/// The circles of the winds to fly in from above, to scale, with the line downwind. `wind_from_deg` is where the wind comes from,
+/// clockwise from north, which is up then; without it up is downwind. `None` without a circle.
 pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
+    let limit_m_s = limit_m_s(winds)?;
+    let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);
     let circles: Vec<(f64, &Circle)> =
-        winds.iter().filter_map(|wind| Some((wind.wind_m_s, wind.circle.as_ref()?))).collect();
+        may_fly.filter_map(|wind| Some((wind.wind_m_s, wind.circle.as_ref()?))).collect();
     let scale = WIDEST / circles.last()?.1.keep_out_m;
-    let to_deg = wind_from_deg.map(|from_deg| (from_deg + 180.0) % 360.0);
-    let (sin, cos) = libm::sincos(to_deg.unwrap_or(0.0).to_radians());
+    let (sin, cos) = libm::sincos(wind_from_deg.map_or(0.0, |from_deg| from_deg + 180.0).to_radians());
     // From downwind, and to the right of that; the plan's y goes down.
     let at = |along: f64, right: f64| [along * sin + right * cos, right * sin - along * cos];
-    let text =
-        |[x, y]: [f64; 2], words: &str| format!("<text x=\"{x:.1}\" y=\"{:.1}\">{words}</text>", y + 2.5);
-    let line = |class: &str, from: [f64; 2], to: [f64; 2]| {
-        let [[x1, y1], [x2, y2]] = [from, to];
+    // Words beyond an end of the line need more room where they stand beside it.
+    let beyond = |end: f64, half: f64| at(end + (8.0 + half * sin.abs()) * end.signum(), 0.0);
+    let text = |[x, y]: [f64; 2], anchor: &str, words: &str| {
+        let y = y + 3.0;
+        format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>")
+    };
+    let line = |class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]| {
         format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>")
     };
     let (mut lines, mut names) = (String::new(), String::new());
+    // Names stand on both sides in turn, and not where one stands already.
+    let mut named = [0.0; 2];
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
         let radius = scale * circle.keep_out_m;
         let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");
         let [x, y] = at(-scale * circle.crew_m() - 1.0, 0.0);
         let _ = write!(lines, "<circle class=\"crew\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\"/>");
-        // Circles of one size have one name.
-        if circles.get(place + 1).is_none_or(|(_, next)| next.keep_out_m > circle.keep_out_m) {
-            let (ahead, right) = libm::sincos(NAMED_DEG[place % NAMED_DEG.len()].to_radians());
-            names += &text(
-                at(radius * ahead, radius * right),
-                &format!("{wind_m_s} m/s: {:.0} m", circle.keep_out_m),
-            );
+        let before = &mut named[place % 2];
+        if *before == 0.0 || radius - *before >= NAME {
+            *before = radius;
+            let right = if place % 2 == 0 { radius + 2.0 } else { -radius - 2.0 };
+            let beside = at(0.0, right);
+            let anchor = if cos.abs() < 0.5 {
+                "middle"
+            } else if beside[0] < 0.0 {
+                "end"
+            } else {
+                "start"
+            };
+            names += &text(beside, anchor, &format!("{wind_m_s} m/s"));
         }
     }
-    let tip = HALF - 14.0;
-    lines += &line("downwind", [0.0; 2], at(tip, 0.0));
-    lines += &line("downwind", at(tip - 6.0, -4.0), at(tip, 0.0));
-    lines += &line("downwind", at(tip - 6.0, 4.0), at(tip, 0.0));
+    for from in [at(0.0, 0.0), at(LINE - 6.0, -4.0), at(LINE - 6.0, 4.0)] {
+        lines += &line("downwind", from, at(LINE, 0.0));
+    }
     lines += &line("", [-3.0, -3.0], [3.0, 3.0]);
     lines += &line("", [-3.0, 3.0], [3.0, -3.0]);
-    let downwind =
-        to_deg.map_or_else(|| "downwind".to_owned(), |to_deg| format!("downwind, {to_deg:03.0}\u{b0}"));
-    names += &text(at(HALF - 7.0, 0.0), &downwind);
-    names += &text(at(-HALF + 7.0, 0.0), "launch crew, upwind");
-    if to_deg.is_some() {
-        names += &text([HALF - 8.0, -HALF + 18.0], "N");
-        lines += &line("", [HALF - 8.0, -HALF + 12.0], [HALF - 8.0, -HALF + 2.0]);
-        lines += &line("", [HALF - 11.0, -HALF + 6.0], [HALF - 8.0, -HALF + 2.0]);
-        lines += &line("", [HALF - 5.0, -HALF + 6.0], [HALF - 8.0, -HALF + 2.0]);
+    names += &text(beyond(LINE, 20.0), "middle", "downwind");
+    names += &text(beyond(-WIDEST - 2.0, 24.0), "middle", "launch crew");
+    let [half_x, half_y] = HALF;
+    if wind_from_deg.is_some() {
+        let tip = [half_x - 8.0, 3.0 - half_y];
+        names += &text([tip[0], tip[1] + 17.0], "middle", "N");
+        for (x, y) in [(0.0, 11.0), (-3.0, 5.0), (3.0, 5.0)] {
+            lines += &line("", [tip[0] + x, tip[1] + y], tip);
+        }
     }
-    let side = 2.0 * HALF;
+    let (width, height) = (2.0 * half_x, 2.0 * half_y);
     Some(format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-{HALF} -{HALF} {side} {side}\">{lines}{names}</svg>"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-{half_x} -{half_y} {width} {height}\">{lines}{names}</svg>"
     ))
 }

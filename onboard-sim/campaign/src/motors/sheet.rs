@@ -59,7 +59,8 @@ const DAY: &[&[&str]] = &[
 impl Card {
     /// The front and the back.
     pub(super) fn sides(&self) -> [Side; 2] {
-        [self.front(&in_winds(&self.flown, &self.rule)), self.back()]
+        let winds = in_winds(&self.flown, &self.rule);
+        [self.front(&winds), self.back(&winds)]
     }
 
     fn front(&self, winds: &[InWind]) -> Side {
@@ -96,7 +97,7 @@ impl Card {
                     ),
                 },
             ],
-            notes: vec![self.sources(winds)],
+            notes: Vec::new(),
         }
     }
 
@@ -127,18 +128,26 @@ impl Card {
             "If the wind turns, so does the line: look again before the arming.".to_owned(),
         ]);
         let plan = plan(winds, self.wind_from_deg);
-        if plan.is_some() && self.wind_from_deg.is_none() {
-            words.push("Hold the plan so that its arrow points downwind.".to_owned());
+        if plan.is_some() {
+            words.push(self.wind_from_deg.map_or_else(
+                || "Hold the plan so that its arrow points downwind.".to_owned(),
+                |from_deg| {
+                    let to_deg = (from_deg + 180.0) % 360.0;
+                    format!(
+                        "The plan has north up: wind from {from_deg:.0}\u{b0}, downwind {to_deg:.0}\u{b0}."
+                    )
+                },
+            ));
         }
         Section { title: "Who stands where", content: Content::Plan(plan, words) }
     }
 
-    /// What the front rests on.
+    /// What the numbers of the front rest on.
     fn sources(&self, winds: &[InWind]) -> String {
         let open = winds.iter().filter_map(|wind| wind.circle).any(|circle| circle.radius.high_m.is_none());
         format!(
-            "Nobody within: the largest of what holds 99 % of the flights of the way of ending that reaches farthest (upper end), of the rows \
-             above, and of {} ({}); rounded up to 10 m.{} Land: on their legs; Wilson's interval. Fewer than {FEWEST} flights tell \
+            "Front. Nobody within: the largest of what holds 99 % of the flights of the way of ending that reaches farthest (upper end), of the rows \
+             above, and of {} ({}); rounded up to 10 m.{} On their legs: of the flights as planned, Wilson's interval. Fewer than {FEWEST} flights tell \
              neither. The fence of the mission ({:.0} m) only decides whether the landing motor may light. The same flights again: \
              onboard-sim hazard --profile mission.toml --dispersion {} --winds {} --seed {} --survey {} --flights {}",
             self.rule,
@@ -153,7 +162,7 @@ impl Card {
         )
     }
 
-    fn back(&self) -> Side {
+    fn back(&self, winds: &[InWind]) -> Side {
         let candidate = &self.landing.candidate;
         let curve = &candidate.curve;
         Side {
@@ -165,18 +174,21 @@ impl Card {
                 self.margins(),
                 Section { title: "Check", content: Content::Checks(self.checks()) },
             ],
-            notes: vec![format!(
-                "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; data: {}.",
-                candidate.name(),
-                curve.total_impulse_n_s(),
-                curve.burn_time_s(),
-                curve.peak_thrust_n(),
-                1e3 * curve.propellant_mass_kg(),
-                1e3 * curve.total_mass_kg(),
-                1e3 * curve.diameter_m(),
-                1e3 * curve.length_m(),
-                candidate.origin
-            )],
+            notes: vec![
+                format!(
+                    "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; data: {}.",
+                    candidate.name(),
+                    curve.total_impulse_n_s(),
+                    curve.burn_time_s(),
+                    curve.peak_thrust_n(),
+                    1e3 * curve.propellant_mass_kg(),
+                    1e3 * curve.total_mass_kg(),
+                    1e3 * curve.diameter_m(),
+                    1e3 * curve.length_m(),
+                    candidate.origin
+                ),
+                self.sources(winds),
+            ],
         }
     }
 
@@ -329,10 +341,10 @@ fn wind_table(winds: &[InWind]) -> Section {
             &[
                 "wind up to",
                 "nobody within",
-                "launch crew, upwind",
+                "launch crew, upwind; walk",
                 "farthest downwind, across, upwind",
                 "99 % come down within (95 % interval)",
-                "land (95 % interval)",
+                "on their legs (95 % interval)",
             ],
             winds.iter().map(|wind| wind_row(wind, may_fly(wind))).collect(),
         ),
@@ -350,7 +362,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
         let [keep_out_m, crew_m] = [circle.keep_out_m, circle.crew_m()];
         [
             format!("{at_least}{keep_out_m:.0} m"),
-            format!("{at_least}{crew_m:.0} m ({:.0} min)", libm::ceil(crew_m / 60.0)),
+            format!("{at_least}{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0)),
         ]
     };
     let [people, crew] = wind.circle.map_or_else(|| ["none".to_owned(), "-".to_owned()], people);
@@ -377,16 +389,17 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
 }
 
 /// One sheet of A4 with two sides, in black and white, readable in the sun.
-const STYLE: &str = "@page{size:A4;margin:11mm}body{font:12px/1.3 sans-serif;max-width:188mm;margin:0 auto;color:#000}\
+const STYLE: &str = "@page{size:A4;margin:10mm}body{font:12px/1.25 sans-serif;max-width:190mm;margin:0 auto;color:#000}\
 section+section{break-before:page}h1{font-size:20px;margin:0}p{margin:2px 0}h2{font-size:14px;margin:7px 0 2px}\
 table{border-collapse:collapse;width:100%}td,th{padding:2px 6px;vertical-align:top;text-align:left;border:1px solid #000}\
-.c2 td:first-child{font-weight:bold;width:33%}.c3 td:first-child{width:25%}.c3 td:nth-child(2){font-weight:bold;width:29%}\
-.c6 td:nth-child(-n+3){font-weight:bold;font-size:15px}.c7{table-layout:fixed}.c7 th:nth-child(4),.c7 th:nth-child(6){width:8%}.c7 td{height:22px}\
+.c2 td:first-child{font-weight:bold;width:34%}.c3 td:first-child{width:25%}.c3 td:nth-child(2){font-weight:bold;width:29%}\
+.c6 td{font-size:11px}.c6 td:nth-child(-n+3){font-weight:bold;font-size:14px}.c6{table-layout:fixed}.c6 th{font-size:11px;width:15%}.c6 th:first-child{width:9%}\
+.c6 th:nth-child(3){width:17%}.c6 th:nth-child(5){width:28%}.c7{table-layout:fixed}.c7 th:first-child{width:17%}.c7 th:nth-child(4),.c7 th:nth-child(6){width:7%}.c7 th:nth-child(5){width:21%}.c7 td{height:22px}\
 ul{list-style:none;padding:0;margin:2px 0}li:before{content:'\\2610\\00a0'}small{display:block;margin-top:5px;overflow-wrap:anywhere}\
-.plan{display:flex;gap:5mm;align-items:center}.plan p{margin:4px 0}svg{flex:0 0 66mm;height:66mm}\
+.plan{display:flex;gap:5mm;align-items:center}.plan p{margin:3px 0}svg{flex:0 0 82mm;height:57mm}\
 circle,line{fill:none;stroke:#000;stroke-width:.7}.downwind{stroke-width:2}.crew{fill:#000}\
-text{font-size:7px;text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:2px}\
-.b{display:flex;gap:4px;align-items:end;height:23px}.b i{flex:1;border-bottom:1px solid #000}";
+text{font-size:9px;paint-order:stroke;stroke:#fff;stroke-width:2px}\
+.b{display:flex;gap:4px;align-items:end;height:22px}.b i{flex:1;border-bottom:1px solid #000}";
 
 pub(super) fn text(sides: &[Side]) -> String {
     let mut out = String::new();
