@@ -139,6 +139,9 @@ fn val_hand_the_wind_to_fly_in_keeps_nine_tenths_of_the_landings() {
     assert_eq!(limit([90, 81, 81]), Some(6.0));
     assert_eq!(limit([90, 81, 80]), Some(3.0));
     assert_eq!(limit([90, 80, 90]), Some(0.0), "no wind beyond one that is not flown");
+    let mut never_down: Vec<Impact> = in_wind(90);
+    never_down.iter_mut().for_each(|impact| impact.place_m = None);
+    assert_eq!(limit_m_s(&in_winds(&[(0.0, never_down)], &rule())), None);
 }
 
 /// The words of the card are those of the page for the range safety officer.
@@ -189,7 +192,12 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
         Recipe { dispersion: windy.dispersion, seed: 5, ..written }.starting_at(StartPoint::Pad).unwrap();
     assert_eq!(card.flown[0].1, studies(&[written], flights, &|_, _| {}).unwrap()[0]);
     let text = card.text();
-    assert!(text.contains("Fewer than 100 flights were flown in each wind: no radius, no rate"), "{text}");
+    assert!(
+        text.contains(
+            "Fewer than 100 flights were flown in each wind, or one did not come down: no radius, no rate"
+        ),
+        "{text}"
+    );
     for row in aborts(StartPoint::Pad).concat() {
         assert!(text.contains(row), "{row} in\n{text}");
     }

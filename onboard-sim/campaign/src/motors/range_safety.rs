@@ -71,7 +71,8 @@ pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     const KEPT: f64 = 0.9;
     let calmest = winds.first()?.landed?;
     let may_fly = |wind: &&InWind| {
-        wind.circle.is_some() && wind.landed.is_some_and(|landed| landed.share >= KEPT * calmest.share)
+        wind.circle.is_some_and(|circle| circle.keep_out_m.is_finite())
+            && wind.landed.is_some_and(|landed| landed.share >= KEPT * calmest.share)
     };
     winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
 }

@@ -112,7 +112,8 @@ impl Card {
     fn places(&self, winds: &[InWind]) -> Section {
         let mut words = match limit_m_s(winds) {
             None => vec![format!(
-                "Fewer than {FEWEST} flights were flown in each wind: no radius, no rate and no wind to fly in. Do not fly by this card."
+                "Fewer than {FEWEST} flights were flown in each wind, or one did not come down: no radius, no rate and no wind to \
+                 fly in. Do not fly by this card."
             )],
             Some(most_m_s) => vec![format!(
                 "Do not fly above {most_m_s} m/s: fewer land, or it is not known. The wind is the mean of ten minutes, 10 m above the \
