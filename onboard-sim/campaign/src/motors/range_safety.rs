@@ -112,7 +112,8 @@ pub fn aborts(start: StartPoint) -> Vec<[&'static str; 2]> {
     before.iter().chain(&[4, 5, 6]).map(|row| ABORTS[*row]).collect()
 }
 
-/// Half the width and half the height of the plan, the radius of its widest circle and the length of its line, in its own units.
+/// Half the width and half the height of the plan, how far the farthest crew stands in it, and the length of its line, in its own
+/// units.
 const HALF: [f64; 2] = [140.0, 98.0];
 const WIDEST: f64 = 72.0;
 const LINE: f64 = 84.0;
@@ -126,7 +127,7 @@ pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
     let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);
     let circles: Vec<(f64, &Circle)> =
         may_fly.filter_map(|wind| Some((wind.wind_m_s, wind.circle.as_ref()?))).collect();
-    let scale = WIDEST / circles.last()?.1.keep_out_m;
+    let scale = WIDEST / circles.last()?.1.crew_m();
     let (sin, cos) = libm::sincos(wind_from_deg.map_or(0.0, |from_deg| from_deg + 180.0).to_radians());
     // From downwind, and to the right of that; the plan's y goes down.
     let at = |along: f64, right: f64| [along * sin + right * cos, right * sin - along * cos];
@@ -168,7 +169,7 @@ pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
     lines += &line("", [-3.0, -3.0], [3.0, 3.0]);
     lines += &line("", [-3.0, 3.0], [3.0, -3.0]);
     names += &text(beyond(LINE, 20.0), "middle", "downwind");
-    names += &text(beyond(-WIDEST - 2.0, 24.0), "middle", "launch crew");
+    names += &text(beyond(-WIDEST - 3.0, 24.0), "middle", "launch crew");
     let [half_x, half_y] = HALF;
     if wind_from_deg.is_some() {
         let tip = [half_x - 8.0, 3.0 - half_y];

@@ -286,7 +286,7 @@ impl Card {
                 row(
                     "Mass, certified motor",
                     format!("{:.3} to {:.3} kg", choice.landing_kg[0], choice.landing_kg[1]),
-                    "outside no landing exists; the flights above differ by what their dispersions say",
+                    "outside no landing exists; the flights of the front differ by what their set says",
                 ),
                 row(
                     "Scatter it stands",
