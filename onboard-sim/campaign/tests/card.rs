@@ -140,7 +140,9 @@ fn val_hand_the_wind_to_fly_in_keeps_nine_tenths_of_the_landings() {
     assert_eq!(limit([90, 81, 80]), Some(3.0));
     assert_eq!(limit([90, 80, 90]), Some(0.0), "no wind beyond one that is not flown");
     let mut never_down: Vec<Impact> = in_wind(90);
-    never_down.iter_mut().for_each(|impact| impact.place_m = None);
+    for impact in &mut never_down {
+        impact.place_m = None;
+    }
     assert_eq!(limit_m_s(&in_winds(&[(0.0, never_down)], &rule())), None);
 }
 
