@@ -49,10 +49,11 @@ enum Command {
     /// good). The best ones are then flown.
     #[command(after_help = cli::motors::MOTORS_EXAMPLE)]
     Motors(cli::motors::MotorsArguments),
-    /// Write the page that a team takes to the field, and the mission to load; refused for what cannot land.
+    /// Write the sheet that a team takes to the field, and the mission to load; refused for what cannot land.
     ///
-    /// The folder gets card.html and card.txt (the same page), mission.toml (for fly, campaign and the vehicle) and day.toml
-    /// (the set of dispersions with the wind of the day).
+    /// The folder gets card.html and card.txt (the same sheet: its front is for the range safety officer, its back for whoever
+    /// prepares the vehicle) and mission.toml (for fly, campaign, hazard and the vehicle). In each wind every way in which a flight
+    /// can end is flown 100 times, and the farthest ones 400 times: some minutes.
     #[command(after_help = cli::motors::CARD_EXAMPLE)]
     Card(cli::motors::CardArguments),
     /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.

@@ -83,7 +83,10 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
     assert!(refused(&["motors", "--from", "list.json"]).contains("list.json: not a list of motors"));
     assert!(refused(&["motors", "--ballast", "1"]).contains("`1` is not FROM:TO"));
     assert!(refused(&["motors", "--tube", "90"]).contains("--tube 90: must be above 0 and up to 74 mm"));
-    assert!(refused(&["card", "--wind", "40"]).contains("--wind 40: must be 0 to 27 m/s"));
+    assert!(refused(&["card", "--winds", "3,40"]).contains("--winds 40: must be 0 to 30 m/s"));
+    assert!(
+        refused(&["card", "--wind-from", "400"]).contains("`400` is not a direction of 0 to 360 degrees")
+    );
     assert!(refused(&["card", "--mass", "0"]).contains("--mass 0: a mass in kg above 0"));
     assert!(refused(&["card", "--motor", "Z9"]).contains("--motor Z9: neither a motor file nor one of the "));
     let none = refused(&["motors", "--mission", "mini-f10", "--tube", "10"]);
@@ -94,66 +97,35 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
 }
 
 #[test]
-fn a_card_is_written_whole_and_its_mission_flies_the_same_flights() {
+fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights() {
     let directory = tempfile::tempdir().unwrap();
-    fs::write(directory.path().join("f10.eng"), F10).unwrap();
-    let arguments = [
-        "card",
-        "--mission",
-        "mini-f10",
-        "--motor",
-        "f10.eng",
-        "--mass",
-        "0.85",
-        "--wind",
-        "2",
-        "--flights",
-        "2",
-        "--hazard-flights",
-        "2",
-    ];
+    let arguments =
+        ["card", "--winds", "6,0", "--flights", "2", "--hazard-flights", "3", "--wind-from", "225"];
     let written = run(directory.path(), &arguments);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let progress = stderr(&written);
+    assert!(progress.contains("12 of 12 flights\n0 of 46 flights\n"), "{progress}");
     let card = directory.path().join("card");
-    assert_eq!(names(&card), ["card.html", "card.txt", "day.toml", "mission.toml"]);
+    assert_eq!(names(&card), ["card.html", "card.txt", "mission.toml"]);
     let text = fs::read_to_string(card.join("card.txt")).unwrap();
     for expected in [
-        "0.850 kg",
+        "Range safety: mk2-h45w",
+        "no radius, no rate and no wind to fly in. Do not fly by this card.",
+        "--dispersion real --winds 0,6 --seed 1 --survey 2 --flights 3",
+        "landing motor lit ",
+        "Book of station 1 ______ : ______ - ",
+        "signature",
+        "Landing card: mk2-h45w",
+        "3.100 kg",
         "Apogee or drop",
-        "Lands at 2 m/s in real",
-        "Lands at 5 m/s in real",
-        "[ ] Nobody within at least ",
         "[ ] Weigh the vehicle",
     ] {
         assert!(text.contains(expected), "{expected} in\n{text}");
     }
+    assert!(!text.contains(" of 2:") && !text.contains("kinder"), "{text}");
     assert!(stdout(&written).starts_with(&text));
-    assert!(!text.contains("kinder"), "{text}");
     let html = fs::read_to_string(card.join("card.html")).unwrap();
-    assert!(html.contains("<td class=\"v\">0.850 kg</td>") && html.ends_with("</html>\n"));
-
-    // The campaign on the written files lands as many of the same flights.
-    let landed = text.lines().find(|line| line.contains("Lands at 2 m/s in real")).unwrap();
-    let count = landed.split_whitespace().nth(6).unwrap();
-    let flown = run(
-        directory.path(),
-        &[
-            "campaign",
-            "--profile",
-            "card/mission.toml",
-            "--dispersion",
-            "card/day.toml",
-            "--seed",
-            "1",
-            "--flights",
-            "2",
-            "--out",
-            "flights",
-        ],
-    );
-    assert_eq!(flown.status.code(), Some(0), "{}", stderr(&flown));
-    let legs = format!("legs    {count} of 2");
-    assert!(stdout(&flown).contains(&legs), "{legs}\n{}", stdout(&flown));
+    assert!(html.contains("<td>3.100 kg</td>") && html.ends_with("</html>\n"), "{html}");
 
     let again = run(directory.path(), &arguments);
     assert_eq!(again.status.code(), Some(1));
@@ -220,9 +192,19 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
         assert!(text.contains(expected), "{expected} in\n{text}");
     }
     let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
-    assert!(csv.starts_with("wind_m_s,way,flight,x_m,y_m,landed\n0,as planned,0,"), "{csv}");
+    assert!(
+        csv.starts_with("wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,landed\n0,as planned,0,"),
+        "{csv}"
+    );
     let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();
-    assert!(svg.contains("vlr: where it comes down") && svg.contains("NAR 9 m"), "{svg}");
+    for expected in [
+        "vlr: where it comes down",
+        "rule of NAR: 9 m",
+        "0 m/s: nobody within at least ",
+        "4 m/s: nobody within at least ",
+    ] {
+        assert!(svg.contains(expected), "{expected} in\n{svg}");
+    }
     let again = hazard(&["--csv", "hazard.csv"]);
     assert!(stderr(&again).contains("hazard.csv exists already; --force"), "{}", stderr(&again));
     let kind = stdout(&hazard(&["--dispersion", "field"]));

@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
-use plotters::element::{Circle, Cross, PathElement, Rectangle, Text};
+use plotters::element::{Cross, EmptyElement, PathElement, Rectangle, Text};
 use plotters::series::{DashedLineSeries, LineSeries};
 use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, WHITE};
 
@@ -329,60 +329,65 @@ pub fn cells_svg(title: &str, map: &Cells<'_>) -> Result<String, FigureError> {
     })
 }
 
-/// Side of the square of the places, px.
-const SIDE_PX: u32 = 620;
+/// Side of the square of places, px: of one of several, and of one alone.
+const SIDE_PX: u32 = 400;
+const LONE_SIDE_PX: u32 = 620;
 /// Corners of a circle.
 const CORNERS: u32 = 180;
-/// Colours of the circles, from the inner to the outer.
-const GREYS: [RGBColor; 4] =
-    [RGBColor(150, 150, 150), RGBColor(110, 110, 110), RGBColor(60, 60, 60), RGBColor(0, 0, 0)];
 
-/// What to draw, m from the pad.
+/// What to draw: places about the pad, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Places<'a> {
-    /// Names and places of the kinds.
-    pub kinds: &'a [(&'a str, Vec<[f64; 2]>)],
-    /// Names and radii of the circles.
-    pub circles: &'a [(String, f64)],
+    /// Names of the axes, to the right and up.
+    pub labels: [&'a str; 2],
+    /// Names of the kinds of places, and of the radii.
+    pub kinds: &'a [&'a str],
+    pub radii: &'a [&'a str],
+    /// Name of an arrow up from the pad, if there is one.
+    pub arrow: Option<&'a str>,
+    pub panels: &'a [PlacesPanel],
 }
 
-/// The places as SVG, both axes at one scale.
+/// One square of places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacesPanel {
+    pub title: String,
+    /// Of each kind, to the right and up.
+    pub places: Vec<Vec<[f64; 2]>>,
+    /// About the pad.
+    pub radii_m: Vec<f64>,
+}
+
+/// Panels of places as SVG, two in a row, both axes at one scale.
 ///
 /// # Errors
 /// A radius is too small.
 pub fn places_svg(title: &str, places: &Places<'_>) -> Result<String, FigureError> {
-    let names = places.kinds.iter().map(|(name, _)| (*name).to_owned());
-    let names = names.chain(places.circles.iter().map(|(name, _)| name.clone()));
-    let (width_px, height_px) = (SIDE_PX + ROOM_PX.0, SIDE_PX + ROOM_PX.1);
+    let Places { kinds, radii, arrow, panels, .. } = places;
+    let columns = panels.len().clamp(1, 2);
+    let rows = panels.len().div_ceil(columns).max(1);
+    let side_px = if panels.len() > 1 { SIDE_PX } else { LONE_SIDE_PX };
+    let title_px = if panels.iter().any(|panel| !panel.title.is_empty()) { TITLE_PX } else { 0 };
+    let panel_px = (side_px + ROOM_PX.0, title_px + side_px + ROOM_PX.1);
+    let (width_px, panels_px) = (columns as u32 * panel_px.0, rows as u32 * panel_px.1);
+    let names = kinds.iter().chain(*radii).chain(arrow).map(|name| (*name).to_owned());
     let legend = Legend::new(names.collect(), width_px);
-    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
-        let (upper, lower) = root.split_vertically(height_px);
-        let of_places = places.kinds.iter().flat_map(|(_, places)| places.iter().flatten().map(|m| m.abs()));
-        let of_circles = places.circles.iter().map(|(_, radius_m)| *radius_m);
-        let far_m = 1.05 * of_places.chain(of_circles).filter(|m| m.is_finite()).fold(1.0, f64::max);
-        let labels = ["world x, m from the pad", "world y, m from the pad"];
-        let mut chart = axes(&upper, [(-far_m, far_m); 2], labels)?;
-        for (kind, (_, places)) in places.kinds.iter().enumerate() {
-            let finite = places.iter().filter(|place| place.iter().all(|m| m.is_finite()));
-            chart.draw_series(finite.map(|[x, y]| Circle::new((*x, *y), 2, dot(kind))))?;
+    drawn(title, (width_px, panels_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(panels_px);
+        for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(*panels) {
+            let area =
+                if panel.title.is_empty() { area.clone() } else { area.titled(&panel.title, TITLE_FONT)? };
+            draw_places(&area, places, panel)?;
         }
-        for (place, (_, radius_m)) in places.circles.iter().enumerate() {
-            let corner = |k: u32| {
-                let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(CORNERS));
-                (radius_m * cos, radius_m * sin)
-            };
-            chart.draw_series([PathElement::new(
-                (0..=CORNERS).map(corner).collect::<Vec<_>>(),
-                line(place),
-            )])?;
-        }
-        chart.draw_series([Cross::new((0.0, 0.0), 6, BLACK.stroke_width(2))])?;
         legend.draw(&lower, |area, entry, (left, middle)| {
-            match entry.checked_sub(places.kinds.len()) {
-                None => area.draw(&Circle::new((left + 10, middle), 4, dot(entry)))?,
-                Some(circle) => {
-                    let ends = [(left, middle), (left + 20, middle)];
-                    area.draw(&PathElement::new(ends, line(circle)))?;
+            match entry.checked_sub(kinds.len()) {
+                None => area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
+                Some(radius) if radius < radii.len() => {
+                    area.draw(&PathElement::new([(left, middle), (left + 20, middle)], line(radius)))?;
+                }
+                Some(_) => {
+                    let arrow = [(10, 9), (10, -9), (6, -3), (10, -9), (14, -3)];
+                    area.draw(&PathElement::new(arrow.map(|(x, y)| (left + x, middle + y)), line(0)))?;
                 }
             }
             Ok(())
@@ -390,13 +395,51 @@ pub fn places_svg(title: &str, places: &Places<'_>) -> Result<String, FigureErro
     })
 }
 
-fn dot(kind: usize) -> ShapeStyle {
-    COLOURS[kind % COLOURS.len()].mix(0.7).filled()
+fn draw_places(area: &Area<'_>, Places { labels, arrow, .. }: &Places<'_>, panel: &PlacesPanel) -> Drawn {
+    let radii_m = || panel.radii_m.iter().copied().enumerate().filter(|(_, radius_m)| radius_m.is_finite());
+    let of_places = panel.places.iter().flatten().flatten().map(|m| m.abs()).filter(|m| m.is_finite());
+    let far_m = 1.05 * of_places.chain(radii_m().map(|(_, radius_m)| radius_m)).fold(1.0, f64::max);
+    let mut chart = axes(area, [(-far_m, far_m); 2], *labels)?;
+    for (kind, places) in panel.places.iter().enumerate() {
+        let finite = places.iter().filter(|place| place.iter().all(|m| m.is_finite()));
+        chart.draw_series(finite.map(|[x, y]| EmptyElement::at((*x, *y)) + mark(kind)))?;
+    }
+    for (place, radius_m) in radii_m() {
+        let corner = |k: u32| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(CORNERS));
+            (radius_m * cos, radius_m * sin)
+        };
+        chart.draw_series([PathElement::new((0..=CORNERS).map(corner).collect::<Vec<_>>(), line(place))])?;
+    }
+    if arrow.is_some() {
+        let tip_m = radii_m().map(|(_, radius_m)| radius_m).next().unwrap_or(far_m);
+        let (back_m, aside_m) = (tip_m - 0.05 * far_m, 0.025 * far_m);
+        let arrow = [(0.0, 0.0), (0.0, tip_m), (-aside_m, back_m), (0.0, tip_m), (aside_m, back_m)];
+        chart.draw_series([PathElement::new(arrow, line(0))])?;
+    }
+    chart.draw_series([Cross::new((0.0, 0.0), 6, BLACK.stroke_width(2))])?;
+    Ok(())
 }
 
-/// The darker, the farther out; each second one is thin.
-fn line(circle: usize) -> ShapeStyle {
-    GREYS[circle % GREYS.len()].stroke_width(1 + u32::from(circle.is_multiple_of(2)))
+/// The mark of a kind: no meaning is in a colour alone.
+fn mark(kind: usize) -> PathElement<(i32, i32)> {
+    const SHAPES: [&[(i32, i32)]; 4] = [
+        &[(-3, -3), (3, -3), (3, 3), (-3, 3), (-3, -3)],
+        &[(-4, -4), (4, 4), (0, 0), (-4, 4), (4, -4)],
+        &[(0, -4), (4, 3), (-4, 3), (0, -4)],
+        &[(-5, 0), (5, 0), (0, 0), (0, -5), (0, 5)],
+    ];
+    PathElement::new(SHAPES[kind % SHAPES.len()], COLOURS[kind % COLOURS.len()].stroke_width(1))
+}
+
+/// The first is bold, the next thin.
+fn line(radius: usize) -> ShapeStyle {
+    BLACK.stroke_width(if radius == 0 { 2 } else { 1 })
+}
+
+/// The colour of a kind of bars.
+fn dot(kind: usize) -> ShapeStyle {
+    COLOURS[kind % COLOURS.len()].mix(0.7).filled()
 }
 
 /// A bar.
@@ -518,15 +561,27 @@ mod tests {
     }
 
     #[test]
-    fn every_place_and_circle_is_drawn_and_named() {
-        let kinds = [("as planned", vec![[1.0, 2.0], [3.0, f64::NAN]]), ("a < b", vec![[-40.0, 5.0]])];
-        let circles = [("fence".to_owned(), 120.0), ("99 %".to_owned(), 400.0)];
-        let svg = places_svg("mk2", &Places { kinds: &kinds, circles: &circles }).unwrap();
-        for text in ["as planned", "a &lt; b", "fence", "99 %", "world x, m from the pad", "400"] {
-            assert!(svg.contains(text), "{text}");
+    fn every_wind_has_a_panel_and_the_legend_names_every_mark_and_line() {
+        let panel = |title: &str, keep_out_m| PlacesPanel {
+            title: title.to_owned(),
+            places: vec![vec![[1.0, 2.0], [3.0, f64::NAN]], vec![[-40.0, 5.0]]],
+            radii_m: vec![keep_out_m, 61.0],
+        };
+        let panels = [panel("0 m/s", 150.0), panel("3 m/s", 310.0), panel("6 m/s", f64::NAN)];
+        let places = Places {
+            labels: ["across the wind, m", "downwind, m"],
+            kinds: &["as planned", "a < b"],
+            radii: &["nobody within", "NAR"],
+            arrow: Some("with the wind"),
+            panels: &panels,
+        };
+        let svg = places_svg("mk2", &places).unwrap();
+        for text in
+            ["as planned", "a &lt; b", "nobody within", "NAR", "with the wind", "0 m/s", "3 m/s", "6 m/s"]
+        {
+            assert_eq!(svg.matches(text).count(), 1, "{text}");
         }
-        // Two places and two in the legend.
-        assert_eq!(svg.matches("<circle").count(), 4);
-        assert!(places_svg("", &Places { kinds: &[], circles: &[] }).is_ok());
+        assert_eq!(svg.matches("downwind, m").count(), 3, "one wind a panel");
+        assert!(places_svg("", &Places { panels: &[], ..places }).is_ok());
     }
 }

@@ -12,7 +12,7 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
-use sim::draw::Chance;
+use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
 use sim::recipe::{Recipe, RecipeError};
 use sim::sortie::{SetUpError, Sortie};
@@ -159,6 +159,8 @@ pub struct Impact {
     pub number: u64,
     /// Place from the pad, m along world x and y; `None` if it was still in the air after a quarter of an hour.
     pub place_m: Option<[f64; 2]>,
+    /// Where the wind of this flight blows to, from world x towards y.
+    pub downwind_rad: f64,
     /// Within the limits of the legs.
     pub landed: bool,
 }
@@ -167,6 +169,13 @@ impl Impact {
     /// Distance from the pad, m.
     pub fn distance_m(&self) -> f64 {
         self.place_m.map_or(f64::INFINITY, |[x_m, y_m]| libm::hypot(x_m, y_m))
+    }
+
+    /// Place from the pad, m downwind and, left of that, across the wind.
+    pub fn in_wind_m(&self) -> Option<[f64; 2]> {
+        let [x_m, y_m] = self.place_m?;
+        let (sin, cos) = libm::sincos(self.downwind_rad);
+        Some([x_m * cos + y_m * sin, y_m * cos - x_m * sin])
     }
 }
 
@@ -228,34 +237,55 @@ pub struct Flights {
 /// A way of which the farthest flight of the survey comes down at this share of the farthest of all is one of the widest.
 const NEARLY: f64 = 0.9;
 
+/// [`study`] of each recipe. `done` is told how many flights of all are flown, of about how many.
+///
+/// # Errors
+/// A flight cannot be set up.
+pub fn studies(
+    recipes: &[Recipe],
+    flights: Flights,
+    done: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Vec<Impact>>, HazardError> {
+    let mut before = 0;
+    let of_each = recipes.iter().enumerate().map(|(place, recipe)| {
+        let left = recipes.len() - place;
+        let impacts = study(recipe, flights, &|flown, of| done(before + flown, before + left * of))?;
+        before += impacts.len();
+        Ok(impacts)
+    });
+    of_each.collect()
+}
+
 /// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` is told how many flights are flown,
-/// of how many.
+/// of how many: before the widest ways are known, of one of them.
 ///
 /// # Errors
 /// A flight cannot be set up.
 pub fn study(
     recipe: &Recipe,
     flights: Flights,
-    done: &(dyn Fn(u64, u64) + Sync),
+    done: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Impact>, HazardError> {
     let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
     let ways = Way::of(&recipe.mission);
-    let fly_some = |ways: &[Way], numbers: core::ops::Range<u64>| {
-        let from = numbers.start;
+    let (surveyed, more) = (survey as usize * ways.len(), (of_widest - survey) as usize);
+    let fly_some = |ways: &[Way], numbers: core::ops::Range<u64>, told: &(dyn Fn(usize) + Sync)| {
         let numbers: Vec<u64> = numbers.collect();
-        let told = |flown: usize| done(from + flown as u64, of_widest);
-        let flown = in_parallel(&numbers, |number| fly(recipe, ways, *number), &told);
+        let flown =
+            in_parallel(&numbers, |number| fly(recipe, ways, *number), &|flown| told(flown * ways.len()));
         let flown = numbers
             .iter()
             .zip(flown)
             .map(|(number, flown)| flown.map_err(|source| HazardError::Flight { number: *number, source }));
         Ok::<_, HazardError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
     };
-    let mut impacts = fly_some(&ways, 0..survey)?;
+    done(0, surveyed + more);
+    let mut impacts = fly_some(&ways, 0..survey, &|flown| done(flown, surveyed + more))?;
     let farthest_m = |way: Way| Radius::of_way(&impacts, way).map_or(0.0, |radius| radius.farthest_m);
     let widest_m = ways.iter().map(|way| farthest_m(*way)).fold(0.0, f64::max);
     let widest: Vec<Way> = ways.into_iter().filter(|way| farthest_m(*way) >= NEARLY * widest_m).collect();
-    impacts.extend(fly_some(&widest, survey..of_widest)?);
+    let of = surveyed + more * widest.len();
+    impacts.extend(fly_some(&widest, survey..of_widest, &|flown| done(surveyed + flown, of))?);
     Ok(impacts)
 }
 
@@ -289,9 +319,6 @@ pub enum HazardError {
     /// The mission has not what its start needs.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
-    /// Nothing was flown.
-    #[error("no flight was flown")]
-    NoFlight,
 }
 
 /// Flies flight `number` of a recipe in some ways.
@@ -300,7 +327,10 @@ pub enum HazardError {
 /// The flight cannot be set up.
 pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, SetUpError> {
     let mut impacts = Vec::with_capacity(ways.len());
-    let mut add = |way: Way, place_m, landed| impacts.push(Impact { way, number, place_m, landed });
+    let drawn = draw(&recipe.mission, &recipe.dispersion, recipe.seed, number);
+    let downwind_rad = drawn.truth.wind_towards_rad;
+    let mut add =
+        |way: Way, place_m, landed| impacts.push(Impact { way, number, place_m, downwind_rad, landed });
     let (alone, beside): (Vec<Way>, Vec<Way>) =
         ways.iter().partition(|way| way.faults().is_some() || **way == Way::Uncommanded);
     if !beside.is_empty() {

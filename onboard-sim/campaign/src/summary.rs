@@ -8,7 +8,7 @@ use flight::vehicle::mission::LegLimits;
 use serde::Serialize;
 
 use crate::attainable::{Window, best_height_m};
-use crate::figure::{Bar, FigureError, Places, bars_svg, places_svg};
+use crate::figure::{Bar, FigureError, Places, PlacesPanel, bars_svg, places_svg};
 use crate::row::{Row, column};
 use crate::statistics::{Share, quantile, rank_correlation, sorted};
 use crate::store::{Manifest, Shard};
@@ -471,14 +471,25 @@ pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>;
         let rows = rows.iter().filter(|row| is(row));
         rows.filter_map(|row| Some([row.touchdown_x_m?, row.touchdown_y_m?])).collect()
     };
-    let kinds = [
-        ("not landed", places(|row| !row.legs)),
-        ("landed on its legs", places(|row| row.legs && !row.strict)),
-        ("strictly", places(|row| row.legs && row.strict)),
-    ];
+    let touchdowns = PlacesPanel {
+        title: String::new(),
+        places: vec![
+            places(|row| !row.legs),
+            places(|row| row.legs && !row.strict),
+            places(|row| row.legs && row.strict),
+        ],
+        radii_m: Vec::new(),
+    };
+    let touchdowns = Places {
+        labels: ["world x, m from the pad", "world y, m from the pad"],
+        kinds: &["not landed", "landed on its legs", "strictly"],
+        radii: &[],
+        arrow: None,
+        panels: &[touchdowns],
+    };
     let values = |column| sorted(numbers(rows, column).map(f64::abs));
     [
-        places_svg(scatter, &Places { kinds: &kinds, circles: &[] }),
+        places_svg(scatter, &touchdowns),
         histogram(&values("touchdown_vertical_m_s"), speed, "vertical speed, m/s", Some(legs.vertical_m_s)),
         histogram(&values("onset_height_m"), height, "height of the feet, m", None),
         histogram(&values("touchdown_tilt_deg"), tilt, "tilt, degrees", Some(legs.tilt_deg)),

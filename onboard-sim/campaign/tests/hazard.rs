@@ -72,6 +72,36 @@ fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
     assert!(falls.flights == 1 && falls.farthest_m < radius.farthest_m, "{falls:?}");
 }
 
+/// The wind of each flight blows to another side. Whatever it is, a parachute drifts with it.
+#[test]
+fn a_parachute_drifts_downwind_whatever_the_direction_of_the_wind() {
+    let mut recipe = recipe("mk2", StartPoint::Pad);
+    recipe.dispersion.wind_m_s = [8.0; 2];
+    let mut quarters = [false; 4];
+    for number in 0..8 {
+        let impact = fly(&recipe, &[Way::Uncommanded], number).unwrap()[0];
+        let [along_m, left_m] = impact.in_wind_m().unwrap();
+        assert!(along_m > 150.0 && left_m.abs() < 0.6 * along_m, "{number}: {along_m} {left_m}");
+        quarters[(impact.downwind_rad / core::f64::consts::FRAC_PI_2) as usize % 4] = true;
+    }
+    assert!(quarters.iter().filter(|seen| **seen).count() >= 3, "{quarters:?}");
+}
+
+/// The wind blows to +y: 10 m there is 10 m downwind, and -x is left of it.
+#[test]
+fn val_hand_a_place_downwind_and_left_of_it() {
+    let impact = Impact {
+        way: Way::AsPlanned,
+        number: 0,
+        place_m: Some([-3.0, 10.0]),
+        downwind_rad: core::f64::consts::FRAC_PI_2,
+        landed: false,
+    };
+    let [along_m, left_m] = impact.in_wind_m().unwrap();
+    assert!((along_m - 10.0).abs() < 1e-12 && (left_m - 3.0).abs() < 1e-12, "{along_m} {left_m}");
+    assert_eq!(Impact { place_m: None, ..impact }.in_wind_m(), None);
+}
+
 #[test]
 fn without_a_booster_nothing_of_one_is_asked() {
     let apogee = Way::of(&recipe("mk2", StartPoint::Apogee).mission);

@@ -2,11 +2,9 @@
 
 use std::fmt;
 use std::fs;
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use campaign::map::{self, By};
@@ -24,7 +22,7 @@ use sha2::Digest as _;
 use sim::dispersion;
 use sim::fault::TimedFault;
 
-use super::{MapArguments, on_threads, recipe, single};
+use super::{MapArguments, Stopwatch, on_threads, recipe, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -106,10 +104,10 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
     let store = Store::open(out, &order, &order.manifest(&program()?, arguments.shard))?;
     let stopwatch = Stopwatch::start();
     let flown = on_threads(arguments.jobs, || {
-        Ok((run::run(&order, &store, &|progress| stopwatch.show(progress))?, rayon::current_num_threads()))
+        Ok((run::run(&order, &store, &|progress| show(&stopwatch, progress))?, rayon::current_num_threads()))
     });
     let (flown, jobs) = flown?;
-    let cost = stopwatch.cost(&flown, jobs);
+    let cost = Cost::of(&flown, stopwatch.elapsed_s(), jobs);
     let summary = run::publish(&order, &store)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{}", to_text(&summary))?;
@@ -199,16 +197,6 @@ fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
     arguments.map.run(default, [&title, how], |axes, progress| map::map(&recipe, by, axes, progress))
 }
 
-/// Time between two lines of progress: on a terminal, and in a file.
-const SHOW_EVERY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
-
-/// Measures a run and shows how far it is.
-struct Stopwatch {
-    started: Instant,
-    shown: Mutex<Option<Instant>>,
-    on_terminal: bool,
-}
-
 /// Cost of a run.
 struct Cost {
     flights: u64,
@@ -218,40 +206,19 @@ struct Cost {
     jobs: usize,
 }
 
-impl Stopwatch {
-    fn start() -> Self {
-        Self { started: now(), shown: Mutex::new(None), on_terminal: std::io::stderr().is_terminal() }
-    }
+/// Shows how far a campaign is.
+fn show(stopwatch: &Stopwatch, progress: &Progress) {
+    let Progress { flown, of, legs, strict, .. } = progress;
+    let rate = *flown as f64 / stopwatch.elapsed_s().max(1e-3);
+    let words = format!("flights, {rate:.1} a second, landed: legs {legs}, strict {strict}");
+    stopwatch.show(*flown as usize, *of as usize, words);
+}
 
-    /// Prints the progress, unless it was printed just before.
-    fn show(&self, progress: &Progress) {
-        let mut shown = self.shown.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let now = now();
-        let due = shown.is_none_or(|last| now - last >= SHOW_EVERY[usize::from(!self.on_terminal)]);
-        if !due && progress.flown < progress.of {
-            return;
-        }
-        *shown = Some(now);
-        let rate = progress.flown as f64 / (now - self.started).as_secs_f64().max(1e-3);
-        let left_s = (progress.of - progress.flown) as f64 / rate;
-        let (before, after) = if self.on_terminal { ("\r\x1b[K", "") } else { ("", "\n") };
-        let after = if progress.flown == progress.of { "\n" } else { after };
-        // Messages go to standard error, which may be closed.
-        let _ = write!(
-            std::io::stderr(),
-            "{before}{} of {} flights, {rate:.1} a second, landed: legs {}, strict {}; {left_s:.0} s to go{after}",
-            progress.flown,
-            progress.of,
-            progress.legs,
-            progress.strict
-        );
-    }
-
+impl Cost {
     /// `None` if nothing was flown.
-    fn cost(&self, flown: &Progress, jobs: usize) -> Option<Cost> {
-        let wall_s = (now() - self.started).as_secs_f64();
+    fn of(flown: &Progress, wall_s: f64, jobs: usize) -> Option<Self> {
         let flight_s = flown.flight_time_ms as f64 * 1e-3;
-        (flown.flown > 0).then(|| Cost {
+        (flown.flown > 0).then(|| Self {
             flights: flown.flown,
             wall_s,
             flights_per_s: flown.flown as f64 / wall_s,
@@ -259,9 +226,7 @@ impl Stopwatch {
             jobs,
         })
     }
-}
 
-impl Cost {
     fn to_json(&self) -> String {
         format!(
             "{:#}\n",
@@ -284,9 +249,4 @@ impl fmt::Display for Cost {
             self.flights, self.wall_s, self.jobs, self.flights_per_s, self.times_real_time_per_job
         )
     }
-}
-
-#[expect(clippy::disallowed_methods, reason = "the duration of a campaign is only reported")]
-fn now() -> Instant {
-    Instant::now()
 }

@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use campaign::figure::{Places, places_svg};
+use campaign::figure::{Places, PlacesPanel, places_svg};
 use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, widest};
 use clap::Args;
 use flight::vehicle::mission::StartPoint;
@@ -13,7 +13,7 @@ use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
 use super::fly::WIND_MAX_M_S;
-use super::{in_wind, mission_text, on_threads, recipe, refuse_loss, show, write_file};
+use super::{Stopwatch, in_wind, mission_text, on_threads, recipe, refuse_loss, write_file};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -47,7 +47,7 @@ pub(crate) struct HazardArguments {
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the places and the radii as a picture (SVG).
+    /// Write the places and the radii as a picture (SVG), one wind a panel.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Replace existing files.
@@ -59,22 +59,14 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
         refuse_loss(path, arguments.force)?;
     }
-    for wind_m_s in &arguments.winds {
-        anyhow::ensure!(
-            (0.0..=WIND_MAX_M_S).contains(wind_m_s),
-            "--winds {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
-        );
-    }
+    check_winds(&arguments.winds)?;
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
     let flights = Flights { survey: arguments.survey, of_widest: arguments.flights };
-    let winds = recipes.len() as u64;
-    let mut impacts = Vec::with_capacity(recipes.len());
-    for (before, recipe) in (0..winds).zip(&recipes) {
-        let told = |done, of| show((before * of + done) as usize, (winds * of) as usize, "flights");
-        impacts.push(on_threads(arguments.jobs, || Ok(hazard::study(recipe, flights, &told)?))?);
-    }
+    let stopwatch = Stopwatch::start();
+    let told = |done, of| stopwatch.show(done, of, "flights");
+    let impacts = on_threads(arguments.jobs, || Ok(hazard::studies(&recipes, flights, &told)?))?;
     let rule = Rule::of(mission);
     let study =
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
@@ -87,6 +79,12 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
         write_file(path, arguments.force, |out| out.write_all(svg.as_bytes()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a wind that cannot be flown.
+pub(super) fn check_winds(winds_m_s: &[f64]) -> anyhow::Result<()> {
+    let wrong = winds_m_s.iter().find(|wind_m_s| !(0.0..=WIND_MAX_M_S).contains(*wind_m_s));
+    wrong.map_or(Ok(()), |wind_m_s| anyhow::bail!("--winds {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"))
 }
 
 /// The mission in each wind.
@@ -170,52 +168,80 @@ impl Study<'_> {
 
     fn write_csv(&self, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let mut table = csv::Writer::from_writer(out);
-        table.write_record(["wind_m_s", "way", "flight", "x_m", "y_m", "landed"])?;
+        table.write_record([
+            "wind_m_s",
+            "way",
+            "flight",
+            "x_m",
+            "y_m",
+            "downwind_m",
+            "across_m",
+            "landed",
+        ])?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
-            for Impact { way, number, place_m, landed } in impacts {
-                let [x, y] = place_m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
+            for impact in impacts {
+                let Impact { way, number, place_m, landed, .. } = impact;
+                let two =
+                    |m: Option<[f64; 2]>| m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
+                let ([x, y], [downwind, across]) = (two(*place_m), two(impact.in_wind_m()));
                 let (wind, number, landed) = (wind_m_s.to_string(), number.to_string(), landed.to_string());
-                table.write_record([&wind, way.name(), &number, &x, &y, &landed])?;
+                table.write_record([&wind, way.name(), &number, &x, &y, &downwind, &across, &landed])?;
             }
         }
         table.flush()
     }
 
+    /// One wind a panel, with its own radius.
     fn svg(&self, rule: &Rule) -> anyhow::Result<String> {
-        let kinds: [(&str, &[Way]); 4] = [
-            (
-                "as planned, or aborted low",
-                &[Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust, Way::NoLight],
-            ),
-            ("ballistic", &[Way::Ballistic, Way::BallisticWithBooster]),
-            (
-                "under the parachute",
-                &[
-                    Way::AbortInAscent,
-                    Way::ParachuteFromApogee,
-                    Way::AbortInDescent,
-                    Way::NoSeparation,
-                    Way::Uncommanded,
-                ],
-            ),
-            ("spent booster", &[Way::Booster]),
-        ];
-        let kinds = kinds.map(|(name, ways)| {
-            let impacts = self.impacts.iter().flatten();
-            let shown = impacts.filter(|impact| ways.contains(&impact.way) && impact.number < SHOWN);
-            (name, shown.filter_map(|impact| impact.place_m).collect::<Vec<_>>())
-        });
-        let mut circles = vec![(format!("NAR {:.0} m", rule.distance_m()), rule.distance_m())];
-        for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
-            if let Some((_, radius)) = widest(impacts) {
-                let outside_m = radius.outside_m();
-                circles.push((format!("{wind_m_s} m/s {outside_m:.0} m"), outside_m));
+        let panels = self.arguments.winds.iter().zip(self.impacts).map(|(wind_m_s, impacts)| {
+            let places = KINDS.map(|(_, ways)| {
+                let shown =
+                    impacts.iter().filter(|impact| ways.contains(&impact.way) && impact.number < SHOWN);
+                shown.filter_map(Impact::in_wind_m).map(|[along_m, left_m]| [-left_m, along_m]).collect()
+            });
+            let widest = widest(impacts).map(|(_, radius)| radius);
+            let keep_out_m = widest.map_or(f64::NAN, |radius| keep_out_m(&radius, rule));
+            let open = widest.is_none_or(|radius| radius.high_m.is_none());
+            PlacesPanel {
+                title: format!(
+                    "{wind_m_s} m/s: nobody within {}{keep_out_m:.0} m",
+                    if open { "at least " } else { "" }
+                ),
+                places: places.to_vec(),
+                radii_m: vec![keep_out_m, rule.distance_m()],
             }
-        }
-        let title = format!("{}: where it comes down, every way, all winds", self.mission);
-        Ok(places_svg(&title, &Places { kinds: &kinds, circles: &circles })?)
+        });
+        let rule = format!("rule of NAR: {:.0} m", rule.distance_m());
+        let places = Places {
+            labels: ["across the wind, m", "downwind, m"],
+            kinds: &KINDS.map(|(name, _)| name),
+            radii: &["nobody within", &rule],
+            arrow: Some("where the wind blows to"),
+            panels: &panels.collect::<Vec<_>>(),
+        };
+        let shown = self.arguments.survey.min(SHOWN);
+        let title =
+            format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission);
+        Ok(places_svg(&title, &places)?)
     }
 }
+
+/// The kinds of a picture, each with its ways.
+const KINDS: [(&str, &[Way]); 4] = [
+    ("as planned, or aborted low", &[Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust, Way::NoLight]),
+    ("ballistic", &[Way::Ballistic, Way::BallisticWithBooster]),
+    (
+        "under the parachute",
+        &[
+            Way::AbortInAscent,
+            Way::ParachuteFromApogee,
+            Way::AbortInDescent,
+            Way::NoSeparation,
+            Way::Uncommanded,
+        ],
+    ),
+    ("spent booster", &[Way::Booster]),
+];
 
 fn cell(radius: Option<&Radius>) -> String {
     radius.map_or_else(String::new, |radius| {

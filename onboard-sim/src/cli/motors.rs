@@ -7,20 +7,20 @@ use std::process::ExitCode;
 use std::str::FromStr;
 
 use anyhow::Context as _;
+use campaign::hazard::Flights;
 use campaign::motors::card::{Card, Day, Order};
 use campaign::motors::choice::{StartHeight, Team};
 use campaign::motors::frame::start_height_m;
-use campaign::motors::ranking::{Progress, Ranked, Request, rank};
+use campaign::motors::ranking::{Ranked, Request, rank};
 use campaign::motors::source::{self, Candidate, Found};
 use campaign::motors::table;
 use clap::Args;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
-use sim::dispersion::{self, Dispersion};
-use sim::recipe::Recipe;
+use sim::dispersion;
 
-use super::fly::WIND_MAX_M_S;
-use super::{in_wind, on_threads, recipe, refuse_loss, show, write_file, write_folder};
+use super::hazard::check_winds;
+use super::{in_wind, on_threads, recipe, refuse_loss, show_progress, write_file, write_folder};
 
 /// Most flights of a motor.
 const FLIGHTS_MAX: u64 = 100_000;
@@ -67,11 +67,7 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     let mission = &team.recipe.mission;
     let request = Request { team: &team, best: arguments.best, flights: arguments.flights };
     let found = choices.motors()?;
-    let told = |progress| match progress {
-        Progress::Motors(done, of) => show(done, of, "motors"),
-        Progress::Flights(done, of) => show(done, of, "flights"),
-    };
-    let ranking = on_threads(choices.jobs, || Ok(rank(&request, found, &told)?))?;
+    let ranking = on_threads(choices.jobs, || Ok(rank(&request, found, &show_progress())?))?;
     std::io::stdout().lock().write_all(table::text(&ranking, arguments.all).as_bytes())?;
     if let Some(path) = &arguments.csv {
         write_file(path, arguments.force, |out| table::write_csv(&ranking, out))?;
@@ -85,18 +81,14 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// More wind than that of the day, m/s.
-const WINDIER_M_S: f64 = 3.0;
-/// Steady winds in which the certified vehicle is flown, m/s.
-const STEADY_M_S: [f64; 6] = [0.0, 3.0, 6.0, 9.0, 12.0, 15.0];
 /// The files of a card.
-const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "day.toml"];
+const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
 
 /// For the help.
 pub(crate) const CARD_EXAMPLE: &str =
-    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --wind 3 --out card";
+    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --out card";
 
 #[derive(Args)]
 pub(crate) struct CardArguments {
@@ -109,13 +101,17 @@ pub(crate) struct CardArguments {
     /// Mass with the motor full, kg. By default the best one within --ballast.
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
-    /// Mean wind of the day 10 m above the ground, m/s.
-    #[arg(long, default_value_t = 3.0, value_name = "M/S")]
-    wind: f64,
-    /// Flights in this wind. By default as many as a few seconds allow, 12 to 60.
-    #[arg(long, value_name = "N")]
-    flights: Option<u64>,
-    /// Flights of the way of ending that comes down farthest from the pad. Below 368 its interval has no upper end.
+    /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
+    #[arg(long, value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    winds: Vec<f64>,
+    /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up and the line downwind. By default
+    /// downwind is up.
+    #[arg(long, value_name = "DEG", value_parser = degrees)]
+    wind_from: Option<f64>,
+    /// Flights in each wind of every way in which a flight can end. Fewer than 100 give neither a rate nor a radius.
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    flights: u64,
+    /// Flights in each wind of the ways that come down farthest. Below 368 the interval has no upper end.
     #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     hazard_flights: u64,
     /// Folder of the card.
@@ -128,19 +124,11 @@ pub(crate) struct CardArguments {
 
 pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let choices = &arguments.choices;
-    let wind_m_s = arguments.wind;
-    let most_m_s = WIND_MAX_M_S - WINDIER_M_S;
-    anyhow::ensure!((0.0..=most_m_s).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {most_m_s} m/s");
+    check_winds(&arguments.winds)?;
     if let Some(mass_kg) = arguments.mass {
         anyhow::ensure!(
             mass_kg.is_finite() && mass_kg > 0.0,
             "--mass {mass_kg}: a mass in kg above 0 is accepted"
-        );
-    }
-    if let Some(flights) = arguments.flights {
-        anyhow::ensure!(
-            (1..=CARD_FLIGHTS_MAX).contains(&flights),
-            "--flights {flights}: must be 1 to {CARD_FLIGHTS_MAX}"
         );
     }
     for name in FILES {
@@ -156,38 +144,40 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         let curve = mission.motor_curve.clone();
         Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
     };
-    let day = |recipe: &Recipe, wind_m_s| {
-        Ok::<_, anyhow::Error>(Day { wind_m_s, recipe: in_wind(recipe, wind_m_s)? })
-    };
-    let certified =
-        Recipe { dispersion_toml: Dispersion::builtin_toml("none")?.to_owned(), ..team.recipe.clone() };
-    let steady = STEADY_M_S.into_iter().map(|wind_m_s| day(&certified, wind_m_s));
+    let mut winds_m_s = arguments.winds.clone();
+    winds_m_s.sort_by(f64::total_cmp);
+    winds_m_s.dedup();
+    let days = winds_m_s
+        .into_iter()
+        .map(|wind_m_s| Ok(Day { wind_m_s, recipe: in_wind(&team.recipe, wind_m_s)? }))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let order = Order {
         team: &team,
         motor: &motor,
         others: &found,
         mass_kg: arguments.mass,
-        today: &day(&team.recipe, wind_m_s)?,
-        windier: &day(&team.recipe, wind_m_s + WINDIER_M_S)?,
-        steady: &steady.collect::<anyhow::Result<Vec<_>>>()?,
-        flights: arguments.flights,
-        hazard_flights: arguments.hazard_flights,
+        winds: &days,
+        flights: Flights {
+            survey: arguments.flights,
+            of_widest: arguments.hazard_flights.max(arguments.flights),
+        },
+        wind_from_deg: arguments.wind_from,
     };
-    let told = |done, of| show(done, of, "flights");
-    let card = on_threads(choices.jobs, || Ok(Card::new(&order, &told)?))?;
-    let [html, text, mission_file, day_file] = FILES;
+    let card = on_threads(choices.jobs, || Ok(Card::new(&order, &show_progress())?))?;
+    let [html, text, mission_file] = FILES;
     let page = card.text();
-    let files = [
-        (html, card.html()),
-        (text, page.clone()),
-        (mission_file, card.recipe.mission_toml),
-        (day_file, card.recipe.dispersion_toml),
-    ];
+    let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
     write_folder(&arguments.out, &files, arguments.force)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{page}")?;
     writeln!(stdout, "card {}", arguments.out.join(html).display())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A direction.
+fn degrees(text: &str) -> Result<f64, String> {
+    let degrees = text.parse().ok().filter(|degrees| (0.0..=360.0).contains(degrees));
+    degrees.ok_or_else(|| format!("`{text}` is not a direction of 0 to 360 degrees"))
 }
 
 /// The motor of a file, or of this name among others.

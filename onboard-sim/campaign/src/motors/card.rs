@@ -1,8 +1,7 @@
-//! The landing card: what a team takes to the field for one vehicle, one motor and one wind.
+//! The landing card: what a team takes to the field for one vehicle and one motor.
 //!
-//! It is computed, not looked up: the mass and the height are chosen or checked, the mission is flown in the wind of the day
-//! and in more, the certified vehicle in steady wind, and what cannot land is refused with the bound that says so and the
-//! nearest vehicle that lands.
+//! It is computed, not looked up: the mass and the height are chosen or checked, the mission is flown in several winds in every way
+//! in which a flight can end, and what cannot land is refused with the bound that says so and the nearest vehicle that lands.
 
 use core::fmt;
 
@@ -14,11 +13,11 @@ use sim::recipe::Recipe;
 
 use super::choice::{Choice, Limits, Refusal, StartHeight, Team, choose};
 use super::frame::{Ballast, Frame, FrameError, start_height_m};
-use super::ranking::{Flown, FlyError, Landing, RankError, fly_rows};
+use super::ranking::{FlyError, Landing, Progress, RankError, fly};
 use super::sheet;
 use super::source::{Candidate, Found};
 use crate::attainable;
-use crate::hazard::{self, Flights, HazardError, Radius, Rule, Way};
+use crate::hazard::{self, Flights, HazardError, Impact, Rule};
 use crate::run::in_parallel;
 
 /// What a card is made for.
@@ -29,16 +28,12 @@ pub struct Order<'a> {
     pub others: &'a [Found],
     /// Mass with the motor full, kg; the best one within the ballast if not given.
     pub mass_kg: Option<f64>,
-    /// The wind of the day.
-    pub today: &'a Day,
-    /// More wind.
-    pub windier: &'a Day,
-    /// Steady winds, rising, in which the certified vehicle is flown.
-    pub steady: &'a [Day],
-    /// Flights in the wind of the day; as many as a few seconds allow if not given.
-    pub flights: Option<u64>,
-    /// Flights of the way of ending that reaches farthest.
-    pub hazard_flights: u64,
+    /// Mean winds, rising.
+    pub winds: &'a [Day],
+    /// Flights in each wind.
+    pub flights: Flights,
+    /// Where the wind of the day comes from, degrees clockwise from north, if it is known.
+    pub wind_from_deg: Option<f64>,
 }
 
 /// A card.
@@ -46,11 +41,15 @@ pub struct Order<'a> {
 pub struct Card {
     /// With the mission to be loaded.
     pub recipe: Recipe,
+    /// Where the flights begin: on the pad if the mission has a booster.
+    pub(super) start: StartPoint,
     pub(super) landing: Landing,
     pub(super) frame: Frame,
-    pub(super) set: String,
-    pub(super) winds: Winds,
-    pub(super) hazard: Hazard,
+    /// The mean winds, rising, m/s, and where the flights in each came down.
+    pub flown: Vec<(f64, Vec<Impact>)>,
+    pub(super) flights: Flights,
+    pub(super) rule: Rule,
+    pub(super) wind_from_deg: Option<f64>,
     /// Command heights of the feet from which a controller that knows everything would land.
     pub(super) attainable: Option<attainable::Window>,
 }
@@ -71,10 +70,12 @@ pub enum CardError {
     NoLanding(#[from] Box<NoLanding>),
     /// A landing exists, but no flight landed.
     #[error(
-        "a landing exists, but none of {flights} flights of `{dispersion}` landed at {wind_m_s} m/s of wind; most \
-         frequent reason: {reason}. A motor or mass with a larger scatter is wanted: `onboard-sim motors` ranks them"
+        "a landing exists, but none of {flights} flights of `{set}` landed; most frequent reason: {reason}. A motor or mass with \
+         a larger scatter is wanted: `onboard-sim motors` ranks them"
     )]
-    NoneLanded { flights: u64, dispersion: String, wind_m_s: f64, reason: String },
+    NoneLanded { flights: u64, set: String, reason: String },
+    #[error("no wind is given")]
+    NoWind,
     #[error(transparent)]
     Text(#[from] RankError),
     #[error(transparent)]
@@ -84,53 +85,49 @@ pub enum CardError {
 }
 
 impl Card {
-    /// Computes a card. `progress` is told how many flights are flown, of how many.
+    /// Computes a card.
     ///
     /// # Errors
     /// The vehicle does not land, or the mass cannot be had.
-    pub fn new(order: &Order<'_>, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, CardError> {
+    pub fn new(order: &Order<'_>, progress: &(dyn Fn(Progress) + Sync)) -> Result<Self, CardError> {
         let mission = &order.team.recipe.mission;
         let frame = Frame::of(mission)?;
         let limits = order.limits(&frame)?;
         let choice = match choose(mission, &frame, &order.motor.curve, &limits) {
             Ok(choice) => choice,
             Err(refusal) => {
-                return Err(Box::new(no_landing(order, &frame, &limits, refusal)).into());
+                return Err(Box::new(no_landing(order, &frame, &limits, refusal, progress)).into());
             }
         };
         let landing = Landing { candidate: order.motor.clone(), choice, flown: None };
-        let recipe = landing.recipe(&order.today.recipe)?;
-        let winds = fly_in_winds(order, &recipe, progress)?;
-        if winds.today.legs.count == 0 {
-            let reason = winds.today.failure.as_ref().map_or("unknown", |(reason, _)| reason);
-            return Err(CardError::NoneLanded {
-                flights: winds.today.legs.of,
-                dispersion: recipe.dispersion_name,
-                wind_m_s: order.today.wind_m_s,
-                reason: reason.to_owned(),
-            });
-        }
-        let hazard = fly_the_hazard(order, &recipe, winds.limit_m_s(), progress)?;
-        let attainable = certified_window(&recipe.mission);
+        let recipe = landing.recipe(&order.team.recipe)?;
+        let days = order.winds.iter().map(|day| day.flies(&recipe)).collect::<Result<Vec<_>, _>>()?;
+        let calmest = days.first().ok_or(CardError::NoWind)?;
+        refuse_without_a_landing(calmest, progress)?;
+        let (start, rule) = (calmest.mission.start.at, Rule::of(&calmest.mission));
+        let told = |done, of| progress(Progress::Flights(done, of));
+        let impacts = hazard::studies(&days, order.flights, &told)?;
         Ok(Self {
+            attainable: certified_window(&recipe.mission),
             recipe,
+            start,
             landing,
             frame,
-            set: order.team.recipe.dispersion_name.clone(),
-            winds,
-            hazard,
-            attainable,
+            flown: order.winds.iter().map(|day| day.wind_m_s).zip(impacts).collect(),
+            flights: order.flights,
+            rule,
+            wind_from_deg: order.wind_from_deg,
         })
     }
 
     /// The card as text.
     pub fn text(&self) -> String {
-        sheet::text(&self.sheet())
+        sheet::text(&self.sides())
     }
 
-    /// The card as one page of HTML.
+    /// The card as HTML: two pages, for the two sides of a sheet.
     pub fn html(&self) -> String {
-        sheet::html(&self.sheet())
+        sheet::html(&self.sides())
     }
 }
 
@@ -169,118 +166,25 @@ pub struct Day {
     pub recipe: Recipe,
 }
 
-/// What the flights came to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Winds {
-    pub today_m_s: f64,
-    pub today: Flown,
-    pub windier_m_s: f64,
-    pub windier: Flown,
-    /// Strongest steady wind, m/s, up to which the certified vehicle lands in every wind that was tried; `None` if in none.
-    pub steady_m_s: Option<f64>,
-    /// Strongest steady wind that was tried, m/s.
-    pub steady_tried_m_s: f64,
-}
-
-impl Winds {
-    /// The wind above which a team should not fly, m/s: the strongest that was flown, if the certified vehicle lands in
-    /// it and not many fewer flights landed than in the wind of the day.
-    pub fn limit_m_s(&self) -> f64 {
-        /// Of the rate in the wind of the day.
-        const KEPT: f64 = 0.9;
-        let windier = self.windier.legs.share >= KEPT * self.today.legs.share;
-        let flown_m_s = if windier { self.windier_m_s } else { self.today_m_s };
-        flown_m_s.min(self.steady_m_s.unwrap_or(0.0))
+impl Day {
+    /// The flights of a card's mission on this day, from its pad if it has a booster.
+    fn flies(&self, recipe: &Recipe) -> Result<Recipe, HazardError> {
+        let Recipe { mission, mission_toml, .. } = recipe.clone();
+        let from_the_pad = mission.launch.is_some() && mission.start.at == StartPoint::Apogee;
+        let recipe = Recipe { mission, mission_toml, ..self.recipe.clone() };
+        Ok(if from_the_pad { recipe.starting_at(StartPoint::Pad)? } else { recipe })
     }
 }
 
-/// How near people may stand.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Hazard {
-    /// Mean wind of the flights: the strongest up to which the card allows to fly, or more, m/s.
-    pub wind_m_s: f64,
-    /// Flights of every way in which a flight can end.
-    pub survey: u64,
-    /// The way that reaches farthest, with its own flights.
-    pub way: Way,
-    pub radius: Radius,
-    pub rule: Rule,
-}
-
-/// Flights of each way, by which the one that reaches farthest is known.
-const SURVEY: u64 = 6;
-
-/// Where the card's mission comes down, from its pad if it has a booster. Every way is flown a few times, and the way that reaches
-/// farthest as often as its interval needs.
-fn fly_the_hazard(
-    order: &Order<'_>,
-    recipe: &Recipe,
-    limit_m_s: f64,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Hazard, CardError> {
-    let day = if limit_m_s > order.today.wind_m_s { order.windier } else { order.today };
-    let mut recipe = in_weather_of(day, recipe);
-    if recipe.mission.launch.is_some() && recipe.mission.start.at == StartPoint::Apogee {
-        recipe = recipe.starting_at(StartPoint::Pad).map_err(HazardError::Recipe)?;
-    }
-    let rule = Rule::of(&recipe.mission);
-    let flights = Flights { survey: SURVEY.min(order.hazard_flights), of_widest: order.hazard_flights };
-    let impacts = hazard::study(&recipe, flights, &|done, of| progress(done as usize, of as usize))?;
-    let (way, radius) = hazard::widest(&impacts).ok_or(HazardError::NoFlight)?;
-    Ok(Hazard { wind_m_s: day.wind_m_s, survey: flights.survey, way, radius, rule })
-}
-
-fn in_weather_of(day: &Day, recipe: &Recipe) -> Recipe {
-    let Recipe { mission, mission_toml, .. } = recipe.clone();
-    Recipe { mission, mission_toml, ..day.recipe.clone() }
-}
-
-/// Flights from which the cost of one is learnt.
-const FIRST: u64 = 4;
-/// Fewest and most flights in the wind of the day.
-const FLIGHTS: [u64; 2] = [12, 60];
-/// Work in the wind of the day, as iterations of the landing solver: some 3 s on two cores. It is counted, not timed, so
-/// that a card is the same on every machine.
-const BUDGET: u64 = 140_000;
-/// What a flight costs beside its solver, as iterations.
-const BESIDE: u64 = 1_500;
-
-fn fly_in_winds(
-    order: &Order<'_>,
-    recipe: &Recipe,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Winds, FlyError> {
-    let first = order.flights.unwrap_or(FIRST).min(FIRST);
-    let mut today = fly_rows(&numbered(recipe, 0..first), &|_| {})?;
-    let flights = order.flights.unwrap_or_else(|| {
-        let each = today.iter().map(|row| row.solver_iterations).sum::<u64>() / FIRST + BESIDE;
-        (BUDGET / each).clamp(FLIGHTS[0], FLIGHTS[1])
-    });
-    let windier = in_weather_of(order.windier, recipe);
-    let steady: Vec<Recipe> = order.steady.iter().map(|day| in_weather_of(day, recipe)).collect();
-    // All at once, so that no thread waits for the last flight of a wind.
-    let mut tasks = numbered(recipe, first..flights);
-    let from_windier = tasks.len();
-    tasks.extend(numbered(&windier, 0..flights.div_ceil(2)));
-    let from_steady = tasks.len();
-    tasks.extend(steady.iter().map(|recipe| (recipe, 0)));
-    let (before, of) = (today.len(), today.len() + tasks.len());
-    let rows = fly_rows(&tasks, &|done| progress(before + done, of))?;
-    today.extend_from_slice(&rows[..from_windier]);
-    let set = &order.team.recipe.dispersion_name;
-    let landed = rows[from_steady..].iter().take_while(|row| row.legs).count();
-    Ok(Winds {
-        today_m_s: order.today.wind_m_s,
-        today: Flown::of(set, &today),
-        windier_m_s: order.windier.wind_m_s,
-        windier: Flown::of(set, &rows[from_windier..from_steady]),
-        steady_m_s: landed.checked_sub(1).map(|last| order.steady[last].wind_m_s),
-        steady_tried_m_s: order.steady.last().map_or(0.0, |day| day.wind_m_s),
+/// Some flights, before many are flown.
+fn refuse_without_a_landing(recipe: &Recipe, progress: &(dyn Fn(Progress) + Sync)) -> Result<(), CardError> {
+    const FIRST: u64 = 12;
+    progress(Progress::Flights(0, FIRST as usize));
+    let flown = fly(&[recipe], FIRST, &|done| progress(Progress::Flights(done, FIRST as usize)))?;
+    flown.into_iter().filter(|flown| flown.legs.count == 0).try_for_each(|flown| {
+        let reason = flown.failure.map_or_else(|| "unknown".to_owned(), |(reason, _)| reason);
+        Err(CardError::NoneLanded { flights: FIRST, set: flown.set, reason })
     })
-}
-
-fn numbered(recipe: &Recipe, numbers: core::ops::Range<u64>) -> Vec<(&Recipe, u64)> {
-    numbers.map(|number| (recipe, number)).collect()
 }
 
 /// Motors that are suggested.
@@ -324,7 +228,13 @@ impl fmt::Display for NoLanding {
     }
 }
 
-fn no_landing(order: &Order<'_>, frame: &Frame, limits: &Limits, refusal: Refusal) -> NoLanding {
+fn no_landing(
+    order: &Order<'_>,
+    frame: &Frame,
+    limits: &Limits,
+    refusal: Refusal,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> NoLanding {
     let curve = &order.motor.curve;
     let without_kg = frame.mass_kg() + curve.total_mass_kg();
     let other_mass = refusal.landing_kg.and_then(|landing_kg| {
@@ -334,7 +244,7 @@ fn no_landing(order: &Order<'_>, frame: &Frame, limits: &Limits, refusal: Refusa
         Some((choice, excess_kg))
     });
     let bound = bound(order, frame, limits);
-    let other_motors = other_motors(order, frame, limits);
+    let other_motors = other_motors(order, frame, limits, progress);
     let motor = format!("{} ({})", order.motor.name(), order.motor.origin);
     NoLanding { motor, refusal, bound, other_mass, other_motors }
 }
@@ -382,13 +292,19 @@ fn bound(order: &Order<'_>, frame: &Frame, limits: &Limits) -> String {
 }
 
 /// The best other motors for this mass, or for this ballast if there is no mass.
-fn other_motors(order: &Order<'_>, frame: &Frame, limits: &Limits) -> Vec<(String, f64, f64)> {
+fn other_motors(
+    order: &Order<'_>,
+    frame: &Frame,
+    limits: &Limits,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Vec<(String, f64, f64)> {
     let others: Vec<&Candidate> = order
         .others
         .iter()
         .filter_map(|found| found.as_ref().ok())
         .filter(|other| other.curve != order.motor.curve)
         .collect();
+    progress(Progress::Motors(0, others.len()));
     let chosen = in_parallel(
         &others,
         |other| {
@@ -400,7 +316,7 @@ fn other_motors(order: &Order<'_>, frame: &Frame, limits: &Limits) -> Vec<(Strin
             }
             choose(&order.team.recipe.mission, frame, &other.curve, &Limits { masses_kg, ..*limits }).ok()
         },
-        &|_| {},
+        &|done| progress(Progress::Motors(done, others.len())),
     );
     let mut landings: Vec<(String, f64, f64)> = others
         .iter()

@@ -83,6 +83,7 @@ pub fn rank(
     let mission = &team.recipe.mission;
     let frame = Frame::of(mission)?;
     let of = found.len();
+    progress(Progress::Motors(0, of));
     let chosen = in_parallel(
         &found,
         |found| {
@@ -119,6 +120,7 @@ fn fly_the_best(
     }
     let recipes = landings[..best].iter().map(|landing| landing.recipe(&request.team.recipe));
     let recipes = recipes.collect::<Result<Vec<_>, _>>()?;
+    progress(Progress::Flights(0, of));
     let flown = fly(&recipes.iter().collect::<Vec<_>>(), request.flights, &|done| {
         progress(Progress::Flights(done, of));
     })?;
@@ -187,26 +189,19 @@ pub struct FlyError {
 pub fn fly(recipes: &[&Recipe], flights: u64, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Flown>, FlyError> {
     let tasks: Vec<(&Recipe, u64)> =
         recipes.iter().flat_map(|recipe| (0..flights).map(|number| (*recipe, number))).collect();
-    let rows = fly_rows(&tasks, done)?;
+    let flown = in_parallel(&tasks, |(recipe, number)| tally::fly(recipe, *number), done);
+    let rows = tasks.iter().zip(flown);
+    let rows = rows.map(|((_, number), row)| row.map_err(|source| FlyError { number: *number, source }));
+    let rows = rows.collect::<Result<Vec<Row>, _>>()?;
     // Without flights there are no chunks.
     let mut of_each = rows.chunks(flights.max(1) as usize);
     let flown = |recipe: &&Recipe| Flown::of(&recipe.dispersion_name, of_each.next().unwrap_or_default());
     Ok(recipes.iter().map(flown).collect())
 }
 
-/// The rows of some flights, in their order.
-pub(crate) fn fly_rows(
-    tasks: &[(&Recipe, u64)],
-    done: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Row>, FlyError> {
-    let flown = in_parallel(tasks, |(recipe, number)| tally::fly(recipe, *number), done);
-    let rows = tasks.iter().zip(flown);
-    rows.map(|((_, number), row)| row.map_err(|source| FlyError { number: *number, source })).collect()
-}
-
 impl Flown {
     /// What rows of a set of dispersions come to.
-    pub(crate) fn of(set: &str, rows: &[Row]) -> Self {
+    fn of(set: &str, rows: &[Row]) -> Self {
         let of = rows.len() as u64;
         let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
         let mut failures: Vec<(String, u64)> = Vec::new();

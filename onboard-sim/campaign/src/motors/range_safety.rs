@@ -1,0 +1,185 @@
+//! The side of a card for the range safety officer: who stands where in which wind, and what an abort does.
+
+use core::fmt::Write as _;
+
+use flight::vehicle::mission::StartPoint;
+
+use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, widest};
+use crate::statistics::Share;
+
+/// A rate or a radius that rests on fewer flights is not told.
+pub const FEWEST: u64 = 100;
+/// The launch crew stands so far outside of the circle, m.
+const BESIDE_M: f64 = 10.0;
+
+/// What the flights in one wind tell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InWind {
+    /// Mean wind 10 m above the ground.
+    pub wind_m_s: f64,
+    /// Landed on their legs, of the flights as planned.
+    pub landed: Option<Share>,
+    pub circle: Option<Circle>,
+}
+
+/// Nobody stands in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Circle {
+    /// Radius about the pad: what flights and rule ask for in this wind and in less.
+    pub keep_out_m: f64,
+    /// The way of ending that reaches farthest, with its flights.
+    pub way: Way,
+    pub radius: Radius,
+    /// The farthest that any flight came down downwind, across the wind and upwind, m.
+    pub farthest_m: [f64; 3],
+}
+
+impl Circle {
+    /// Where the launch crew stands, upwind of the pad, m.
+    pub fn crew_m(&self) -> f64 {
+        self.keep_out_m + BESIDE_M
+    }
+}
+
+/// What flights tell of each wind, in rising order.
+pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
+    let mut least_m: f64 = 0.0;
+    let in_wind = |(wind_m_s, impacts): &(f64, Vec<Impact>)| {
+        let planned = || impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+        let landed = planned().filter(|impact| impact.landed).count();
+        let landed = Share::new(landed as u64, planned().count() as u64);
+        let enough = landed.of >= FEWEST;
+        let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
+        let circle = widest.map(|(way, radius)| {
+            least_m = least_m.max(keep_out_m(&radius, rule));
+            Circle { keep_out_m: least_m, way, radius, farthest_m: farthest_m(impacts) }
+        });
+        InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
+    };
+    flown.iter().map(in_wind).collect()
+}
+
+fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
+    let places = || impacts.iter().filter_map(Impact::in_wind_m);
+    let most = |of: fn([f64; 2]) -> f64| places().map(of).fold(0.0, f64::max);
+    [most(|[along_m, _]| along_m), most(|[_, across_m]| across_m.abs()), most(|[along_m, _]| -along_m)]
+}
+
+/// The strongest of these winds up to which at least nine tenths as many flights land as in the calmest one; `None` if too few
+/// flights tell of it.
+pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
+    const KEPT: f64 = 0.9;
+    let calmest = winds.first()?.landed?;
+    let may_fly = |wind: &&InWind| {
+        wind.circle.is_some_and(|circle| circle.keep_out_m.is_finite())
+            && wind.landed.is_some_and(|landed| landed.share >= KEPT * calmest.share)
+    };
+    winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
+}
+
+/// What an abort does: when, and what happens. The words are those of SAFETY.md.
+pub const ABORTS: [[&str; 2]; 7] = [
+    ["on the pad, in the countdown", "disarmed, both motors inhibited; keep away for 60 s"],
+    ["below a drone", "inhibited; it stays on the drone"],
+    [
+        "commanded to light, before the lift-off",
+        "the ascent motor's igniter is switched off, disarmed, both motors inhibited; keep away for 60 s, because it had current. \
+         A disarm does the same. If the motor has lit, or lights late, the next row",
+    ],
+    [
+        "under the ascent motor, and coasting",
+        "the ascent motor cannot be stopped; the landing motor is inhibited, and the parachute opens at apogee",
+    ],
+    ["falling, with room for the parachute (80 to 120 m for mk2)", "landing motor inhibited, parachute"],
+    [
+        "falling, below that height",
+        "it burns if every check for the ignition passes, else inhibited with open fins: an impact",
+    ],
+    [
+        "landing motor lit",
+        "it cannot be stopped, and there is never a parachute under thrust: the vehicle lands on the ground below it instead of \
+         at the pad",
+    ],
+];
+
+/// The rows of [`ABORTS`] for flights that begin so.
+pub fn aborts(start: StartPoint) -> Vec<[&'static str; 2]> {
+    let before: &[usize] = match start {
+        StartPoint::Pad => &[0, 2, 3],
+        StartPoint::Apogee => &[0],
+        StartPoint::Drone => &[1],
+    };
+    before.iter().chain(&[4, 5, 6]).map(|row| ABORTS[*row]).collect()
+}
+
+/// Half the width and half the height of the plan, how far the farthest crew stands in it, and the length of its line, in its own
+/// units.
+const HALF: [f64; 2] = [140.0, 98.0];
+const WIDEST: f64 = 72.0;
+const LINE: f64 = 84.0;
+/// Room of a circle's name across the wind.
+const NAME: f64 = 28.0;
+
+/// The circles of the winds to fly in from above, to scale, with the line downwind. `wind_from_deg` is where the wind comes from,
+/// clockwise from north, which is up then; without it up is downwind. `None` without a circle.
+pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
+    let limit_m_s = limit_m_s(winds)?;
+    let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);
+    let circles: Vec<(f64, &Circle)> =
+        may_fly.filter_map(|wind| Some((wind.wind_m_s, wind.circle.as_ref()?))).collect();
+    let scale = WIDEST / circles.last()?.1.crew_m();
+    let (sin, cos) = libm::sincos(wind_from_deg.map_or(0.0, |from_deg| from_deg + 180.0).to_radians());
+    // From downwind, and to the right of that; the plan's y goes down.
+    let at = |along: f64, right: f64| [along * sin + right * cos, right * sin - along * cos];
+    // Words beyond an end of the line need more room where they stand beside it.
+    let beyond = |end: f64, half: f64| at(end + (8.0 + half * sin.abs()) * end.signum(), 0.0);
+    let text = |[x, y]: [f64; 2], anchor: &str, words: &str| {
+        let y = y + 3.0;
+        format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>")
+    };
+    let line = |class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]| {
+        format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>")
+    };
+    let (mut lines, mut names) = (String::new(), String::new());
+    // Names stand on both sides in turn, and not where one stands already.
+    let mut named = [0.0; 2];
+    for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
+        let radius = scale * circle.keep_out_m;
+        let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");
+        let [x, y] = at(-scale * circle.crew_m() - 1.0, 0.0);
+        let _ = write!(lines, "<circle class=\"crew\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\"/>");
+        let before = &mut named[place % 2];
+        if *before == 0.0 || radius - *before >= NAME {
+            *before = radius;
+            let right = if place % 2 == 0 { radius + 2.0 } else { -radius - 2.0 };
+            let beside = at(0.0, right);
+            let anchor = if cos.abs() < 0.5 {
+                "middle"
+            } else if beside[0] < 0.0 {
+                "end"
+            } else {
+                "start"
+            };
+            names += &text(beside, anchor, &format!("{wind_m_s} m/s"));
+        }
+    }
+    for from in [at(0.0, 0.0), at(LINE - 6.0, -4.0), at(LINE - 6.0, 4.0)] {
+        lines += &line("downwind", from, at(LINE, 0.0));
+    }
+    lines += &line("", [-3.0, -3.0], [3.0, 3.0]);
+    lines += &line("", [-3.0, 3.0], [3.0, -3.0]);
+    names += &text(beyond(LINE, 20.0), "middle", "downwind");
+    names += &text(beyond(-WIDEST - 3.0, 24.0), "middle", "launch crew");
+    let [half_x, half_y] = HALF;
+    if wind_from_deg.is_some() {
+        let tip = [half_x - 8.0, 3.0 - half_y];
+        names += &text([tip[0], tip[1] + 17.0], "middle", "N");
+        for (x, y) in [(0.0, 11.0), (-3.0, 5.0), (3.0, 5.0)] {
+            lines += &line("", [tip[0] + x, tip[1] + y], tip);
+        }
+    }
+    let (width, height) = (2.0 * half_x, 2.0 * half_y);
+    Some(format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"-{half_x} -{half_y} {width} {height}\">{lines}{names}</svg>"
+    ))
+}
