@@ -55,11 +55,10 @@ fn an_abort_right_after_the_ignition_lands() {
     }
 }
 
-/// Too low for the parachute, at the first moment that the gate is open. That is the greatest height from which a
-/// landing can begin, so only half of these flights land (10 of the first 20). But each of them brakes; a fall would
-/// end at about 37 m/s.
+/// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the height that was chosen. A fall
+/// would end at about 37 m/s.
 #[test]
-fn an_abort_before_the_ignition_with_the_gate_open_burns_and_lands_here() {
+fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_here() {
     let recipe = recipe(None);
     let burns = AbortEffect::Burn;
     let asked = |tally: &Tally| tally.flight().computer().abort_effect();
@@ -72,14 +71,14 @@ fn an_abort_before_the_ignition_with_the_gate_open_burns_and_lands_here() {
         assert_eq!(tally.flight().computer().mode().phase, Phase::LandArmed);
         tally.flight_mut().abort();
         tally.step();
-        let lit = *tally.flight().computer().mode();
-        assert!(lit.phase == Phase::Ignition && lit.interlocks.lands_here, "{lit:?}");
+        let falls = *tally.flight().computer().mode();
+        assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_here, "{falls:?}");
         while tally.step() {}
         rows.push(tally.row());
     }
     let slow = |row: &Row| row.touchdown_vertical_m_s.is_some_and(|m_s| m_s.abs() < 12.0);
     assert!(rows.iter().all(|row| row.ignited && !row.parachute && slow(row)));
-    assert!(landed(&rows) >= 4, "{} of 8", landed(&rows));
+    assert!(landed(&rows) >= 7, "{} of 8", landed(&rows));
 }
 
 /// The impact speed that is reported to the crew is the speed at which the fall ends.

@@ -93,7 +93,8 @@ pub const ABORTS: [[&str; 2]; 7] = [
     ["falling, with room for the parachute (80 to 120 m for mk2)", "landing motor inhibited, parachute"],
     [
         "falling, below that height",
-        "it burns if every check for the ignition passes, else inhibited with open fins: an impact",
+        "its motor lights at the chosen height if every check for the ignition passes, and it lands on \
+         the ground below; else inhibited with open fins: an impact",
     ],
     [
         "landing motor lit",

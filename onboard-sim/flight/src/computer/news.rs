@@ -64,13 +64,13 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
     Some((severity, words.to_owned()))
 }
 
-/// The message for an abort after the landing motor was commanded or lit, if the abort came between these two modes.
-pub(super) fn words_of_landing_here(
-    before: Interlocks,
-    after: Interlocks,
-) -> Option<(Severity, &'static str)> {
+/// The message for an abort that lands on the motor, if the abort came between these two modes.
+pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(Severity, &'static str)> {
+    let after = mode.interlocks;
     let words = if after.no_light_latched {
         "ABORT: the landing motor has not lit"
+    } else if mode.phase.in_descent() {
+        "ABORT: too low for the parachute; the motor lights at its height, landing on the ground below"
     } else {
         "ABORT: no cut-off exists; landing on the ground below"
     };

@@ -73,7 +73,7 @@ impl PhaseTable {
                 self.say(severity, words);
             }
         }
-        if let Some((severity, words)) = words_of_landing_here(before.interlocks, self.mode.interlocks) {
+        if let Some((severity, words)) = words_of_landing_here(before.interlocks, &self.mode) {
             self.say(severity, words.to_owned());
         }
         if self.mode.phase != before.phase {
@@ -111,7 +111,7 @@ pub enum AbortEffect {
     ChuteAtApogee,
     /// Inhibit the landing motor, parachute now.
     ChuteNow,
-    /// Too low for a parachute, and the gate is open: light the landing motor and land on the ground below.
+    /// Too low for a parachute, and the gate is open: light the landing motor at its height and land on the ground below.
     Burn,
     /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing motor.
     Impact {
@@ -172,9 +172,9 @@ impl Computer {
             () if next.refusal.is_some() => AbortEffect::None,
             () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
             () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
-            () if does(Effect::IgniteLandingMotor) => AbortEffect::Burn,
             () if does(Effect::RecordLoss) => impact(),
             () if next.mode.interlocks.lands_here => match () {
+                () if mode.phase.in_descent() => AbortEffect::Burn,
                 // It was commanded to light and has not.
                 () if mode.phase == Phase::Ignition && mode.interlocks.no_light_latched => impact(),
                 () if self.plans_a_landing() => AbortEffect::LandHere,

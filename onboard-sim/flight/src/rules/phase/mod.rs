@@ -142,7 +142,7 @@ pub struct Interlocks {
     pub abort_latched: bool,
     /// The landing motor was commanded and gave no thrust in time.
     pub no_light_latched: bool,
-    /// Aborted with the landing motor lit. The motor has no cut-off, so the vehicle lands on the ground below.
+    /// Aborted too low for the parachute, or with the landing motor lit, which has no cut-off: the vehicle lands on the ground below.
     pub lands_here: bool,
 }
 

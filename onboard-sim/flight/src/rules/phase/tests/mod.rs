@@ -124,7 +124,7 @@ fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
             (P::Chute, &[InhibitLandingMotor, FinsOpen, DeployChute])
         }
         (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { gate_open: true, .. }) => {
-            (P::Ignition, &[IgniteLandingMotor])
+            (phase, &[])
         }
         (P::Deploy | P::AeroDescent | P::LandArmed, E::AbortRequested { .. }) => {
             (phase, &[InhibitLandingMotor, FinsOpen, RecordLoss])
@@ -318,11 +318,14 @@ fn after_an_abort_under_thrust_the_vehicle_lands_here_and_the_phase_stays() {
     assert!(aborted.mode.interlocks.lands_here && aborted.effects.is_empty());
     assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
     let burns = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: true };
-    let lit = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
-    assert!(
-        lit.phase == Phase::Ignition && lit.interlocks.lands_here,
-        "a motor lit by an abort also lands the vehicle here"
-    );
+    let falls = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
+    assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_here);
+    let lit = transition(&falls, Event::IgnitionGate { open: true }, 2.0);
+    assert!(lit.mode.phase == Phase::Ignition && lit.mode.interlocks.lands_here);
+    assert_eq!(lit.effects, Effects::of(&[Effect::IgniteLandingMotor]));
+    let room = Event::AbortRequested { lifted_off: false, above_commit_height: true, gate_open: true };
+    let chute = transition(&falls, room, 2.0).mode;
+    assert!(chute.phase == Phase::Chute && chute.interlocks.landing_motor_inhibited, "a gust lifted it");
 }
 
 #[test]
@@ -420,14 +423,9 @@ proptest! {
                 lit += 1;
                 let locks = mode.interlocks;
                 prop_assert!(locks.armed && locks.pin_out);
-                prop_assert!(!locks.landing_motor_inhibited && !locks.abort_latched);
+                prop_assert!(!locks.landing_motor_inhibited && (!locks.abort_latched || locks.lands_here));
                 prop_assert!(mode.phase.in_descent());
-                let gate_open = matches!(
-                    event,
-                    Event::IgnitionGate { open: true }
-                        | Event::AbortRequested { above_commit_height: false, gate_open: true, .. }
-                );
-                prop_assert!(gate_open, "{event:?}");
+                prop_assert_eq!(event, Event::IgnitionGate { open: true });
                 prop_assert_eq!(answer.mode.phase, Phase::Ignition);
             }
             if answer.effects.contains(Effect::DeployChute) {
