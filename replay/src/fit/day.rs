@@ -465,13 +465,13 @@ pub(super) struct Arguments {
     #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
     prior: String,
     /// Seed of the simulated flights.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, requires = "flights")]
     seed: u64,
     /// Landing rate that the club wants at least.
-    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.95, value_name = "SHARE", requires = "flights")]
     limit: f64,
     /// Risk that is taken of flying below it: GO if the probability is no higher.
-    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE", requires = "flights")]
     risk: f64,
     /// Flights at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N")]

@@ -119,6 +119,9 @@ impl Entry {
     }
 }
 
+/// Records are far smaller. Decoded, one may take many times its bytes.
+const RECORD_MAX_BYTES: usize = 1 << 20;
+
 fn decoded<M: Message + Default>(
     channel: &LogChannel,
     message_name: &str,
@@ -140,6 +143,11 @@ fn decoded<M: Message + Default>(
         } else {
             Entry::Other
         };
+    }
+    if data.len() > RECORD_MAX_BYTES {
+        let reason =
+            format!("{}: {} bytes; no record has more than {RECORD_MAX_BYTES}", channel.topic, data.len());
+        return Entry::Unreadable { reason };
     }
     let message = match M::decode(data) {
         Ok(message) => message,

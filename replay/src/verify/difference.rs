@@ -169,6 +169,9 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
     }
 }
 
+/// The path of the digest of a computer's memory.
+const DIGEST: &str = "state_digest";
+
 /// Most differing fields that are kept of the first diverged frame.
 const FIELDS_KEPT: usize = 32;
 
@@ -195,6 +198,9 @@ pub(super) struct Tally {
     /// Of these, in flight.
     pub(super) in_flight: u64,
     pub(super) different: u64,
+    /// Of these, with another output or another digest.
+    pub(super) outputs_different: u64,
+    pub(super) digests_different: u64,
     pub(super) fields_different: u64,
     /// Number and vehicle time, s, of the first and of the last frame.
     pub(super) first: Option<(u64, f64)>,
@@ -229,6 +235,9 @@ impl Tally {
         let fields_different = fields.len();
         let time_s = logged.flight_time_s().unwrap_or(boot_s);
         self.different += 1;
+        self.outputs_different +=
+            u64::from(fields.iter().any(|field| !field.path.starts_with("input.") && field.path != DIGEST));
+        self.digests_different += u64::from(recorded.state_digest != again.state_digest);
         self.fields_different += fields_different as u64;
         let worst_ulps = fields.iter().filter_map(|field| field.ulps).max();
         self.growth.note(GrowthStep { frame, time_s, fields_different, gimbal_rad, worst_ulps });
@@ -240,7 +249,7 @@ impl Tally {
     }
 }
 
-fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
+pub(super) fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
     bytes.clear();
     bytes.reserve(record.encoded_len());
     record.encode_raw(bytes);
