@@ -76,9 +76,7 @@ pub enum Damage {
         reason: String,
     },
     /// A record that was passed over.
-    #[error(
-        "a record of {bytes} bytes before byte {near_byte} was passed over: more than the {RECORD_LIMIT_BYTES} that are held in memory"
-    )]
+    #[error("a record of {bytes} bytes before byte {near_byte} was passed over: more than is held in memory")]
     TooLarge { near_byte: u64, bytes: u64 },
     /// The log can be read to its end, and its summary counts other messages or chunks.
     #[error("its summary counts {counted}, and {read} are there: a part was cut out or is there twice")]

@@ -626,9 +626,6 @@ pub(crate) struct Args {
         long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
     )]
     strict: Option<bool>,
-    /// Replace an existing JUnit file.
-    #[arg(long)]
-    force: bool,
     /// Solve this tick of the only log again.
     #[arg(long, value_name = "TICK", conflicts_with_all = ["junit", "strict"])]
     explain: Option<u64>,
@@ -652,7 +649,7 @@ impl Args {
         }
         let to_stdout = |path: &Path| path.as_os_str() == "-";
         let junit = self.junit.as_deref().filter(|path| !to_stdout(path));
-        let junit = junit.map(|path| print::junit_file(path, self.force)).transpose()?;
+        let junit = junit.map(|path| print::junit_file(path)).transpose()?;
         let kind = match &self.junit {
             Some(path) if to_stdout(path) => Printed::Junit,
             _ if self.json => Printed::Json,

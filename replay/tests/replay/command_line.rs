@@ -107,7 +107,7 @@ fn a_log_broken_in_the_middle_says_what_span_is_lost() {
     let mut bytes = WHOLE.bytes.clone();
     bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
     let (code, stdout, _) = run(&mut replay("info", &files.file(&bytes)));
-    let until_s = (ticks - 1) as f64 * FRAME_S;
+    let until_s = ticks as f64 * FRAME_S;
     let lost_s = FLIGHT.ticks.len() as f64 * FRAME_S - until_s;
     assert_eq!(code, 0);
     assert!(stdout.contains(&format!("readable until {until_s:.3} s")), "{stdout}");

@@ -212,6 +212,46 @@ fn a_flipped_bit_of_the_summary_is_damage() {
     });
 }
 
+/// The vehicle gives out such a log: its end says nothing about how much there was.
+#[test]
+fn without_a_summary_the_answer_says_what_cannot_be_known() {
+    on_disk(&PAD[1], |path| {
+        let whole = std::fs::read(path).unwrap();
+        let chunks = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes;
+        let ends = chunks.iter().map(|chunk| chunk.chunk_start_offset + chunk.chunk_length).max().unwrap();
+        let bytes = [&whole[..usize::try_from(ends).unwrap()], &protocol::log::writer::ending()].concat();
+        std::fs::write(path, bytes).unwrap();
+        assert!(!only(verify(path).unwrap()).counted);
+        let (_, stdout, _) = run(&mut replay("verify", &path.to_owned()));
+        assert!(stdout.contains("cannot be known"), "{stdout}");
+        let (_, stdout, _) = run(&mut replay("info", &path.to_owned()));
+        assert!(stdout.contains("as far as can be known") && !stdout.contains("every checksum"), "{stdout}");
+    });
+}
+
+/// Whatever a log holds, nothing of it steers the terminal.
+#[test]
+fn control_characters_of_a_log_are_not_shown() {
+    let mut held = PAD[1].clone();
+    held.metadata(METADATA_RUN).insert("faults".to_owned(), "\u{1b}[2J\u{9b}31m".to_owned());
+    held.metadata(METADATA_RUN).insert("controller".to_owned(), "\u{1b}]0;x\u{7}".to_owned());
+    let named = held.messages.iter_mut().find(|message| message.topic == TOPIC_ESTIMATE).unwrap();
+    named.topic = "/a\u{1b}[2J".to_owned();
+    on_disk(&held, |path| {
+        for arguments in
+            [&["info"][..], &["info", "--json"], &["verify"], &["evaluate"], &["refly"], &["compare"]]
+        {
+            let mut command = replay(arguments[0], &path.to_owned());
+            if arguments == ["compare"] {
+                command.arg(path);
+            }
+            let (_, stdout, stderr) = run(command.args(&arguments[1..]));
+            let steers = |text: &str| text.chars().any(|letter| letter.is_control() && letter != '\n');
+            assert!(!steers(&stdout) && !steers(&stderr), "{arguments:?}: {stdout}{stderr}");
+        }
+    });
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Harm {
     /// A bit of a start, an estimate, an output, a digest or a verdict.
