@@ -76,6 +76,8 @@ pub(super) struct Told {
     pub(super) chunks: Vec<(u64, u64, ChunkName)>,
     /// How many messages there were; `None` if it is not told.
     pub(super) messages: Option<u64>,
+    /// Its checksum does not fit.
+    is_changed: bool,
 }
 
 /// A file being read record by record.
@@ -156,6 +158,9 @@ impl Records {
                     contents.lose(at, 0, None, reason);
                 }
                 contents.told = self.told(next)?;
+                if contents.told.is_changed {
+                    contents.lose(next, 0, None, "the checksum over the summary does not fit");
+                }
                 break;
             }
             match check(opcode, &body) {
@@ -221,7 +226,7 @@ impl Records {
                     checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
                     // What the bits of a number were cannot be seen from it.
                     if footer.summary_crc != 0 && footer.summary_crc != checksum.finalize() {
-                        told.messages = None;
+                        (told.messages, told.is_changed) = (None, true);
                     }
                     break;
                 }

@@ -649,7 +649,7 @@ impl Args {
         }
         let to_stdout = |path: &Path| path.as_os_str() == "-";
         let junit = self.junit.as_deref().filter(|path| !to_stdout(path));
-        let junit = junit.map(|path| print::junit_file(path)).transpose()?;
+        let junit = junit.map(print::junit_file).transpose()?;
         let kind = match &self.junit {
             Some(path) if to_stdout(path) => Printed::Junit,
             _ if self.json => Printed::Json,
