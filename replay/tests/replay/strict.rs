@@ -141,8 +141,9 @@ fn a_verdict_that_contradicts_itself_is_damage() {
 
 #[test]
 fn inputs_that_cannot_be_are_named() {
+    type Change = fn(&mut ComputerFrame);
     let flies = pad().messages.iter().filter(|message| message.is_tick()).count() as u64 - 1_500;
-    let changes: [(&str, fn(&mut ComputerFrame)); 4] = [
+    let changes: [(&str, Change); 4] = [
         ("battery", |frame| frame.input.battery_v = Some(1.5e20)),
         ("time", |frame| frame.input.time_s = f64::NAN),
         ("pin", |frame| frame.input.pin_out = !frame.input.pin_out),
@@ -336,7 +337,7 @@ fn harmed(harm: Harm, place: usize, count: usize) -> Held {
             data.resize(data.len() + 2_000_000, 0x55);
         }
     }
-    if count % 2 == 0 {
+    if count.is_multiple_of(2) {
         held.renumber();
     }
     held
