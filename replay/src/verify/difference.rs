@@ -249,9 +249,9 @@ impl Tally {
     }
 }
 
+/// Into a buffer that is used again, and so has its room already.
 pub(super) fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
     bytes.clear();
-    bytes.reserve(record.encoded_len());
     record.encode_raw(bytes);
 }
 

@@ -229,7 +229,12 @@ impl FlightVerifier {
             (None, None) if compared == 0 => Some(Obstacle::NoTicks),
             (obstacle, _) => obstacle,
         };
-        let obstacle = facts.schema.clone().map(|found| Obstacle::Schema { found }).or(obstacle);
+        let obstacle = match (obstacle, &facts.schema) {
+            (obstacle @ Some(Obstacle::Unreadable { .. } | Obstacle::NoTicks), _) | (obstacle, None) => {
+                obstacle
+            }
+            (_, Some(found)) => Some(Obstacle::Schema { found: found.clone() }),
+        };
         VerifyReport::new(facts, (self.frames, self.tally), self.has_power_up, parts, obstacle)
     }
 
@@ -244,10 +249,13 @@ impl FlightVerifier {
         let why =
             (missing > 0).then(|| format!("{missing} are missing, or belong to no frame that was run again"));
         let alone = || "only --strict flies the flight again".to_owned();
-        let profile = facts.profile.as_ref().map(|(said, flown)| {
-            Part { different: 1, ..Part::of("metadata", 1) }
-                .because(format!("its run facts name the profile {said}, and it is {flown}"))
-        });
+        let flown = self.computer.as_ref().map(|computer| &computer.pilot().mission().name);
+        let other = facts.profile.as_ref().zip(flown).filter(|(said, flown)| said != flown);
+        let metadata = match other {
+            Some((said, flown)) => Part { different: 1, ..Part::of("metadata", 1) }
+                .because(format!("its run facts name the profile {said}, and it is {flown}")),
+            None => Part::of("metadata", 1).because(alone()),
+        };
         vec![
             parts.inputs.clone(),
             part("frames", tally.compared, tally.different),
@@ -256,7 +264,7 @@ impl FlightVerifier {
             Part { why, ..thoughts.clone() },
             parts.starts.clone(),
             Part::of("verdict", parts.verdicts).because(alone()),
-            profile.unwrap_or_else(|| Part::of("metadata", 1).because(alone())),
+            metadata,
             Part::beside("truth", parts.truth),
             Part::beside("events", parts.events),
             Part::beside("timing", parts.timing),

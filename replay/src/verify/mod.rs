@@ -148,18 +148,11 @@ pub fn verify_log<R: Read>(
             counted: log.is_counted(),
             build: head.compare_build(),
             schema: (!head.is_of_this_schema()).then(|| head.schema_version().unwrap_or("none").to_owned()),
-            profile: other_profile(head),
+            profile: head.run.get("profile").cloned(),
         };
         reports.push(computer.into_report(facts));
     }
     Ok(reports)
-}
-
-/// The profile that the run facts name and the one that is attached, if those are two.
-fn other_profile(head: &Head) -> Option<(String, String)> {
-    let (said, Ok(text)) = (head.run.get("profile")?, head.profile_toml.as_ref()?) else { return None };
-    let flown = vehicles::mission::from_toml(text, "profile.toml").ok()?.name;
-    (*said != flown).then(|| (said.clone(), flown))
 }
 
 /// The result of a verification.
@@ -260,8 +253,8 @@ pub(super) struct FileFacts {
     pub(super) build: BuildComparison,
     /// The version of its contents, if this build does not read it.
     pub(super) schema: Option<String>,
-    /// The profile that its run facts name and the one that it has, if those are two.
-    pub(super) profile: Option<(String, String)>,
+    /// The profile that its run facts name.
+    pub(super) profile: Option<String>,
 }
 
 /// The report on one flight.
