@@ -88,18 +88,21 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 /// As [`verify`].
 pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut reports = verify(path)?;
-    // What differs or is not whole already is not flown again.
-    if let [report] = reports.as_mut_slice()
-        && report.outcome == Verification::Identical
-    {
-        let count = |name: &str| report.part(name).map_or(0, |part| part.recorded);
-        let simulated = count("truth") > 0;
-        let [mut verdict, mut facts] =
-            [Part::of("verdict", count("verdict")), Part::of("metadata", count("metadata"))];
-        again::compare(path, simulated, &mut verdict, &mut facts);
-        for part in [verdict, facts] {
-            report.replace(part);
-        }
+    let [report] = reports.as_mut_slice() else {
+        let why = "a file with several flights is not flown again";
+        reports.iter_mut().for_each(|report| report.explain_what_is_left(why));
+        return Ok(reports);
+    };
+    if report.outcome != Verification::Identical {
+        report.explain_what_is_left("what differs or is not whole is not flown again");
+        return Ok(reports);
+    }
+    let count = |name: &str| report.part(name).map_or(0, |part| part.recorded);
+    let simulated = count("truth") > 0;
+    let [mut verdict, mut facts] = ONLY_STRICTLY.map(|name| Part::of(name, count(name)));
+    again::compare(path, simulated, &mut verdict, &mut facts);
+    for part in [verdict, facts] {
+        report.replace(part);
     }
     Ok(reports)
 }
@@ -355,6 +358,14 @@ impl VerifyReport {
             *place = part;
         }
         self.conclude();
+    }
+
+    /// Says why a strict verification has not compared what only it compares.
+    fn explain_what_is_left(&mut self, why: &str) {
+        let left = |part: &&mut Part| ONLY_STRICTLY.contains(&part.name) && part.different == 0;
+        for part in self.parts.iter_mut().filter(left) {
+            part.why = Some(why.to_owned());
+        }
     }
 
     /// Whether every part that follows from the inputs was compared.
