@@ -23,8 +23,8 @@ use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record
 use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 use protocol::text::printable;
-pub(crate) use record::frame_descriptor;
 pub use record::{Entry, LoggedFrame, StampedEntry};
+pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 use verdict::contradiction;
 pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
@@ -106,7 +106,8 @@ impl<R: Read> FlightLog<R> {
         })
     }
 
-    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`].
+    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`]. Frames that differ
+    /// from what is computed may have been misread: [`misread_frame`].
     #[must_use]
     pub fn decoding(self, topics: &'static [&'static str]) -> Self {
         Self { wanted: Some(topics), ..self }
@@ -165,7 +166,7 @@ impl<R: Read> FlightLog<R> {
                     let wanted = |channel: &&LogChannel| {
                         self.wanted.is_none_or(|topics| topics.contains(&channel.topic.as_str()))
                     };
-                    let mut entry = Entry::decode(channel.filter(wanted), &data);
+                    let mut entry = Entry::decode(channel.filter(wanted), &data, self.wanted.is_some());
                     self.recognised |= entry.is_ours()
                         || channel.is_some_and(|channel| channel.schema_name.starts_with("touchdown."));
                     if let Entry::Verdict(verdict) = &entry

@@ -8,7 +8,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use serde::{Serialize, Serializer};
 
 use crate::controller::phase_name;
-use crate::log::{LoggedFrame, frame_descriptor};
+use crate::log::{LoggedFrame, frame_descriptor, misread_frame};
 
 /// A field in which a recorded and a recomputed frame differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -213,21 +213,33 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Compares a recorded frame, and the bytes of its record, with the recomputed one.
-    pub(super) fn compare(&mut self, logged: &LoggedFrame, data: &[u8], again: &ComputerFrame) {
+    ///
+    /// # Errors
+    /// The record cannot be understood exactly.
+    pub(super) fn compare(
+        &mut self,
+        logged: &LoggedFrame,
+        data: &[u8],
+        again: &ComputerFrame,
+    ) -> Result<(), String> {
         let recorded = &logged.record;
         encode_into(again, &mut self.recomputed);
+        let same = self.recomputed == data;
+        if !same && let Some(reason) = misread_frame(data) {
+            return Err(reason);
+        }
         let (frame, boot_s) = (recorded.input.frame, recorded.input.time_s);
         self.compared += 1;
         self.in_flight += u64::from(logged.tick.is_some());
         self.first.get_or_insert((frame, boot_s));
         self.last = Some((frame, boot_s));
-        if self.recomputed == data {
-            return;
+        if same {
+            return Ok(());
         }
         // Another writer may have put the same fields into other bytes.
         encode_into(recorded, &mut self.recorded);
         if self.recorded == self.recomputed {
-            return;
+            return Ok(());
         }
         let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
         let axes = recorded.output.gimbal_rad.iter().zip(&again.output.gimbal_rad);
@@ -246,6 +258,7 @@ impl Tally {
             let (tick, phase) = (logged.tick, phase_name(&again.output));
             self.divergence = Some(Divergence { frame, tick, time_s, phase, fields_different, fields });
         }
+        Ok(())
     }
 }
 

@@ -15,7 +15,8 @@ use super::{FileFacts, Obstacle, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::info::VerdictFacts;
 use crate::log::{
-    Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, summary_of,
+    Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, misread_frame,
+    summary_of,
 };
 use crate::refly::{ReflyOptions, StartAt, refly};
 
@@ -166,6 +167,8 @@ impl FlightVerifier {
         self.flies |= frame.tick.is_some();
         let number = frame.record.input.frame;
         let impossible = self.inputs.judge(&frame.record.input, frame.tick.is_some());
+        // What a missing field was filled with says nothing.
+        let impossible = impossible.filter(|_| misread_frame(data).is_none());
         self.parts.inputs.recorded += 1;
         self.parts.inputs.compare(impossible.is_none());
         if let Some(reason) = impossible {
@@ -179,12 +182,18 @@ impl FlightVerifier {
             return;
         }
         let obstacle = match (lost.filter(|_| !begins), &mut self.computer) {
-            (_, None) => Some(Obstacle::NoStart),
+            (_, None) => Some(match misread_frame(data) {
+                Some(reason) => Obstacle::Unreadable { reason },
+                None => Obstacle::NoStart,
+            }),
             (Some(Gap { after: 0, before }), _) => Some(Obstacle::BeginningMissing { first: before }),
             (Some(Gap { after, before }), _) => Some(Obstacle::Gap { after, before }),
             (None, Some(computer)) => match computer.run_again(&frame.record) {
                 Ok(again) => {
-                    self.tally.compare(frame, data, &again);
+                    if let Err(reason) = self.tally.compare(frame, data, &again) {
+                        self.obstacle = Some(Obstacle::Unreadable { reason });
+                        return;
+                    }
                     self.parts.digests += u64::from(self.remembers);
                     if again.output.released {
                         self.parts.starts.recorded += 1;
@@ -198,7 +207,10 @@ impl FlightVerifier {
                     }
                     None
                 }
-                Err(error) => Some(Obstacle::Frame(error)),
+                Err(error) => Some(match misread_frame(data) {
+                    Some(reason) => Obstacle::Unreadable { reason },
+                    None => Obstacle::Frame(error),
+                }),
             },
         };
         self.obstacle = obstacle;

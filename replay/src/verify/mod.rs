@@ -90,7 +90,9 @@ pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut reports = verify(path)?;
     let [report] = reports.as_mut_slice() else {
         let why = "a file with several flights is not flown again";
-        reports.iter_mut().for_each(|report| report.explain_what_is_left(why));
+        for report in &mut reports {
+            report.explain_what_is_left(why);
+        }
         return Ok(reports);
     };
     if report.outcome != Verification::Identical {
