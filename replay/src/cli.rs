@@ -40,18 +40,66 @@ impl Outcome {
             Self::Verified { outcome, strict } => match outcome {
                 Verification::Identical => 0,
                 Verification::IdenticalReadablePart if !strict => 0,
-                Verification::IdenticalReadablePart | Verification::Diverged => EXIT_NO,
+                Verification::IdenticalReadablePart | Verification::Impossible | Verification::Diverged => {
+                    EXIT_NO
+                }
                 Verification::NotReplayable => EXIT_NO_ANSWER,
             },
         }
     }
 }
 
+/// Passes text on without what steers a terminal: whatever a log or a file name holds, it is only shown.
+pub(crate) struct Shown<W> {
+    output: W,
+    /// The first byte of a character that may be a control character.
+    held: bool,
+}
+
+/// In UTF-8, the control characters from U+0080 to U+009F are this byte and one of 80 to 9f.
+const HIGH_CONTROL: u8 = 0xc2;
+const REPLACEMENT: &[u8] = "\u{fffd}".as_bytes();
+
+impl<W: Write> Shown<W> {
+    fn new(output: W) -> Self {
+        Self { output, held: false }
+    }
+
+    fn release(&mut self) -> io::Result<()> {
+        if std::mem::take(&mut self.held) { self.output.write_all(&[HIGH_CONTROL]) } else { Ok(()) }
+    }
+}
+
+impl<W: Write> Write for Shown<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        for byte in bytes {
+            if self.held && (0x80..0xa0).contains(byte) {
+                self.held = false;
+                self.output.write_all(REPLACEMENT)?;
+                continue;
+            }
+            self.release()?;
+            match byte {
+                &HIGH_CONTROL => self.held = true,
+                b'\n' | b'\t' => self.output.write_all(&[*byte])?,
+                0..=0x1f | 0x7f => self.output.write_all(REPLACEMENT)?,
+                _ => self.output.write_all(&[*byte])?,
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.release()?;
+        self.output.flush()
+    }
+}
+
 /// Writes an answer to standard output. A reader that closes the pipe early is not an error.
 pub(crate) fn answer(
-    write: impl FnOnce(&mut io::BufWriter<io::StdoutLock<'static>>) -> io::Result<()>,
+    write: impl FnOnce(&mut Shown<io::BufWriter<io::StdoutLock<'static>>>) -> io::Result<()>,
 ) -> Result<()> {
-    let mut output = io::BufWriter::new(io::stdout().lock());
+    let mut output = Shown::new(io::BufWriter::new(io::stdout().lock()));
     match write(&mut output).and_then(|()| output.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
@@ -105,8 +153,9 @@ pub(crate) fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.
-pub(crate) fn say(text: &str) {
-    let _ = writeln!(io::stderr(), "replay: {text}");
+pub fn say(text: &str) {
+    let mut output = Shown::new(io::stderr());
+    let _ = writeln!(output, "replay: {text}").and_then(|()| output.flush());
 }
 
 /// Warns about damage, a missing end of the flight and missing ticks.
@@ -154,5 +203,25 @@ pub(crate) fn show_progress(done: usize, flights: usize) {
         let end = if ended { "\n" } else { "" };
         // Progress goes to standard error, which may be closed.
         let _ = write!(output, "\rreplay: {done} of {flights} flights{end}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_steers_a_terminal_is_shown() {
+        let text = "grün\tand\n\u{1b}[2J \u{9b}2J \u{7f}\u{8}\r§\u{c2}";
+        for length in [1, 2, 3, 100] {
+            let mut output = Shown::new(Vec::new());
+            for piece in text.as_bytes().chunks(length) {
+                output.write_all(piece).unwrap();
+            }
+            output.flush().unwrap();
+            let said = String::from_utf8(output.output).unwrap();
+            let r = char::REPLACEMENT_CHARACTER;
+            assert_eq!(said, format!("grün\tand\n{r}[2J {r}2J {r}{r}{r}§\u{c2}"));
+        }
     }
 }

@@ -11,7 +11,7 @@ use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 pub use flight_log::again::FrameError;
 use flight_log::again::RecordedComputer;
-use flight_log::frame::{LoggedInput, level_of, phase_of};
+use flight_log::frame::{LoggedInput, level_of, phase_of, start_to_log};
 use nalgebra::Vector3;
 use nmpc::SolveStatus;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
@@ -91,8 +91,7 @@ impl LoggedComputer {
         Ok(Self { computer, schedule, other_law, compares_digests: true })
     }
 
-    /// The same computer where digests are not compared: in a log of another schema they cover other fields, and a computer
-    /// that did not wait on the pad remembers less.
+    /// The same computer where digests are not compared: one that did not wait on the pad remembers less.
     #[must_use]
     pub fn without_digests(self) -> Self {
         Self { compares_digests: false, ..self }
@@ -120,6 +119,11 @@ impl LoggedComputer {
     /// The pilot in the flight computer.
     pub fn pilot(&self) -> &Pilot {
         self.computer.computer().pilot()
+    }
+
+    /// The computer as it is now, as a record.
+    pub(crate) fn as_start(&self) -> ComputerStart {
+        start_to_log(self.computer.computer())
     }
 
     /// Runs a recorded frame again: the result has the recorded input and the new decision.

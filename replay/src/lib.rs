@@ -54,13 +54,13 @@ use crate::cli::{Outcome, answer};
 ///
 /// Exit codes:
 ///   0  success: the log is described, or every frame that could be read is identical
-///   1  verify: some frame differs, or with --strict not the whole flight was compared; with --baseline some flight
-///      got worse, lands no longer, diverged or is missing; with --book a book is broken, or its end is not proven;
+///   1  verify: something differs or cannot be, or with --strict not all that can be compared was; with --baseline some
+///      flight got worse, lands no longer, diverged, is missing or was not verified; with --book a book is broken, or its end is not proven;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
 ///      fit: NO-GO
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some frame (no frames, no profile, frames missing) and all others are identical;
-///      or a file would be overwritten and --force is not given
+///      or a file would be overwritten
 ///
 /// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict (implied by
 /// --junit) and by compare.
@@ -86,8 +86,9 @@ enum Command {
     /// Runs the flight computer of a log again and compares its decisions bit for bit.
     ///
     /// The flight computer is built from the profile in the log and run on the recorded inputs, from power-up or from where
-    /// the log begins. All fields of the output and the digest of the memory are compared; measured times are not. For a
-    /// divergence the report says how it grows, and whether the landing would end differently (simulated from the first
+    /// the log begins. Outputs, digests of the memory, estimates and the start at the release are compared, and the inputs
+    /// are judged; a table says what was compared. With --strict a simulated flight is also flown again, and its measurements
+    /// and its verdict are compared; truth, events and measured times never are. For a divergence the report says how it grows, and whether the landing would end differently (simulated from the first
     /// frame that differs).
     ///
     /// With --explain one recorded tick is solved again: cost, residuals, active constraints, warm against cold start,

@@ -1,6 +1,5 @@
 //! The `replay` command.
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser as _;
@@ -21,7 +20,7 @@ fn main() -> ExitCode {
     match answered {
         Ok(answer) => ExitCode::from(answer.exit_code()),
         Err(error) => {
-            let _ = writeln!(std::io::stderr(), "replay: {error:#}");
+            cli::say(&format!("{error:#}"));
             ExitCode::from(cli::EXIT_NO_ANSWER)
         }
     }

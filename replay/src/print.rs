@@ -6,7 +6,8 @@ use std::io;
 use std::io::Write;
 use std::path::Path;
 
-use crate::output::{Destination, NewFile, Overwrite};
+use crate::cli::refuse_existing;
+use crate::output::NewFile;
 use anyhow::{Context as _, Result};
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use serde::Serialize;
@@ -143,10 +144,13 @@ pub(crate) fn verdict_rows<'a>(
         .collect()
 }
 
-/// A file for JUnit XML: before the work, so that nothing is done for a file that may not be written.
-pub(crate) fn junit_file(path: &Path, force: bool) -> Result<NewFile> {
-    let overwrite = Overwrite::if_forced(force);
-    NewFile::create(Destination { path, overwrite }, Path::new(""))
+/// A file for JUnit XML: before the work, so that nothing is done for a file that may not be written. An existing file is
+/// kept, whatever it holds; a pipe or a device has nothing to keep.
+pub(crate) fn junit_file(path: &Path) -> Result<NewFile> {
+    if std::fs::metadata(path).is_ok_and(|found| found.is_file()) {
+        refuse_existing(path)?;
+    }
+    NewFile::create(path.into(), Path::new(""))
         .with_context(|| format!("{}: cannot be written", path.display()))
 }
 

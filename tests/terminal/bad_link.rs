@@ -63,14 +63,14 @@ fn an_abort_whose_answers_are_lost_is_repeated_and_reported_as_observed() {
 }
 
 #[test]
-fn an_arm_whose_answer_is_lost_is_not_sent_again_and_the_heartbeat_decides() {
+fn an_arm_whose_answers_are_lost_is_repeated_for_two_seconds_done_once_and_the_heartbeat_decides() {
     let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("GO: every arming check passes");
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
     rig.terminal.type_by_hand(b"AARM\r");
     rig.wait_for_fact("ARM", "acknowledged NEVER  observed yes");
     rig.terminal.wait_for(" ARMED ");
-    assert_eq!(rig.sent(ARM, 1.0), 1);
+    assert_eq!(rig.sent(ARM, 1.0), 5);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Converts states, measurements and estimates between the flight computer's types and log records, bit for bit.
 
+use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
@@ -148,8 +149,14 @@ pub fn estimate_to_log(estimate: &Estimate) -> v1::Estimate {
     }
 }
 
+/// What the pilot thought after a frame: its estimate, with the motor's. `None` before it has one.
+pub fn thought_to_log(pilot: &Pilot) -> Option<v1::Estimate> {
+    let estimate = pilot.estimate()?;
+    Some(v1::Estimate { motor: motor_to_log(pilot.motor()), ..estimate_to_log(estimate) })
+}
+
 /// The motor's estimate as a record; none before ignition.
-pub fn motor_to_log(motor: &MotorEstimate) -> Option<v1::MotorEstimate> {
+fn motor_to_log(motor: &MotorEstimate) -> Option<v1::MotorEstimate> {
     let ignition_s = motor.ignition_s()?;
     let [
         impulse_scale_sigma,

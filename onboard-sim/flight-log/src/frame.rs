@@ -11,10 +11,12 @@ use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::outputs::{Line, Outputs};
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
+use flight::vehicle::mission::StartPoint;
 use log_records::computer_v1 as v1;
 
 use crate::estimate::{
     RecordError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
+    state_to_log, vector_to_log,
 };
 
 /// Requests, by their number in the log.
@@ -54,6 +56,22 @@ impl LoggedInput {
     #[must_use]
     pub fn hearing(self, uplink: Uplink, commander: Option<Commander>, requests: Vec<Request>) -> Self {
         Self { requests, rest: Input { uplink, commander, ..self.rest }, ..self }
+    }
+}
+
+/// A computer as it is now: at power-up or at its release, before its first frame there.
+pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
+    let mission = computer.pilot().mission();
+    let released = computer.released_at_s().is_some();
+    let estimate = computer.pilot().estimator().estimate();
+    let stood = released && mission.start.at == StartPoint::Pad;
+    v1::ComputerStart {
+        frame: if released { computer.frame() } else { 0 },
+        believed: state_to_log(&estimate.state),
+        gyro_bias_rad_s: stood.then(|| vector_to_log(&estimate.gyro_bias_rad_s)),
+        steered: mission.steered,
+        fixed_ignition_height_m: mission.ignition.fixed_height_m,
+        released,
     }
 }
 

@@ -10,10 +10,9 @@ use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::dynamics::PlanarState;
-use flight::vehicle::mission::StartPoint;
 use nalgebra::Vector3;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
-use protocol::log::flight_v1::{Estimate, TruthSample};
+use protocol::log::flight_v1::TruthSample;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
@@ -24,8 +23,8 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use world::{Strain, Touchdown};
 
-use crate::estimate::{estimate_to_log, motor_to_log, state_to_log, vector_to_log};
-use crate::frame::frame_to_log;
+use crate::estimate::{state_to_log, thought_to_log, vector_to_log};
+use crate::frame::{frame_to_log, start_to_log};
 
 /// The header of the log of a simulated flight.
 pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
@@ -50,18 +49,7 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
 
 /// The computer of a flight as it is now: at power-up or at its release, before its first frame there.
 pub fn start(flight: &Sortie) -> ComputerStart {
-    let mission = flight.mission();
-    let released = flight.computer().released_at_s().is_some();
-    let estimate = flight.pilot().estimator().estimate();
-    let stood = released && mission.start.at == StartPoint::Pad;
-    ComputerStart {
-        frame: if released { flight.computer().frame() } else { 0 },
-        believed: state_to_log(&estimate.state),
-        gyro_bias_rad_s: stood.then(|| vector_to_log(&estimate.gyro_bias_rad_s)),
-        steered: mission.steered,
-        fixed_ignition_height_m: mission.ignition.fixed_height_m,
-        released,
-    }
+    start_to_log(flight.computer())
 }
 
 /// Keeps the flight computer's last frame as its record.
@@ -97,10 +85,8 @@ impl Watch for LastFrame {
 
 /// What the flight computer thought in the frame that was just flown, and the truth.
 pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
-    let thought = flight.pilot().estimate().filter(|_| !flight.computer_is_dead()).map(|estimate| {
-        let motor = motor_to_log(flight.pilot().motor());
-        Record::Estimate(Box::new(Estimate { motor, ..estimate_to_log(estimate) }))
-    });
+    let thought = thought_to_log(flight.pilot()).filter(|_| !flight.computer_is_dead());
+    let thought = thought.map(|estimate| Record::Estimate(Box::new(estimate)));
     thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
 

@@ -1,17 +1,24 @@
 //! Reads a log: everything before the first damage, and a description of the damage.
 //!
 //! The reader goes from front to back with bounded memory. It needs no summary and no footer, so it reads the log of
-//! a recorder that was killed. It returns the content of a chunk only if the chunk's checksum is right.
+//! a recorder that was killed. It returns the content of a chunk only if the chunk's checksum is right. A record that is
+//! too large to be held in memory is passed over by its length, and what follows is read.
 
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::sync::Arc;
 
-use mcap::records::Record as McapRecord;
+use mcap::records::{Record as McapRecord, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// A record or chunk larger than this is treated as damage.
+/// A record or chunk larger than this is passed over.
 pub const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
+
+/// Metadata larger than this are passed over: their entries take far more memory than their bytes.
+const METADATA_LIMIT_BYTES: usize = 1024 * 1024;
+
+/// A record begins with its type and its length.
+const HEAD_BYTES: usize = 9;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogChannel {
@@ -68,6 +75,9 @@ pub enum Damage {
         /// The parser's message.
         reason: String,
     },
+    /// A record that was passed over.
+    #[error("a record of {bytes} bytes before byte {near_byte} was passed over: more than is held in memory")]
+    TooLarge { near_byte: u64, bytes: u64 },
     /// The log can be read to its end, and its summary counts other messages or chunks.
     #[error("its summary counts {counted}, and {read} are there: a part was cut out or is there twice")]
     Miscounted { counted: String, read: String },
@@ -107,9 +117,13 @@ pub struct LogReader<R: Read> {
     bytes_read: u64,
     schemas: BTreeMap<u16, (String, Arc<[u8]>)>,
     channels: BTreeMap<u16, LogChannel>,
+    /// Of everything before the end mark of the data.
+    checksum: crc32fast::Hasher,
     saw_data_end: bool,
     /// Messages so far.
     messages: u64,
+    /// The summary says how many messages the log has.
+    is_counted: bool,
     damage: Option<Damage>,
     ended: bool,
 }
@@ -118,11 +132,10 @@ impl<R: Read> LogReader<R> {
     /// Starts reading at the beginning of `input`.
     pub fn new(input: R) -> Self {
         let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
-            // A record between two chunks, or a whole chunk, may be damaged beyond recognition; only this checksum
-            // shows that.
-            .with_validate_data_section_crc(true)
+            .with_validate_summary_section_crc(true)
             .with_record_length_limit(RECORD_LIMIT_BYTES);
         Self {
             input,
@@ -130,8 +143,10 @@ impl<R: Read> LogReader<R> {
             bytes_read: 0,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            checksum: crc32fast::Hasher::new(),
             saw_data_end: false,
             messages: 0,
+            is_counted: false,
             damage: None,
             ended: false,
         }
@@ -152,12 +167,18 @@ impl<R: Read> LogReader<R> {
         self.bytes_read
     }
 
-    /// Returns what ended the reading early; `None` for an undamaged log that was read to its end.
+    /// Returns the first thing that is wrong with the log; `None` for an undamaged log that was read to its end.
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
     }
 
-    /// Returns the next item; `None` at the end or at the first damage.
+    /// Returns whether a summary at the end says how many messages the log has. Without one, nothing shows that its last
+    /// records are missing.
+    pub fn is_counted(&self) -> bool {
+        self.is_counted
+    }
+
+    /// Returns the next item; `None` at the end or at the first damage that cannot be passed over.
     ///
     /// # Errors
     /// Reading the input failed. Damage is not an error: see [`LogReader::damage`].
@@ -173,22 +194,20 @@ impl<R: Read> LogReader<R> {
                     self.finish(Some(damage));
                     break;
                 }
-                Some(Ok(LinearReadEvent::ReadRequest(need))) => {
-                    let buffer = self.parser.insert(need);
-                    let count = self.input.read(buffer)?;
-                    self.parser.notify_read(count);
-                    self.bytes_read += count as u64;
+                Some(Ok(LinearReadEvent::ReadRequest(_))) => {
+                    self.feed()?;
                     continue;
                 }
                 // A hole in a file is read as an endless row of such records.
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
-                    let reason = "a record of type 0, which does not exist".to_owned();
-                    self.finish(Some(Damage::Corrupt { near_byte: self.bytes_read, reason }));
+                    let damage = self.corrupt("a record of type 0, which does not exist");
+                    self.finish(Some(damage));
                     break;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => parse_record(opcode, data),
             };
             match parsed {
+                Ok(McapRecord::Footer(_)) => self.take_end()?,
                 Ok(record) => {
                     if let Some(item) = self.take(record) {
                         return Ok(Some(item));
@@ -203,11 +222,111 @@ impl<R: Read> LogReader<R> {
         Ok(None)
     }
 
+    /// Gives the parser the next record of the file, or passes over one that is too large.
+    fn feed(&mut self) -> std::io::Result<()> {
+        if self.bytes_read == 0 {
+            let mut magic = [0; mcap::MAGIC.len()];
+            self.bytes_read = fill(&mut self.input, &mut magic)? as u64;
+            if magic != mcap::MAGIC {
+                self.finish(Some(Damage::NotMcap));
+                return Ok(());
+            }
+            self.checksum.update(&magic);
+        }
+        let mut head = [0; HEAD_BYTES];
+        let count = fill(&mut self.input, &mut head)?;
+        self.bytes_read += count as u64;
+        let [opcode, length @ ..] = head;
+        let bytes = u64::from_le_bytes(length);
+        if count < HEAD_BYTES {
+            let damage = self.cut();
+            self.finish(Some(damage));
+            return Ok(());
+        }
+        let most = if opcode == op::METADATA { METADATA_LIMIT_BYTES } else { RECORD_LIMIT_BYTES };
+        let length = match usize::try_from(bytes) {
+            Ok(length) if length <= most => length,
+            _ => return self.pass_over(&head, bytes),
+        };
+        let buffer = self.parser.insert(HEAD_BYTES + length);
+        buffer[..HEAD_BYTES].copy_from_slice(&head);
+        let count = fill(&mut self.input, &mut buffer[HEAD_BYTES..])?;
+        let (record, body) = (&buffer[..HEAD_BYTES + count], &buffer[HEAD_BYTES..HEAD_BYTES + count]);
+        self.bytes_read += count as u64;
+        let unpacked = if opcode == op::CHUNK { unpacked_bytes(body) } else { 0 };
+        let mut damage = None;
+        if opcode == op::DATA_END && !self.saw_data_end {
+            // A record between two chunks, or a whole chunk, may be damaged beyond recognition; only this checksum shows
+            // that.
+            let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            if told != 0 && told != self.checksum.clone().finalize() {
+                damage = Some("the checksum over all data does not fit");
+            }
+        } else {
+            self.checksum.update(record);
+        }
+        if unpacked > RECORD_LIMIT_BYTES as u64 {
+            self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes: unpacked });
+        } else {
+            self.parser.notify_read(HEAD_BYTES + count);
+        }
+        if count < length {
+            let damage = self.cut();
+            self.finish(Some(damage));
+        } else if let Some(reason) = damage {
+            let damage = self.corrupt(reason);
+            self.note(damage);
+        }
+        Ok(())
+    }
+
+    /// Reads to the end of a record without keeping it. Attachments of other programs may have any size: only without the
+    /// others is the log damaged.
+    fn pass_over(&mut self, head: &[u8], bytes: u64) -> std::io::Result<()> {
+        self.checksum.update(head);
+        let checksum = &mut self.checksum;
+        let mut piece = vec![0; 1 << 16];
+        let mut left = bytes;
+        while left > 0 {
+            let most = usize::try_from(left).unwrap_or(piece.len()).min(piece.len());
+            let count = fill(&mut self.input, &mut piece[..most])?;
+            checksum.update(&piece[..count]);
+            self.bytes_read += count as u64;
+            left -= count as u64;
+            if count < most {
+                break;
+            }
+        }
+        if left > 0 {
+            let damage = self.corrupt("a record that is longer than the rest of the file");
+            self.finish(Some(damage));
+        } else if head.first() != Some(&op::ATTACHMENT) {
+            self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes });
+        }
+        Ok(())
+    }
+
+    /// Behind the footer comes the end of the file.
+    fn take_end(&mut self) -> std::io::Result<()> {
+        let mut rest = [0; mcap::MAGIC.len() + 1];
+        let count = fill(&mut self.input, &mut rest)?;
+        self.bytes_read += count as u64;
+        let ends = rest.get(..count) == Some(mcap::MAGIC);
+        let damage = (!ends).then(|| self.corrupt("the file does not end behind its footer"));
+        self.finish(damage);
+        Ok(())
+    }
+
+    /// Keeps the first damage.
+    fn note(&mut self, damage: Damage) {
+        self.damage.get_or_insert(damage);
+    }
+
     fn finish(&mut self, damage: Option<Damage>) {
         self.ended = true;
-        // Damage in the summary after the data does not affect what was read.
-        if !self.saw_data_end {
-            self.damage = Some(damage.unwrap_or_else(|| self.cut()));
+        let missing = (!self.saw_data_end).then(|| self.cut());
+        if let Some(damage) = damage.or(missing) {
+            self.note(damage);
         }
     }
 
@@ -215,6 +334,10 @@ impl<R: Read> LogReader<R> {
     fn cut(&self) -> Damage {
         let shorter_than_magic = self.bytes_read < mcap::MAGIC.len() as u64;
         if shorter_than_magic { Damage::NotMcap } else { Damage::Truncated { bytes: self.bytes_read } }
+    }
+
+    fn corrupt(&self, reason: &str) -> Damage {
+        Damage::Corrupt { near_byte: self.bytes_read, reason: reason.to_owned() }
     }
 
     fn describe(&self, error: &mcap::McapError) -> Damage {
@@ -258,10 +381,13 @@ impl<R: Read> LogReader<R> {
                 })
             }
             // A tool that cut a part out, or a disk that lost it, has not always changed the count.
-            McapRecord::Statistics(told) if self.saw_data_end && told.message_count != self.messages => {
-                let messages = |count: u64| format!("{count} messages");
-                let (counted, read) = (messages(told.message_count), messages(self.messages));
-                self.damage = Some(Damage::Miscounted { counted, read });
+            McapRecord::Statistics(told) if self.saw_data_end => {
+                self.is_counted = true;
+                if told.message_count != self.messages {
+                    let messages = |count: u64| format!("{count} messages");
+                    let (counted, read) = (messages(told.message_count), messages(self.messages));
+                    self.note(Damage::Miscounted { counted, read });
+                }
                 None
             }
             McapRecord::Metadata(metadata) => {
@@ -277,6 +403,27 @@ impl<R: Read> LogReader<R> {
             _ => None,
         }
     }
+}
+
+/// Reads until the buffer is full or the input ends; returns how many bytes there were.
+fn fill(input: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match input.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// What the body of a chunk says that it unpacks to.
+fn unpacked_bytes(body: &[u8]) -> u64 {
+    const UNPACKED_AT: usize = 16;
+    let unpacked = body.get(UNPACKED_AT..).and_then(|rest| rest.first_chunk());
+    unpacked.map_or(0, |bytes| u64::from_le_bytes(*bytes))
 }
 
 /// Joins an error and its causes: the parser's own text often names only the place.
@@ -296,7 +443,7 @@ fn with_causes(error: &mcap::McapError) -> String {
 /// The body does not fit the type.
 pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
     // The parser of the crate `mcap` panics if an attachment is too short for its own fields.
-    if opcode == mcap::records::op::ATTACHMENT && !attachment_fits(data) {
+    if opcode == op::ATTACHMENT && !attachment_fits(data) {
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
     mcap::parse_record(opcode, data).map(McapRecord::into_owned)
@@ -311,9 +458,7 @@ pub fn records_of_chunk(
     body: &[u8],
     mut keep: impl FnMut(McapRecord<'static>) -> mcap::McapResult<()>,
 ) -> Result<(), RecordError> {
-    const UNPACKED_AT: usize = 16;
-    let unpacked = body.get(UNPACKED_AT..).and_then(|rest| rest.first_chunk());
-    let unpacked = unpacked.map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let unpacked = unpacked_bytes(body);
     if unpacked > RECORD_LIMIT_BYTES as u64 {
         return Err(RecordError::TooLarge(unpacked));
     }
@@ -323,8 +468,7 @@ pub fn records_of_chunk(
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(RECORD_LIMIT_BYTES);
     let mut reader = LinearReader::new_with_options(options);
-    let head: Vec<u8> =
-        std::iter::once(mcap::records::op::CHUNK).chain((body.len() as u64).to_le_bytes()).collect();
+    let head: Vec<u8> = std::iter::once(op::CHUNK).chain((body.len() as u64).to_le_bytes()).collect();
     let mut input = head.as_slice().chain(body);
     while let Some(event) = reader.next_event() {
         match event? {

@@ -108,7 +108,7 @@ impl Flown {
         let mut log = FlightLog::open(path)?;
         let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
-            flights.note(&stamped.entry);
+            flights.note(&stamped);
             let message = heard_message(log.channel(stamped.channel_id), &stamped);
             verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);

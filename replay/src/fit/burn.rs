@@ -198,6 +198,8 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
         found: Vec::new(),
         not_found: Vec::new(),
         damage: None,
+        landed: None,
+        content: None,
     };
     let reason = "the table does not show it";
     for (place, name, unit) in [

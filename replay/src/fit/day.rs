@@ -24,6 +24,7 @@ use serde::Serialize;
 use sim::dispersion::{DEFAULT, Dispersion, DispersionError, may_be_kinder};
 use sim::draw::{Draw, draw};
 use sim::sortie::{SetUpError, Sortie};
+use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
 use world::truth::Truth;
 
 use super::lot::{Chance, Lot, Prediction, Trial, draw_next, predict};
@@ -109,6 +110,10 @@ pub struct Learnt {
     pub flights: usize,
     /// `None` if the day was not flown.
     pub prediction: Option<Prediction>,
+    /// How the flights so far ended.
+    pub flown: Outcomes,
+    /// The rate with these outcomes; `None` without any, and if the day was not flown.
+    pub pulled: Option<Pulled>,
     pub limit: f64,
     pub risk: f64,
     pub go: Option<bool>,
@@ -162,6 +167,8 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
             .ok_or_else(|| LearnError::Day("no flight was simulated: --flights is 0".to_owned()))
     });
     let prediction = prediction.transpose()?;
+    let flown = Outcomes::of(fits);
+    let pulled = prediction.and_then(|found| Pulled::of(&found, flown));
     let reports = PROPERTIES.iter().zip(&lots).zip(&values).zip(&priors);
     let reports = reports.map(|((((name, unit), lot), values), prior)| LotReport {
         name,
@@ -184,11 +191,72 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
         wind_m_s,
         flights: trials.map_or(0, |trials| trials.len()),
         prediction,
+        flown,
+        pulled,
         limit: ask.limit,
         risk: ask.risk,
-        go: prediction.map(|found| found.risk <= ask.risk),
+        go: prediction.map(|found| {
+            let allowed = pulled.is_none_or(|pulled| pulled.rate >= ask.limit) && flown.allow(ask.limit);
+            found.risk <= ask.risk && allowed
+        }),
         day,
     })
+}
+
+/// How the flights so far ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Outcomes {
+    pub landed: usize,
+    pub of: usize,
+}
+
+/// Outcomes that are rarer than this, if the rate is what the club wants, speak against it.
+const AGAINST: f64 = 0.05;
+
+impl Outcomes {
+    fn of(fits: &[Fit]) -> Self {
+        let known: Vec<bool> = fits.iter().filter_map(|fit| fit.landed).collect();
+        Self { landed: known.iter().filter(|landed| **landed).count(), of: known.len() }
+    }
+
+    /// Whether so few landings may be, if each flight lands with this rate.
+    fn allow(self, rate: f64) -> bool {
+        let so_few = Binomial::new(rate, self.of as u64).map(|flights| flights.cdf(self.landed as u64));
+        self.landed == self.of || so_few.is_ok_and(|share| share >= AGAINST)
+    }
+}
+
+/// The landing rate of a simulation that the outcomes of flights have moved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pulled {
+    /// So many flights the simulation was worth.
+    pub worth: f64,
+    pub rate: f64,
+    /// Ends of the 95 % interval.
+    pub low: f64,
+    pub high: f64,
+}
+
+/// A simulation is worth no more flights than this, however many it has flown: it knows only what its models know.
+const WORTH_MAX: f64 = 20.0;
+/// And no fewer.
+const WORTH_MIN: f64 = 1.0;
+
+impl Pulled {
+    /// A beta distribution of the simulation's mean and width, with the outcomes; `None` without outcomes.
+    fn of(simulated: &Prediction, Outcomes { landed, of }: Outcomes) -> Option<Self> {
+        if of == 0 {
+            return None;
+        }
+        let mean = simulated.rate.clamp(0.001, 0.999);
+        let sigma = ((simulated.high - simulated.low) / (2.0 * Z_95)).max(1e-6);
+        let worth = (mean * (1.0 - mean) / (sigma * sigma) - 1.0).clamp(WORTH_MIN, WORTH_MAX);
+        let landed = mean * worth + landed as f64;
+        let all = worth + of as f64;
+        let rate = Beta::new(landed, all - landed).ok()?;
+        let [low, high] = [0.025, 0.975].map(|share| rate.inverse_cdf(share));
+        Some(Self { worth, rate: landed / all, low, high })
+    }
 }
 
 /// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has no vehicle.
@@ -432,6 +500,17 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
         counted(learnt.flights as u64, "simulated flight"),
         shown(set)
     )?;
+    if let Some(pulled) = &learnt.pulled {
+        let Outcomes { landed, of } = learnt.flown;
+        writeln!(
+            output,
+            "flown     {landed} of {of} landed: with the simulation worth {:.0} flights {:.1} %, 95 % interval {:.1} to {:.1} %",
+            pulled.worth,
+            100.0 * pulled.rate,
+            100.0 * pulled.low,
+            100.0 * pulled.high
+        )?;
+    }
     writeln!(
         output,
         "risk      {:.1} % that the rate is below {:.0} %; {:.0} % is taken",
@@ -440,6 +519,13 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
         100.0 * learnt.risk
     )?;
     match (learnt.go == Some(true), may_be_kinder(set)) {
+        (false, _) if found.risk <= learnt.risk => {
+            writeln!(
+                output,
+                "NO-GO: the flights so far speak against a rate of {:.0} %",
+                100.0 * learnt.limit
+            )
+        }
         (false, _) => writeln!(output, "NO-GO"),
         (true, false) => writeln!(output, "GO"),
         (true, true) => writeln!(output, "GO in {} only, which may be kinder than {DEFAULT}", shown(set)),
@@ -465,13 +551,13 @@ pub(super) struct Arguments {
     #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
     prior: String,
     /// Seed of the simulated flights.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, requires = "flights")]
     seed: u64,
     /// Landing rate that the club wants at least.
-    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.95, value_name = "SHARE", requires = "flights")]
     limit: f64,
     /// Risk that is taken of flying below it: GO if the probability is no higher.
-    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE", requires = "flights")]
     risk: f64,
     /// Flights at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N")]
@@ -545,6 +631,8 @@ mod tests {
             found,
             not_found: Vec::new(),
             damage: None,
+            landed: None,
+            content: None,
         }
     }
 
@@ -569,6 +657,21 @@ mod tests {
             (high - 4.0 - reach).abs() < 1e-9 && (low - (4.0 - reach).max(0.0)).abs() < 1e-9,
             "{low} {high}"
         );
+    }
+
+    /// Of a beta distribution with 17.7 and 2.3, eleven flights that did not land leave 17.7 of 31.
+    #[test]
+    fn val_hand_what_was_flown_moves_the_rate_and_forbids_a_go() {
+        let simulated = Prediction { rate: 0.885, low: 0.86, high: 0.91, risk: 0.0 };
+        let pulled = Pulled::of(&simulated, Outcomes { landed: 0, of: 11 }).unwrap();
+        assert!((pulled.rate - 17.7 / 31.0).abs() < 1e-9 && pulled.high < 0.8, "{pulled:?}");
+        assert!(!Outcomes { landed: 0, of: 11 }.allow(0.8));
+        let good = Pulled::of(&simulated, Outcomes { landed: 11, of: 11 }).unwrap();
+        assert!(good.rate > simulated.rate && Outcomes { landed: 11, of: 11 }.allow(1.0));
+        // Seven and fewer of ten come in 12 % of all tens at 0.8 and in 1.2 % at 0.95.
+        let seven = Outcomes { landed: 7, of: 10 };
+        assert!(seven.allow(0.8) && !seven.allow(0.95));
+        assert_eq!(Pulled::of(&simulated, Outcomes { landed: 0, of: 0 }), None);
     }
 
     #[test]

@@ -25,6 +25,7 @@ mod trace;
 mod turning;
 mod wind;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -121,6 +122,12 @@ pub struct Fit {
     pub not_found: Vec<NotFound>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
+    /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
+    #[serde(default)]
+    pub landed: Option<bool>,
+    /// Names what was recorded: one flight is one flight, under however many names.
+    #[serde(default)]
+    pub content: Option<String>,
 }
 
 impl Fit {
@@ -186,6 +193,8 @@ pub fn fit(trace: &Trace) -> Fit {
         found: Vec::new(),
         not_found: Vec::new(),
         damage: trace.damage.clone(),
+        landed: trace.landed,
+        content: trace.content.map(|content| format!("{content:016x}")),
     };
     match along_and_turning(trace) {
         Ok((along, turning)) => {
@@ -549,6 +558,7 @@ impl Args {
                 }
             }
         }
+        once_each(&mut fits);
         for fit in &fits {
             warn_of_damage(&fit.source, fit.damage.as_deref());
         }
@@ -590,6 +600,20 @@ impl Args {
     }
 }
 
+/// Leaves out what is there already under another name.
+fn once_each(fits: &mut Vec<Fit>) {
+    let mut known: BTreeMap<String, String> = BTreeMap::new();
+    fits.retain(|fit| {
+        let Some(content) = &fit.content else { return true };
+        if let Some(first) = known.get(content) {
+            say(&format!("left out: {} is the same as {first}", fit.source));
+            return false;
+        }
+        known.insert(content.clone(), fit.source.clone());
+        true
+    });
+}
+
 fn is_log(file: &Path) -> bool {
     !ends_in(file, "csv") && !ends_in(file, "json")
 }
@@ -625,6 +649,8 @@ mod tests {
             found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
             not_found: Vec::new(),
             damage: None,
+            landed: None,
+            content: None,
         };
         let other = Basis { impulse_n_s: 110.0, loaded_kg: 3.3, ..basis };
         let found = &fit.over(&other).found[0];
@@ -642,6 +668,8 @@ mod tests {
             found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
             not_found: Vec::new(),
             damage: None,
+            landed: None,
+            content: None,
         };
         values.iter().map(fit).collect()
     }

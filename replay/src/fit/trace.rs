@@ -13,6 +13,7 @@ use flight_log::estimate::estimate_from_log;
 use flight_log::frame::{commands_from_log, input_from_log, phase_of};
 use protocol::log::computer_v1::ComputerFrame;
 
+use crate::digest::{START, digest};
 use crate::log::{Entry, FlightLog, LogError, RecordingError};
 use crate::settings::explained;
 
@@ -51,6 +52,10 @@ pub struct Trace {
     pub frames: Vec<Frame>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
+    /// Whether the flight landed, if the log says so.
+    pub landed: Option<bool>,
+    /// Tells what was recorded from any other flight.
+    pub content: Option<u64>,
 }
 
 /// Why nothing can be learnt from a log.
@@ -86,7 +91,8 @@ impl Trace {
     /// A flight without frames yet.
     pub fn new(name: &str, mission: Mission, mission_toml: &str) -> Self {
         let mission_toml = mission_toml.to_owned();
-        Self { name: name.to_owned(), mission, mission_toml, frames: Vec::new(), damage: None }
+        let name = name.to_owned();
+        Self { name, mission, mission_toml, frames: Vec::new(), damage: None, landed: None, content: None }
     }
 
     /// Adds a frame; one without sensors or with numbers that are not finite is left out.
@@ -143,13 +149,20 @@ impl Trace {
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, TraceError> {
         /// Two hours of frames: no flight is that long.
         const FRAMES_MAX: usize = 1_440_000;
+        /// The noise of so many frames is that of no other flight.
+        const NAMING_FRAMES: usize = 100;
         let name = log.name().to_owned();
         let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
         let mut trace: Option<Self> = None;
         let mut waiting = None;
         let (mut telemetry, mut flights) = (false, 0_usize);
+        let (mut landed, mut content, mut named) = (None, START, 0);
         while let Some(stamped) = log.next_entry()? {
+            if named < NAMING_FRAMES && matches!(stamped.entry, Entry::ComputerFrame(_)) {
+                (content, named) = (digest(content, &stamped.data), named + 1);
+            }
             match stamped.entry {
+                Entry::Verdict(verdict) => landed = Some(verdict.landed),
                 Entry::Telemetry(_) => telemetry = true,
                 Entry::ComputerStart(start) => flights += usize::from(start.released),
                 Entry::ComputerFrame(frame) => waiting = frame.into_tick(),
@@ -186,7 +199,10 @@ impl Trace {
         let found = if telemetry { "it is a ground station's" } else { "none of either" };
         match trace.filter(|trace| !trace.frames.is_empty()) {
             None => Err(TraceError::NoFrames { name, found }),
-            Some(trace) => Ok(Self { damage: log.damage().map(ToString::to_string), ..trace }),
+            Some(trace) => {
+                let damage = log.damage().map(ToString::to_string);
+                Ok(Self { damage, landed, content: Some(content), ..trace })
+            }
         }
     }
 }

@@ -51,7 +51,7 @@ pub fn info_of<R: Read>(
             None => (stamped.log_time_ns, stamped.log_time_ns),
             Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
         });
-        seen.flights.note(&stamped.entry);
+        seen.flights.note(&stamped);
         let channel = log.channel(stamped.channel_id);
         let first_ns = *seen.first_ns.get_or_insert(stamped.log_time_ns);
         let since_s = stamped.log_time_ns.saturating_sub(first_ns) as f64 / 1e9;
@@ -116,7 +116,8 @@ impl Seen {
         let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
         let channels = self.channels.into_facts(log.channels());
         let completeness = Completeness::new(log.damage(), span.as_ref(), &channels, summary);
-        let completeness = completeness.with_flights(&self.flights);
+        let completeness =
+            Completeness { counted: log.is_counted(), ..completeness.with_flights(&self.flights) };
         let verdict = self.verdicts.found().as_ref().map(VerdictFacts::found);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
@@ -128,7 +129,10 @@ impl Seen {
                 None => Grade::without_frames(self.unreadable.as_deref()),
             },
             frames,
-            schema: SchemaFacts { version: head.schema_version(), this_build: SCHEMA_VERSION },
+            schema: SchemaFacts {
+                version: head.schema_version().map(str::to_owned),
+                this_build: SCHEMA_VERSION.to_string(),
+            },
             library: head.library.clone(),
             build: head.build.clone(),
             build_comparison: head.compare_build(),
@@ -190,11 +194,11 @@ pub struct Info {
     pub attachments: Vec<AttachmentFacts>,
 }
 
-/// The version of a log's schema, and of this build's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// The version of a log's schema, if it says so, and of this build's.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SchemaFacts {
-    pub version: u32,
-    pub this_build: u32,
+    pub version: Option<String>,
+    pub this_build: String,
 }
 
 /// What can be done with a log.
@@ -287,6 +291,8 @@ pub struct Completeness {
     pub complete: bool,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
+    /// The log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    pub counted: bool,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,
     /// How much is missing after that, s; known only if the end of the file can be read.
@@ -306,7 +312,8 @@ impl Completeness {
         channels: &[ChannelFacts],
         summary: impl FnOnce() -> Option<SummaryFacts>,
     ) -> Self {
-        let missing_s = damage.and_then(|_| {
+        // The summary of a recovered log says nothing about the damaged one.
+        let missing_s = damage.filter(|damage| !matches!(damage, Damage::Recovered(_))).and_then(|_| {
             let end_ns = summary()?.last_log_time_ns;
             Some(seconds(end_ns.checked_sub(span?.last_ns)?))
         });
@@ -314,6 +321,7 @@ impl Completeness {
         Self {
             complete: damage.is_none() && messages_lost == 0,
             damage: damage.map(ToString::to_string),
+            counted: false,
             readable_until_s: span.map(|span| span.duration_s),
             missing_s,
             messages_lost,
@@ -430,15 +438,9 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     }
     print_origin(info, output)?;
     let schema = &info.schema;
-    if schema.version != schema.this_build {
-        let newer = schema.version > schema.this_build;
-        let words =
-            if newer { "newer than this build reads" } else { "without the flight computer's frames" };
-        row(
-            output,
-            "schema",
-            &format!("{}, {words} (this build writes {})", schema.version, schema.this_build),
-        )?;
+    if schema.version.as_ref() != Some(&schema.this_build) {
+        let version = schema.version.as_deref().map_or_else(|| "not stated".to_owned(), short);
+        row(output, "schema", &format!("{version}; this build reads {}", schema.this_build))?;
     }
     if let Some(span) = &info.span {
         let (first, last) = (utc(span.first_ns), utc(span.last_ns));
@@ -470,8 +472,12 @@ fn row(output: &mut impl Write, name: &str, text: &str) -> io::Result<()> {
 
 fn completeness(info: &Info) -> String {
     let found = &info.completeness;
-    if found.complete {
+    if found.complete && found.counted {
         return "yes: ended properly, every checksum holds".to_owned();
+    }
+    if found.complete {
+        return "as far as can be known: it has no summary, which would say how many records there were"
+            .to_owned();
     }
     let mut faults = Vec::new();
     if let Some(damage) = &found.damage {

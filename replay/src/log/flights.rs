@@ -2,7 +2,8 @@
 //!
 //! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool may end in the
 //! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`; a second one
-//! at the release belongs to it. Each flight ends with its verdict.
+//! at the release belongs to it. A vehicle records until its flight computer says that the flight is over; a flight that
+//! begins at its release, until it is judged.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,7 +13,7 @@ use flight::rules::phase::Phase;
 use flight_log::frame::phase_of;
 use serde::Serialize;
 
-use super::{Clock, ClockTime, Entry};
+use super::{Clock, ClockTime, Entry, StampedEntry};
 
 /// Tolerance for rounding: times are sums of periods.
 const ROUNDING_S: f64 = 1e-6;
@@ -28,6 +29,13 @@ pub struct LoggedFlight {
     on_the_pad: Option<(f64, u32)>,
     /// Time of contact in the verdict, s.
     contact_s: Option<f64>,
+    /// When the verdict and the latest frame were recorded, ns since the Unix epoch.
+    judged_ns: Option<u64>,
+    framed_ns: u64,
+    /// It began with the power-up of its flight computer.
+    powered_up: bool,
+    /// The flight computer has said that the flight is over.
+    over: bool,
 }
 
 /// Where an incomplete record of a flight ends.
@@ -42,15 +50,18 @@ pub struct Cut {
     pub on_pad: bool,
     /// Time of contact in the verdict, s, if the verdict is there and only ticks are missing.
     pub contact_s: Option<f64>,
+    /// Contact is there, and the frames behind it are missing.
+    pub after_contact: bool,
 }
 
 impl fmt::Display for Cut {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { time_s, clock, phase, on_pad, contact_s } = self;
+        let Self { time_s, clock, phase, on_pad, contact_s, after_contact } = self;
         let place = if *on_pad { "on the pad, " } else { "" };
         let time = ClockTime { clock: *clock, time_s: *time_s };
         write!(formatter, "ends {place}at {time} in {phase}, ")?;
         match contact_s {
+            Some(_) if *after_contact => write!(formatter, "before the flight was over"),
             Some(contact_s) => write!(formatter, "before its contact at T+{contact_s:.3} s"),
             None => write!(formatter, "without a verdict"),
         }
@@ -70,14 +81,20 @@ impl LoggedFlight {
     pub fn cut(&self) -> Option<Cut> {
         let flown = self.last.map(|last| (last, Clock::Flight));
         let ((time_s, phase), clock) = flown.or(self.on_the_pad.map(|last| (last, Clock::Boot)))?;
-        let reached = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= FRAME_S + ROUNDING_S);
+        let down = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= FRAME_S + ROUNDING_S);
+        let ended = if self.powered_up {
+            self.over && (down || self.ticks == 0)
+        } else {
+            down && self.judged_ns.is_some_and(|judged_ns| judged_ns <= self.framed_ns)
+        };
         let phase = u8::try_from(phase).ok().and_then(Phase::from_index);
-        (!reached).then_some(Cut {
+        (!ended).then_some(Cut {
             time_s,
             clock,
             phase: phase.map_or("an unknown phase", Phase::name),
             on_pad: clock == Clock::Boot && phase.is_some_and(Phase::on_pad),
             contact_s: self.contact_s,
+            after_contact: down,
         })
     }
 }
@@ -139,49 +156,43 @@ impl InFlight {
 #[derive(Debug, Clone, Default)]
 pub struct Flights {
     found: Vec<LoggedFlight>,
-    /// The last flight began with the power-up of its flight computer.
-    powered_up: bool,
 }
 
 impl Flights {
     /// Notes a record. Returns whether a flight begins with it.
-    pub fn note(&mut self, entry: &Entry) -> bool {
+    pub fn note(&mut self, stamped: &StampedEntry) -> bool {
         let before = self.found.len();
-        match entry {
+        match &stamped.entry {
             // If the log has the power-up of this flight computer, its release does not begin another flight.
             Entry::ComputerStart(start)
                 if start.released
-                    && self.powered_up
-                    && self.found.last().is_some_and(|flight| flight.ticks == 0) => {}
+                    && self.found.last().is_some_and(|flight| flight.powered_up && flight.ticks == 0) => {}
             Entry::ComputerStart(start) => {
-                self.begin();
-                self.powered_up = !start.released;
+                self.found.push(LoggedFlight { powered_up: !start.released, ..LoggedFlight::default() });
             }
             Entry::ComputerFrame(frame) => {
                 // The start may be lost.
                 if self.found.is_empty() {
-                    self.begin();
+                    self.found.push(LoggedFlight::default());
                 }
+                let Some(flight) = self.found.last_mut() else { return false };
                 let phase = frame.record.output.phase;
-                match (self.found.last_mut(), frame.flight_time_s()) {
-                    (Some(flight), Some(time_s)) => flight.note(time_s, phase),
-                    (Some(flight), None) => flight.on_the_pad = Some((frame.record.input.time_s, phase)),
-                    (None, _) => {}
+                flight.over |= frame.record.output.over;
+                flight.framed_ns = flight.framed_ns.max(stamped.log_time_ns);
+                match frame.flight_time_s() {
+                    Some(time_s) => flight.note(time_s, phase),
+                    None => flight.on_the_pad = Some((frame.record.input.time_s, phase)),
                 }
             }
             Entry::Verdict(verdict) => {
                 if let Some(flight) = self.found.last_mut() {
                     flight.contact_s = Some(verdict.time_s);
+                    flight.judged_ns = Some(stamped.log_time_ns);
                 }
             }
             _ => {}
         }
         self.found.len() > before
-    }
-
-    fn begin(&mut self) {
-        self.found.push(LoggedFlight::default());
-        self.powered_up = false;
     }
 
     /// Every flight so far, in file order.

@@ -6,9 +6,13 @@ use protocol::log::build::build_info;
 use protocol::log::reader::{Damage, LogItem};
 use protocol::log::record::{
     ATTACHMENT_PROFILE, ATTACHMENT_SCENARIO, METADATA_BUILD, METADATA_RECOVERY, METADATA_RUN,
-    METADATA_SCHEMA, RECOVERY_FAULT_ENTRY, SCHEMA_VERSION_ENTRY,
+    METADATA_SCHEMA, RECOVERY_FAULT_ENTRY, SCHEMA_VERSION, SCHEMA_VERSION_ENTRY,
 };
 use serde::Serialize;
+
+/// What is kept of a head that goes on and on.
+const RUN_FACTS_MAX: usize = 10_000;
+const ATTACHMENTS_MAX: usize = 10_000;
 
 /// Metadata and attachments.
 #[derive(Debug, Clone, Default)]
@@ -58,9 +62,14 @@ pub struct BuildDifference {
 }
 
 impl Head {
-    /// Version of the log's contents; 1 if the log does not state it.
-    pub fn schema_version(&self) -> u32 {
-        self.schema.get(SCHEMA_VERSION_ENTRY).and_then(|version| version.parse().ok()).unwrap_or(1)
+    /// Version of the log's contents, as the log states it.
+    pub fn schema_version(&self) -> Option<&str> {
+        self.schema.get(SCHEMA_VERSION_ENTRY).map(String::as_str)
+    }
+
+    /// Whether this build reads this version of contents.
+    pub fn is_of_this_schema(&self) -> bool {
+        self.schema_version() == Some(SCHEMA_VERSION.to_string().as_str())
     }
 
     /// Whether one of our programs wrote the log.
@@ -76,13 +85,17 @@ impl Head {
             LogItem::Library(library) => self.library = library,
             LogItem::Metadata { name, entries } if name == METADATA_BUILD => self.build = entries,
             LogItem::Metadata { name, entries } if name == METADATA_SCHEMA => self.schema = entries,
-            LogItem::Metadata { name, entries } if name == METADATA_RUN => self.run.extend(entries),
+            LogItem::Metadata { name, entries } if name == METADATA_RUN && self.run.len() < RUN_FACTS_MAX => {
+                self.run.extend(entries);
+            }
             LogItem::Metadata { name, entries } if name == METADATA_RECOVERY => {
                 let fault = entries.get(RECOVERY_FAULT_ENTRY).filter(|fault| !fault.is_empty());
                 self.recovered = self.recovered.take().or(fault.cloned().map(Damage::Recovered));
             }
             LogItem::Attachment { name, data } => {
-                self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
+                if self.attachments.len() < ATTACHMENTS_MAX {
+                    self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
+                }
                 match name.as_str() {
                     ATTACHMENT_PROFILE => self.profile_toml = Some(String::from_utf8(data)),
                     ATTACHMENT_SCENARIO => self.scenario_toml = String::from_utf8(data).ok(),

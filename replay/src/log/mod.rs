@@ -11,21 +11,22 @@ mod recording;
 mod verdict;
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Chain, Cursor, Read, Seek as _, Write as _};
+use std::io::{BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom, Write as _};
 use std::path::Path;
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
 use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight, TickRanges};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
-use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, RECORD_LIMIT_BYTES};
-use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY};
+use mcap::records::{Record as McapRecord, op};
+use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
+use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 use protocol::text::printable;
-pub(crate) use record::frame_descriptor;
 pub use record::{Entry, LoggedFrame, StampedEntry};
+pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
+use verdict::contradiction;
 pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
 
 use crate::output::{Destination, NewFile};
@@ -34,6 +35,9 @@ use crate::output::{Destination, NewFile};
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
 const BUFFER_BYTES: usize = 1 << 20;
+
+/// The summary of a log of many hours has some megabytes.
+const SUMMARY_LIMIT_BYTES: u64 = 64 << 20;
 
 /// A log being read.
 pub struct FlightLog<R: Read> {
@@ -44,8 +48,19 @@ pub struct FlightLog<R: Read> {
     recognised: bool,
     last_log_time_ns: Option<u64>,
     in_flight: InFlight,
+    /// The first verdict that contradicts itself.
+    contradiction: Option<Damage>,
     /// The topics whose records are decoded; all, if `None`.
     wanted: Option<&'static [&'static str]>,
+}
+
+/// Opens a file, and no pipe: that would wait for somebody who writes into it.
+pub(crate) fn open_regular(path: &Path) -> std::io::Result<File> {
+    if std::fs::metadata(path)?.is_file() {
+        File::open(path)
+    } else {
+        Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is not a regular file"))
+    }
 }
 
 impl FlightLog<BufReader<File>> {
@@ -55,7 +70,7 @@ impl FlightLog<BufReader<File>> {
     /// The file cannot be read, or is not an MCAP file.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
-        match File::open(path) {
+        match open_regular(path) {
             Ok(file) => Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file)),
             Err(source) => Err(LogError::Read { name, source }),
         }
@@ -86,11 +101,13 @@ impl<R: Read> FlightLog<R> {
             recognised: false,
             last_log_time_ns: None,
             in_flight: InFlight::default(),
+            contradiction: None,
             wanted: None,
         })
     }
 
-    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`].
+    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`]. Frames that differ
+    /// from what is computed may have been misread: [`misread_frame`].
     #[must_use]
     pub fn decoding(self, topics: &'static [&'static str]) -> Self {
         Self { wanted: Some(topics), ..self }
@@ -117,10 +134,15 @@ impl<R: Read> FlightLog<R> {
         self.reader.channel(id)
     }
 
-    /// Why the log could not be read to its end, or that it was recovered from one that lacked something; `None` for a whole
-    /// log, once the entries are exhausted.
+    /// What is wrong with the log, or that it was recovered from one that lacked something; `None` for a whole log, once
+    /// the entries are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
-        self.reader.damage().or(self.head.recovered.as_ref())
+        self.reader.damage().or(self.contradiction.as_ref()).or(self.head.recovered.as_ref())
+    }
+
+    /// Whether the log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    pub fn is_counted(&self) -> bool {
+        self.reader.is_counted()
     }
 
     /// The latest time of any entry so far, ns since the Unix epoch.
@@ -144,9 +166,18 @@ impl<R: Read> FlightLog<R> {
                     let wanted = |channel: &&LogChannel| {
                         self.wanted.is_none_or(|topics| topics.contains(&channel.topic.as_str()))
                     };
-                    let mut entry = Entry::decode(channel.filter(wanted), &data);
+                    let mut entry = Entry::decode(channel.filter(wanted), &data, self.wanted.is_some());
                     self.recognised |= entry.is_ours()
                         || channel.is_some_and(|channel| channel.schema_name.starts_with("touchdown."));
+                    if let Entry::Verdict(verdict) = &entry
+                        && let Some(contradiction) = contradiction(verdict)
+                    {
+                        let reason = format!("{TOPIC_VERDICT} contradicts itself: {contradiction}");
+                        let damage =
+                            Damage::Corrupt { near_byte: self.reader.bytes_read(), reason: reason.clone() };
+                        self.contradiction.get_or_insert(damage);
+                        entry = Entry::Unreadable { reason };
+                    }
                     self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
                     return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, data, entry }));
@@ -298,11 +329,26 @@ pub struct SummaryFacts {
 
 /// Reads the summary at the end of a file, if possible.
 pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
-    let summary = read_summary(path)?;
-    let stats = summary.stats?;
-    let is_frame =
-        |id: &u16| summary.channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
-    let counts = stats.channel_message_counts.iter().filter(|(id, _)| is_frame(id));
+    let section = summary_section(path)?;
+    let (mut frame_channels, mut stats) = (Vec::new(), None);
+    let mut rest = section.as_slice();
+    while let Some((opcode, behind)) = rest.split_first()
+        && let Some((length, behind)) = behind.split_first_chunk()
+    {
+        let (body, behind) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+        match parse_record(*opcode, body).ok()? {
+            McapRecord::Channel(channel) if channel.topic == TOPIC_COMPUTER_FRAME => {
+                frame_channels.push(channel.id);
+            }
+            McapRecord::Statistics(found) => stats = Some(found),
+            // A hole in a file is an endless row of such records.
+            McapRecord::Unknown { opcode: 0, .. } => return None,
+            _ => {}
+        }
+        rest = behind;
+    }
+    let stats = stats?;
+    let counts = stats.channel_message_counts.iter().filter(|(id, _)| frame_channels.contains(id));
     Some(SummaryFacts {
         message_count: stats.message_count,
         frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
@@ -310,21 +356,22 @@ pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     })
 }
 
-/// The summary at the end of a file; `None` if the file has none that can be read.
-fn read_summary(path: &Path) -> Option<mcap::Summary> {
+/// The bytes between the end mark of the data and the footer; `None` if there are none, or more than any log has.
+fn summary_section(path: &Path) -> Option<Vec<u8>> {
+    /// The footer with its head, and the magic.
+    const END_BYTES: usize = 9 + 20 + 8;
     let mut file = File::open(path).ok()?;
-    let size = file.metadata().ok()?.len();
-    let options =
-        SummaryReaderOptions::default().with_file_size(size).with_record_length_limit(RECORD_LIMIT_BYTES);
-    let mut reader = SummaryReader::new_with_options(options);
-    while let Some(event) = reader.next_event() {
-        match event.ok()? {
-            SummaryReadEvent::ReadRequest(need) => {
-                let count = file.read(reader.insert(need)).ok()?;
-                reader.notify_read(count);
-            }
-            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to).ok()?),
-        }
+    let end = file.metadata().ok()?.len().checked_sub(END_BYTES as u64)?;
+    file.seek(SeekFrom::Start(end)).ok()?;
+    let mut footer = [0; END_BYTES];
+    file.read_exact(&mut footer).ok()?;
+    if footer[0] != op::FOOTER || !footer.ends_with(&MCAP_MAGIC) {
+        return None;
     }
-    reader.finish()
+    let start = u64::from_le_bytes(*footer.get(9..)?.first_chunk()?);
+    let length = end.checked_sub(start).filter(|length| start > 0 && *length <= SUMMARY_LIMIT_BYTES)?;
+    file.seek(SeekFrom::Start(start)).ok()?;
+    let mut section = vec![0; usize::try_from(length).ok()?];
+    file.read_exact(&mut section).ok()?;
+    Some(section)
 }

@@ -91,14 +91,15 @@ impl Entry {
         !matches!(self, Self::Event(_) | Self::Other)
     }
 
-    /// The content of a message on `channel`.
-    pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8]) -> Self {
+    /// The content of a message on `channel`, if it can be understood exactly. Of a frame of the flight computer that is not
+    /// looked at if `trusted`: see [`misread_frame`].
+    pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8], trusted: bool) -> Self {
         let Some(channel) = channel else {
             return Self::Other;
         };
         match channel.topic.as_str() {
             TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
-            TOPIC_COMPUTER_FRAME => decoded(channel, "ComputerFrame", data, |record| {
+            TOPIC_COMPUTER_FRAME => decoded_if(!trusted, channel, "ComputerFrame", data, |record| {
                 Self::ComputerFrame(Box::new(LoggedFrame { record: *record, tick: None }))
             }),
             TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
@@ -119,7 +120,27 @@ impl Entry {
     }
 }
 
+/// Records are far smaller. Decoded, one may take many times its bytes.
+const RECORD_MAX_BYTES: usize = 1 << 20;
+
 fn decoded<M: Message + Default>(
+    channel: &LogChannel,
+    message_name: &str,
+    data: &[u8],
+    kind: impl FnOnce(Box<M>) -> Entry,
+) -> Entry {
+    decoded_if(true, channel, message_name, data, kind)
+}
+
+/// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded again to be compared with
+/// its bytes, this is asked only if they differ.
+pub(crate) fn misread_frame(data: &[u8]) -> Option<String> {
+    complaint("touchdown.computer.v1.ComputerFrame", data)
+        .map(|complaint| format!("{TOPIC_COMPUTER_FRAME}: {complaint}"))
+}
+
+fn decoded_if<M: Message + Default>(
+    exactly: bool,
     channel: &LogChannel,
     message_name: &str,
     data: &[u8],
@@ -141,6 +162,11 @@ fn decoded<M: Message + Default>(
             Entry::Other
         };
     }
+    if data.len() > RECORD_MAX_BYTES {
+        let reason =
+            format!("{}: {} bytes; no record has more than {RECORD_MAX_BYTES}", channel.topic, data.len());
+        return Entry::Unreadable { reason };
+    }
     let message = match M::decode(data) {
         Ok(message) => message,
         Err(error) => {
@@ -148,7 +174,8 @@ fn decoded<M: Message + Default>(
         }
     };
     // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would give different bytes.
-    if message.encode_to_vec() != data
+    if exactly
+        && message.encode_to_vec() != data
         && let Some(complaint) = complaint(&accepted, data)
     {
         return Entry::Unreadable { reason: format!("{}: {complaint}", channel.topic) };

@@ -134,7 +134,7 @@ impl Recording {
         let (mut first_ns, mut frame_order, mut frames_lost) = (None, FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
             let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
-            flights.note(&stamped.entry);
+            flights.note(&stamped);
             let channel = log.channel(stamped.channel_id);
             let message = heard_message(channel, &stamped);
             recording.clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);

@@ -120,6 +120,37 @@ impl Heard {
     }
 }
 
+/// Why a recorded verdict cannot be one: it judges each limit, and the vehicle has landed if all are kept.
+pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
+    let v1::LandingVerdict { time_s, state, limits, landed, table_2, ending: _ } = verdict;
+    let v1::PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s } = state;
+    let numbers = [time_s, x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s];
+    if numbers.into_iter().any(|number| !number.is_finite()) {
+        return Some("its time and its state are not all numbers".to_owned());
+    }
+    if limits.is_empty() {
+        return Some("it has no limits".to_owned());
+    }
+    let wrong = limits.iter().chain(table_2).find(|limit| {
+        let v1::LimitResult { value, minimum, maximum, passed, .. } = limit;
+        // What breaks at a limit may be outside in the moment it reaches it.
+        let inside =
+            if *passed { minimum <= value && value <= maximum } else { minimum < value && value < maximum };
+        ![value, minimum, maximum].into_iter().all(|number| number.is_finite()) || inside != *passed
+    });
+    if let Some(v1::LimitResult { name, value, minimum, maximum, passed, .. }) = wrong {
+        let said = if *passed { "inside" } else { "outside" };
+        return Some(format!("{name} {value:?} is said to be {said} {minimum:?} to {maximum:?}"));
+    }
+    let kept = limits.iter().all(|limit| limit.passed);
+    (*landed != kept).then(|| {
+        let [landed, kept] =
+            [(*landed, "landed", "not landed"), (kept, "every limit was kept", "a limit was broken")]
+                .map(|(holds, yes, no)| if holds { yes } else { no });
+        format!("it says {landed}, and {kept}")
+    })
+}
+
 impl Verdicts {
     /// Notes a record, and the message of the vehicle in it ([`heard_message`]).
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {

@@ -11,7 +11,7 @@ use std::path::Path;
 use mcap::records::{Channel, Record, SchemaHeader, op};
 use protocol::log::reader::{RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk};
 
-use crate::log::LogError;
+use crate::log::{LogError, open_regular};
 
 /// Size of the type and length before every record.
 const HEAD_BYTES: usize = 9;
@@ -24,6 +24,9 @@ const OVERLAP_BYTES: usize = 64;
 /// No log has more chunks and records outside of chunks; a file of tiny records must not fill the memory.
 const GOOD_MAX: usize = 500_000;
 const LOST_MAX: usize = 10_000;
+
+/// The part of the footer that its checksum covers.
+const FOOTER_CHECKED_BYTES: usize = 16;
 
 /// What tells one chunk from another, in its own head and in the summary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,6 +76,8 @@ pub(super) struct Told {
     pub(super) chunks: Vec<(u64, u64, ChunkName)>,
     /// How many messages there were; `None` if it is not told.
     pub(super) messages: Option<u64>,
+    /// Its checksum does not fit.
+    is_changed: bool,
 }
 
 /// A file being read record by record.
@@ -87,7 +92,7 @@ impl Records {
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
         let read = |source| LogError::Read { name: name.clone(), source };
-        let file = File::open(path).map_err(read)?;
+        let file = open_regular(path).map_err(read)?;
         let size = file.metadata().map_err(read)?.len();
         let mut input = BufReader::with_capacity(1 << 16, file);
         let mut found = Vec::new();
@@ -153,6 +158,9 @@ impl Records {
                     contents.lose(at, 0, None, reason);
                 }
                 contents.told = self.told(next)?;
+                if contents.told.is_changed {
+                    contents.lose(next, 0, None, "the checksum over the summary does not fit");
+                }
                 break;
             }
             match check(opcode, &body) {
@@ -186,6 +194,7 @@ impl Records {
     /// What is told from here to the footer, or to the first record that makes no sense.
     fn told(&mut self, from_byte: u64) -> Result<Told, LogError> {
         let mut told = Told::default();
+        let mut checksum = crc32fast::Hasher::new();
         let mut at = from_byte;
         while self.begins_record(at)? {
             let Some((opcode, length)) =
@@ -211,9 +220,22 @@ impl Records {
                     told.chunks.push((index.chunk_start_offset, index.chunk_length, name));
                 }
                 Ok(Record::Statistics(statistics)) => told.messages = Some(statistics.message_count),
-                Ok(Record::Footer(_)) | Err(_) => break,
+                Ok(Record::Footer(footer)) => {
+                    checksum.update(&[opcode]);
+                    checksum.update(&length.to_le_bytes());
+                    checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
+                    // What the bits of a number were cannot be seen from it.
+                    if footer.summary_crc != 0 && footer.summary_crc != checksum.finalize() {
+                        (told.messages, told.is_changed) = (None, true);
+                    }
+                    break;
+                }
+                Err(_) => break,
                 Ok(_) => {}
             }
+            checksum.update(&[opcode]);
+            checksum.update(&length.to_le_bytes());
+            checksum.update(&body);
             at += HEAD_BYTES as u64 + length;
         }
         Ok(told)

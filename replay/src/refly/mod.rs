@@ -15,7 +15,7 @@
 
 pub mod flip;
 mod jobs;
-mod prepared;
+pub(crate) mod prepared;
 mod rerun;
 pub mod vary;
 

@@ -109,6 +109,11 @@ impl<'a> Prepared<'a> {
         })
     }
 
+    /// How the frames before the start compare with the record.
+    pub(crate) fn reached(&self) -> Reached {
+        self.reached
+    }
+
     /// The flight.
     pub fn recording(&self) -> &'a Recording {
         self.recording
@@ -156,7 +161,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Continues the flight to its end; keeps the frames if a place for them is given.
-    fn fly_on(
+    pub(crate) fn fly_on(
         &self,
         options: &ReflyOptions,
         mut kept: Option<&mut Kept>,

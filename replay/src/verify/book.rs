@@ -3,7 +3,6 @@
 //! A log of a station holds its book. A log of the vehicle holds the ends of books that stations sent: whoever changes a
 //! station's log cannot change those.
 
-use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::{Path, PathBuf};
 
@@ -19,6 +18,7 @@ use protocol::log::v1::{BookEntry, BookHead};
 use serde::Serialize;
 
 use crate::cli::{Outcome, answer};
+use crate::log::open_regular;
 use crate::print::{print_json, shown};
 
 /// A head as a station shows it at the end: the number of entries, and the beginning of the hash.
@@ -203,7 +203,7 @@ pub struct Contents {
 /// The file cannot be read, or is no log.
 pub fn read(path: &Path) -> Result<Contents, ReadError> {
     let failed = |source| ReadError::Read { path: path.to_owned(), source };
-    let mut reader = LogReader::new(BufReader::new(File::open(path).map_err(failed)?));
+    let mut reader = LogReader::new(BufReader::new(open_regular(path).map_err(failed)?));
     let mut contents = Contents { name: path.display().to_string(), ..Contents::default() };
     while let Some(item) = reader.next_item().map_err(failed)? {
         if let LogItem::Message { channel_id, data, .. } = item

@@ -8,7 +8,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use serde::{Serialize, Serializer};
 
 use crate::controller::phase_name;
-use crate::log::{LoggedFrame, frame_descriptor};
+use crate::log::{LoggedFrame, frame_descriptor, misread_frame};
 
 /// A field in which a recorded and a recomputed frame differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -169,6 +169,9 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
     }
 }
 
+/// The path of the digest of a computer's memory.
+const DIGEST: &str = "state_digest";
+
 /// Most differing fields that are kept of the first diverged frame.
 const FIELDS_KEPT: usize = 32;
 
@@ -195,6 +198,9 @@ pub(super) struct Tally {
     /// Of these, in flight.
     pub(super) in_flight: u64,
     pub(super) different: u64,
+    /// Of these, with another output or another digest.
+    pub(super) outputs_different: u64,
+    pub(super) digests_different: u64,
     pub(super) fields_different: u64,
     /// Number and vehicle time, s, of the first and of the last frame.
     pub(super) first: Option<(u64, f64)>,
@@ -207,21 +213,33 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Compares a recorded frame, and the bytes of its record, with the recomputed one.
-    pub(super) fn compare(&mut self, logged: &LoggedFrame, data: &[u8], again: &ComputerFrame) {
+    ///
+    /// # Errors
+    /// The record cannot be understood exactly.
+    pub(super) fn compare(
+        &mut self,
+        logged: &LoggedFrame,
+        data: &[u8],
+        again: &ComputerFrame,
+    ) -> Result<(), String> {
         let recorded = &logged.record;
         encode_into(again, &mut self.recomputed);
+        let same = self.recomputed == data;
+        if !same && let Some(reason) = misread_frame(data) {
+            return Err(reason);
+        }
         let (frame, boot_s) = (recorded.input.frame, recorded.input.time_s);
         self.compared += 1;
         self.in_flight += u64::from(logged.tick.is_some());
         self.first.get_or_insert((frame, boot_s));
         self.last = Some((frame, boot_s));
-        if self.recomputed == data {
-            return;
+        if same {
+            return Ok(());
         }
         // Another writer may have put the same fields into other bytes.
         encode_into(recorded, &mut self.recorded);
         if self.recorded == self.recomputed {
-            return;
+            return Ok(());
         }
         let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
         let axes = recorded.output.gimbal_rad.iter().zip(&again.output.gimbal_rad);
@@ -229,6 +247,9 @@ impl Tally {
         let fields_different = fields.len();
         let time_s = logged.flight_time_s().unwrap_or(boot_s);
         self.different += 1;
+        self.outputs_different +=
+            u64::from(fields.iter().any(|field| !field.path.starts_with("input.") && field.path != DIGEST));
+        self.digests_different += u64::from(recorded.state_digest != again.state_digest);
         self.fields_different += fields_different as u64;
         let worst_ulps = fields.iter().filter_map(|field| field.ulps).max();
         self.growth.note(GrowthStep { frame, time_s, fields_different, gimbal_rad, worst_ulps });
@@ -237,12 +258,13 @@ impl Tally {
             let (tick, phase) = (logged.tick, phase_name(&again.output));
             self.divergence = Some(Divergence { frame, tick, time_s, phase, fields_different, fields });
         }
+        Ok(())
     }
 }
 
-fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
+/// Into a buffer that is used again, and so has its room already.
+pub(super) fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
     bytes.clear();
-    bytes.reserve(record.encoded_len());
     record.encode_raw(bytes);
 }
 

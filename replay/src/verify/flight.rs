@@ -3,16 +3,20 @@
 use std::io::Read;
 use std::path::Path;
 
+use flight_log::estimate::thought_to_log;
 use protocol::log::computer_v1::ComputerStart;
-use protocol::log::record::SCHEMA_VERSION;
+use protocol::log::record::{TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRUTH_SAMPLE};
 use serde::Serialize;
 
-use super::difference::Tally;
+use super::difference::{Tally, encode_into};
+use super::inputs::Inputs;
+use super::parts::Part;
 use super::{FileFacts, Obstacle, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::info::VerdictFacts;
 use crate::log::{
-    Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, summary_of,
+    Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, misread_frame,
+    summary_of,
 };
 use crate::refly::{ReflyOptions, StartAt, refly};
 
@@ -23,9 +27,13 @@ pub(super) struct FlightVerifier {
     from_power_up: bool,
     /// The log has the power-up.
     has_power_up: bool,
-    digests_compared: bool,
+    /// The computer remembers what the recorded one did.
+    remembers: bool,
     order: FrameOrder,
     tally: Tally,
+    inputs: Inputs,
+    awaited: Awaited,
+    parts: Parts,
     /// Frames read.
     frames: u64,
     flies: bool,
@@ -36,6 +44,25 @@ pub(super) struct FlightVerifier {
     unreadable: Option<String>,
 }
 
+/// What must follow the last frame, as bytes; empty if nothing must.
+#[derive(Default)]
+struct Awaited {
+    thought: Vec<u8>,
+    release: Vec<u8>,
+}
+
+/// What was compared beside the frames.
+struct Parts {
+    inputs: Part,
+    digests: u64,
+    thoughts: Part,
+    starts: Part,
+    verdicts: u64,
+    truth: u64,
+    events: u64,
+    timing: u64,
+}
+
 impl FlightVerifier {
     /// A flight before its first record. `behind_another`: another flight comes before it in the log. `unreadable`: why
     /// a record that may have been its beginning could not be read.
@@ -44,9 +71,21 @@ impl FlightVerifier {
             computer: None,
             from_power_up: false,
             has_power_up: false,
-            digests_compared: true,
+            remembers: true,
             order: if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() },
             tally: Tally::default(),
+            inputs: Inputs::default(),
+            awaited: Awaited::default(),
+            parts: Parts {
+                inputs: Part::of("inputs", 0),
+                digests: 0,
+                thoughts: Part::of("estimates", 0),
+                starts: Part::of("starts", 0),
+                verdicts: 0,
+                truth: 0,
+                events: 0,
+                timing: 0,
+            },
             frames: 0,
             flies: false,
             obstacle: None,
@@ -63,12 +102,19 @@ impl FlightVerifier {
         whole_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
         match stamped.entry {
-            Entry::ComputerStart(start) => self.start(&start, log, whole_head)?,
+            Entry::ComputerStart(start) => self.start(&start, &stamped.data, log, whole_head)?,
             Entry::ComputerFrame(frame) => self.check(&frame, &stamped.data, stamped.sequence),
+            Entry::Verdict(_) => self.parts.verdicts += 1,
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
-            _ => {}
+            _ => match log.channel(stamped.channel_id).map(|channel| channel.topic.as_str()) {
+                Some(TOPIC_ESTIMATE) => self.thought(&stamped.data),
+                Some(TOPIC_TRUTH_SAMPLE) => self.parts.truth += 1,
+                Some(TOPIC_EVENTS) => self.parts.events += 1,
+                Some(TOPIC_PILOT_TIMING) => self.parts.timing += 1,
+                _ => {}
+            },
         }
         Ok(())
     }
@@ -78,11 +124,18 @@ impl FlightVerifier {
     fn start<R: Read>(
         &mut self,
         start: &ComputerStart,
+        data: &[u8],
         log: &FlightLog<R>,
         whole_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
+        let starts = &mut self.parts.starts;
+        starts.recorded += u64::from(self.awaited.release.is_empty());
         let runs = self.computer.is_some() && self.obstacle.is_none();
         if start.released && (runs || self.flies) {
+            if runs {
+                starts.compare(self.awaited.release == data);
+            }
+            self.awaited.release.clear();
             return Ok(());
         }
         let toml = match text_of(log, whole_head)? {
@@ -94,13 +147,14 @@ impl FlightVerifier {
         };
         match LoggedComputer::recorded(&toml, start, &log.head().run, &[]) {
             Ok(computer) => {
-                let same_schema = log.head().schema_version() == SCHEMA_VERSION;
-                self.digests_compared = same_schema && (!start.released || self.frames == 0);
-                self.computer =
-                    Some(if self.digests_compared { computer } else { computer.without_digests() });
+                // What it begins from decides what it does.
+                starts.compared += 1;
+                self.remembers = !start.released || (self.frames == 0 && start.frame == 0);
+                self.computer = Some(if self.remembers { computer } else { computer.without_digests() });
                 self.from_power_up = !start.released;
                 self.has_power_up |= self.from_power_up;
                 self.on_the_pad = self.obstacle.take();
+                self.awaited.release.clear();
             }
             Err(error) => self.obstacle = Some(Obstacle::ProfileUnreadable { reason: error.to_string() }),
         }
@@ -111,29 +165,72 @@ impl FlightVerifier {
     fn check(&mut self, frame: &LoggedFrame, data: &[u8], sequence: u32) {
         self.frames += 1;
         self.flies |= frame.tick.is_some();
-        let lost = self.order.note(frame.record.input.frame, sequence);
+        let number = frame.record.input.frame;
+        let impossible = self.inputs.judge(&frame.record.input, frame.tick.is_some());
+        // What a missing field was filled with says nothing.
+        let impossible = impossible.filter(|_| misread_frame(data).is_none());
+        self.parts.inputs.recorded += 1;
+        self.parts.inputs.compare(impossible.is_none());
+        if let Some(reason) = impossible {
+            self.parts.inputs.why.get_or_insert_with(|| format!("frame {number}: {reason}"));
+        }
+        let lost = self.order.note(number, sequence);
         // A computer that begins at its release can be run again behind a loss on the pad.
         let begins = !self.from_power_up && frame.tick == Some(1);
+        self.awaited.thought.clear();
         if self.obstacle.is_some() {
             return;
         }
         let obstacle = match (lost.filter(|_| !begins), &mut self.computer) {
-            (_, None) => Some(Obstacle::NoStart),
+            (_, None) => Some(match misread_frame(data) {
+                Some(reason) => Obstacle::Unreadable { reason },
+                None => Obstacle::NoStart,
+            }),
             (Some(Gap { after: 0, before }), _) => Some(Obstacle::BeginningMissing { first: before }),
             (Some(Gap { after, before }), _) => Some(Obstacle::Gap { after, before }),
             (None, Some(computer)) => match computer.run_again(&frame.record) {
                 Ok(again) => {
-                    self.tally.compare(frame, data, &again);
+                    if let Err(reason) = self.tally.compare(frame, data, &again) {
+                        self.obstacle = Some(Obstacle::Unreadable { reason });
+                        return;
+                    }
+                    self.parts.digests += u64::from(self.remembers);
+                    if again.output.released {
+                        self.parts.starts.recorded += 1;
+                        encode_into(&computer.as_start(), &mut self.awaited.release);
+                    }
+                    if frame.tick.is_some()
+                        && let Some(thought) = thought_to_log(computer.pilot())
+                    {
+                        self.parts.thoughts.recorded += 1;
+                        encode_into(&thought, &mut self.awaited.thought);
+                    }
                     None
                 }
-                Err(error) => Some(Obstacle::Frame(error)),
+                Err(error) => Some(match misread_frame(data) {
+                    Some(reason) => Obstacle::Unreadable { reason },
+                    None => Obstacle::Frame(error),
+                }),
             },
         };
         self.obstacle = obstacle;
     }
 
+    /// Compares what the pilot thought after the last frame.
+    fn thought(&mut self, data: &[u8]) {
+        let awaited = &mut self.awaited.thought;
+        if awaited.is_empty() {
+            // It belongs to a frame that was not run again, or is there twice.
+            self.parts.thoughts.recorded += 1;
+        } else {
+            self.parts.thoughts.compare(awaited == data);
+            awaited.clear();
+        }
+    }
+
     pub(super) fn into_report(self, facts: FileFacts) -> VerifyReport {
         let compared = self.tally.compared;
+        let parts = self.parts(&facts);
         let obstacle = match (self.obstacle.or(self.on_the_pad), self.unreadable) {
             // An unreadable frame leaves a gap; the reason why it is unreadable says more than the gap.
             (None | Some(Obstacle::Gap { .. } | Obstacle::BeginningMissing { .. }), Some(reason)) => {
@@ -144,8 +241,46 @@ impl FlightVerifier {
             (None, None) if compared == 0 => Some(Obstacle::NoTicks),
             (obstacle, _) => obstacle,
         };
-        let how = (self.has_power_up, self.digests_compared);
-        VerifyReport::new(facts, (self.frames, self.tally), how, obstacle)
+        let obstacle = match (obstacle, &facts.schema) {
+            (obstacle @ Some(Obstacle::Unreadable { .. } | Obstacle::NoTicks), _) | (obstacle, None) => {
+                obstacle
+            }
+            (_, Some(found)) => Some(Obstacle::Schema { found: found.clone() }),
+        };
+        VerifyReport::new(facts, (self.frames, self.tally), self.has_power_up, parts, obstacle)
+    }
+
+    fn parts(&self, facts: &FileFacts) -> Vec<Part> {
+        let Self { frames, tally, parts, .. } = self;
+        let part = |name, compared, different| Part { compared, different, ..Part::of(name, *frames) };
+        let digests = part("digests", parts.digests, tally.digests_different);
+        let remembers_less =
+            "a computer that is run again from its release on does not remember what was before";
+        let thoughts = &parts.thoughts;
+        let missing = thoughts.recorded.saturating_sub(thoughts.compared);
+        let why =
+            (missing > 0).then(|| format!("{missing} are missing, or belong to no frame that was run again"));
+        let alone = || "only --strict flies the flight again".to_owned();
+        let flown = self.computer.as_ref().map(|computer| &computer.pilot().mission().name);
+        let other = facts.profile.as_ref().zip(flown).filter(|(said, flown)| said != flown);
+        let metadata = match other {
+            Some((said, flown)) => Part { different: 1, ..Part::of("metadata", 1) }
+                .because(format!("its run facts name the profile {said}, and it is {flown}")),
+            None => Part::of("metadata", 1).because(alone()),
+        };
+        vec![
+            parts.inputs.clone(),
+            part("frames", tally.compared, tally.different),
+            part("outputs", tally.compared, tally.outputs_different),
+            if self.remembers { digests } else { digests.because(remembers_less) },
+            Part { why, ..thoughts.clone() },
+            parts.starts.clone(),
+            Part::of("verdict", parts.verdicts).because(alone()),
+            metadata,
+            Part::beside("truth", parts.truth),
+            Part::beside("events", parts.events),
+            Part::beside("timing", parts.timing),
+        ]
     }
 }
 

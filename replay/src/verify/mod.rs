@@ -1,7 +1,10 @@
 //! Checks whether the controller makes the recorded decisions again, bit for bit.
 //!
 //! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded input. It compares every
-//! field of the output, and the digest of the memory, with the record. Measured times are not compared.
+//! field of the output, the digest of the memory, what the pilot thought, and the computer at its release with the record.
+//! The inputs themselves are judged: some cannot be. [`verify_strictly`] also flies a simulated flight again, closed loop,
+//! and compares its measurements and its verdict. The answer lists what was compared and what was not; truth, events and
+//! measured times are not.
 //!
 //! A vehicle's log has every frame from power-up on, so self-test, arming, countdown, gate and abort are compared as well. A
 //! frame in flight is a *tick* and counts from the release; a log of a flight that begins there has only ticks, and the
@@ -16,10 +19,13 @@
 //! For a divergence, the report says how it grows from tick to tick. If a whole file is verified, it also says whether
 //! the landing would end differently: only for this, the flight is simulated from the first tick that differs.
 
+mod again;
 pub mod book;
 mod difference;
 pub mod explain;
 mod flight;
+mod inputs;
+mod parts;
 pub mod season;
 
 use std::io::{self, Read, Write};
@@ -33,8 +39,10 @@ use difference::Tally;
 pub use difference::{
     Divergence, FieldDifference, FieldValue, Growth, GrowthStep, differences, ulp_distance,
 };
+pub use parts::Part;
+use parts::print_parts;
 use protocol::log::reader::Damage;
-use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
+use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
@@ -74,6 +82,33 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     Ok(reports)
 }
 
+/// Verifies a log file, and flies a simulated flight again. That takes the time of another flight.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
+    let mut reports = verify(path)?;
+    let [report] = reports.as_mut_slice() else {
+        let why = "a file with several flights is not flown again";
+        for report in &mut reports {
+            report.explain_what_is_left(why);
+        }
+        return Ok(reports);
+    };
+    if report.outcome != Verification::Identical {
+        report.explain_what_is_left("what differs or is not whole is not flown again");
+        return Ok(reports);
+    }
+    let count = |name: &str| report.part(name).map_or(0, |part| part.recorded);
+    let simulated = count("truth") > 0;
+    let [mut verdict, mut facts] = ONLY_STRICTLY.map(|name| Part::of(name, count(name)));
+    again::compare(path, simulated, &mut verdict, &mut facts);
+    for part in [verdict, facts] {
+        report.replace(part);
+    }
+    Ok(reports)
+}
+
 /// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first tick comes before
 /// its profile.
 ///
@@ -88,7 +123,7 @@ pub fn verify_log<R: Read>(
     // An unreadable record before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
-        if flights.note(&stamped.entry) {
+        if flights.note(&stamped) {
             computers.push(FlightVerifier::new(!computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
@@ -109,8 +144,17 @@ pub fn verify_log<R: Read>(
         let cut = flights.found().get(place).and_then(LoggedFlight::cut);
         // Damage ends the reading, so it belongs to the last flight.
         let damage = log.damage().filter(|_| place + 1 == of).map(ToString::to_string);
-        let facts =
-            FileFacts { file: log.name().to_owned(), flight, cut, damage, build: log.head().compare_build() };
+        let head = log.head();
+        let facts = FileFacts {
+            file: log.name().to_owned(),
+            flight,
+            cut,
+            damage,
+            counted: log.is_counted(),
+            build: head.compare_build(),
+            schema: (!head.is_of_this_schema()).then(|| head.schema_version().unwrap_or("none").to_owned()),
+            profile: head.run.get("profile").cloned(),
+        };
         reports.push(computer.into_report(facts));
     }
     Ok(reports)
@@ -120,12 +164,14 @@ pub fn verify_log<R: Read>(
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verification {
-    /// The flight is whole, has ticks, and every tick is identical.
+    /// The flight is whole, has ticks, and all that was compared is identical.
     Identical,
-    /// The log is damaged or ends before its flight did, and every tick that could be read is identical.
+    /// The log is damaged, ends before its flight did or lacks a part, and what could be compared is identical.
     IdenticalReadablePart,
-    /// Some tick differs.
+    /// Something differs.
     Diverged,
+    /// Nothing differs, and an input cannot be.
+    Impossible,
     /// Some tick could not be re-executed, and all others are identical.
     NotReplayable,
 }
@@ -174,6 +220,12 @@ pub enum Obstacle {
     /// There are frames of a flight computer, and no record of what it was built from.
     #[error("it has frames of the flight computer and no record /computer/start before them to begin from")]
     NoStart,
+    /// The log's contents are of another version.
+    #[error("it says that its contents have version {found}; this build reads {SCHEMA_VERSION}")]
+    Schema {
+        /// What the log says.
+        found: String,
+    },
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
     Frame(#[from] FrameError),
@@ -201,7 +253,13 @@ pub(super) struct FileFacts {
     pub(super) flight: Option<FlightPlace>,
     pub(super) cut: Option<Cut>,
     pub(super) damage: Option<String>,
+    /// The log says how many records it has.
+    pub(super) counted: bool,
     pub(super) build: BuildComparison,
+    /// The version of its contents, if this build does not read it.
+    pub(super) schema: Option<String>,
+    /// The profile that its run facts name.
+    pub(super) profile: Option<String>,
 }
 
 /// The report on one flight.
@@ -215,8 +273,10 @@ pub struct VerifyReport {
     pub outcome: Verification,
     /// Whether the frames begin at power-up, and not at the release.
     pub from_power_up: bool,
-    /// Whether digests of the computer's memory were compared as well. Digests of another schema are not compared.
-    pub digests_compared: bool,
+    /// What was compared, and what was not.
+    pub parts: Vec<Part>,
+    /// The log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    pub counted: bool,
     /// Frames that could be read.
     pub frames_recorded: u64,
     /// Frames that were re-executed and compared.
@@ -254,27 +314,20 @@ impl VerifyReport {
     fn new(
         facts: FileFacts,
         (frames_recorded, counts): (u64, Tally),
-        (from_power_up, digests_compared): (bool, bool),
+        from_power_up: bool,
+        parts: Vec<Part>,
         obstacle: Option<Obstacle>,
     ) -> Self {
         let (first_divergence, growth) = (counts.divergence, counts.growth);
-        let FileFacts { file, flight, cut, damage, build } = facts;
-        let outcome = if first_divergence.is_some() {
-            Verification::Diverged
-        } else if obstacle.is_some() {
-            Verification::NotReplayable
-        } else if damage.is_some() || cut.is_some() {
-            Verification::IdenticalReadablePart
-        } else {
-            Verification::Identical
-        };
+        let FileFacts { file, flight, cut, damage, counted, build, schema: _, profile: _ } = facts;
         let (first, last) = (counts.first, counts.last);
-        Self {
+        let mut report = Self {
             file,
             flight,
-            outcome,
+            outcome: Verification::Identical,
             from_power_up,
-            digests_compared,
+            parts,
+            counted,
             frames_recorded,
             frames_compared: counts.compared,
             frames_identical: counts.compared - counts.different,
@@ -291,9 +344,57 @@ impl VerifyReport {
             damage,
             unread: None,
             build,
+        };
+        report.conclude();
+        report
+    }
+
+    /// A part of the record by its name.
+    pub fn part(&self, name: &str) -> Option<&Part> {
+        self.parts.iter().find(|part| part.name == name)
+    }
+
+    /// Puts a part in the place of the one with its name.
+    fn replace(&mut self, part: Part) {
+        if let Some(place) = self.parts.iter_mut().find(|known| known.name == part.name) {
+            *place = part;
+        }
+        self.conclude();
+    }
+
+    /// Says why a strict verification has not compared what only it compares.
+    fn explain_what_is_left(&mut self, why: &str) {
+        let left = |part: &&mut Part| ONLY_STRICTLY.contains(&part.name) && part.different == 0;
+        for part in self.parts.iter_mut().filter(left) {
+            part.why = Some(why.to_owned());
         }
     }
+
+    /// Whether every part that follows from the inputs was compared.
+    pub fn is_all_compared(&self) -> bool {
+        self.parts.iter().all(Part::is_whole)
+    }
+
+    fn conclude(&mut self) {
+        let different = |part: &&Part| part.different > 0;
+        let of_inputs = |part: &Part| part.name == "inputs";
+        let whole = |part: &Part| part.is_whole() || ONLY_STRICTLY.contains(&part.name);
+        self.outcome = if self.parts.iter().filter(different).any(|part| !of_inputs(part)) {
+            Verification::Diverged
+        } else if self.parts.iter().filter(different).any(of_inputs) {
+            Verification::Impossible
+        } else if self.obstacle.is_some() {
+            Verification::NotReplayable
+        } else if self.damage.is_some() || self.cut.is_some() || !self.parts.iter().all(whole) {
+            Verification::IdenticalReadablePart
+        } else {
+            Verification::Identical
+        };
+    }
 }
+
+/// Parts that only a strict verification compares.
+const ONLY_STRICTLY: [&str; 2] = ["verdict", "metadata"];
 
 /// Most fields of the first diverged frame that are shown.
 const FIELDS_SHOWN: usize = 5;
@@ -317,6 +418,15 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
                 "{name}: {frames_identical} of {frames_compared} frames identical{of}{what_is_missing}"
             )?;
         }
+        Verification::Diverged if report.first_divergence.is_none() => {
+            let different = report.parts.iter().filter(|part| part.different > 0);
+            let names: Vec<&str> = different.map(|part| part.name).collect();
+            writeln!(
+                output,
+                "{name}: DIVERGED: {frames_identical} of {frames_compared} frames are identical, and not: {}",
+                names.join(", ")
+            )?;
+        }
         Verification::Diverged => {
             let VerifyReport { frames_different, fields_different, .. } = report;
             let fields = counted(*fields_different, "field");
@@ -324,6 +434,9 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
                 output,
                 "{name}: DIVERGED: {frames_different} of {frames_compared} frames differ, in {fields}"
             )?;
+        }
+        Verification::Impossible => {
+            writeln!(output, "{name}: IMPOSSIBLE: some recorded inputs cannot be")?;
         }
         Verification::NotReplayable if *frames_compared == 0 => {
             let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
@@ -338,11 +451,11 @@ pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Resul
         print_divergence(first, output)?;
     }
     print_beginning(report, output)?;
-    if !report.digests_compared && report.frames_compared > 0 {
-        writeln!(
-            output,
-            "another release wrote it: what it remembered was not compared, what it decided was"
-        )?;
+    if *frames_compared > 0 {
+        print_parts(&report.parts, output)?;
+    }
+    if !report.counted {
+        writeln!(output, "{NOT_COUNTED}")?;
     }
     if let Some(growth) = &report.growth {
         print_growth(growth, output)?;
@@ -379,6 +492,10 @@ fn print_beginning(report: &VerifyReport, output: &mut impl Write) -> io::Result
 
 /// The remark on a log whose flight computer cannot be run again from power-up on.
 const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
+
+/// The remark on a log without a summary.
+const NOT_COUNTED: &str =
+    "the log has no summary that counts its records: whether the last of them are missing cannot be known";
 
 /// The file and, if it holds several flights, the flight's number.
 fn name_of(report: &VerifyReport) -> String {
@@ -485,11 +602,14 @@ pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
     let details = String::from_utf8_lossy(&text).into_owned();
     let message = details.lines().next().unwrap_or_default().to_owned();
     let outcome = match report.outcome {
+        Verification::Identical if strict && !report.is_all_compared() => {
+            JunitOutcome::Failed { message, details }
+        }
         Verification::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
         Verification::Identical | Verification::IdenticalReadablePart => {
             JunitOutcome::Passed { said: details }
         }
-        Verification::Diverged => JunitOutcome::Failed { message, details },
+        Verification::Diverged | Verification::Impossible => JunitOutcome::Failed { message, details },
         Verification::NotReplayable => JunitOutcome::Error { message: details },
     };
     JunitCase { name: format!("verify {}", name_of(report)), outcome }
@@ -506,15 +626,12 @@ pub(crate) struct Args {
     /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
     junit: Option<PathBuf>,
-    /// Exit code 1 unless the whole of each flight was compared: damaged logs fail, and logs that end before their
-    /// flight did.
+    /// Exit code 1 unless all that can be compared was: damaged logs fail, logs that end before their flight did, and
+    /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
     #[arg(
         long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
     )]
     strict: Option<bool>,
-    /// Replace an existing JUnit file.
-    #[arg(long)]
-    force: bool,
     /// Solve this tick of the only log again.
     #[arg(long, value_name = "TICK", conflicts_with_all = ["junit", "strict"])]
     explain: Option<u64>,
@@ -538,7 +655,7 @@ impl Args {
         }
         let to_stdout = |path: &Path| path.as_os_str() == "-";
         let junit = self.junit.as_deref().filter(|path| !to_stdout(path));
-        let junit = junit.map(|path| print::junit_file(path, self.force)).transpose()?;
+        let junit = junit.map(print::junit_file).transpose()?;
         let kind = match &self.junit {
             Some(path) if to_stdout(path) => Printed::Junit,
             _ if self.json => Printed::Json,
@@ -556,11 +673,12 @@ impl Args {
         for file in &self.files {
             if file.is_dir() { files.extend(season::logs_of(file)?) } else { files.push(file.clone()) }
         }
+        let strict = self.strict.unwrap_or(self.junit.is_some());
         let mut answers: Vec<Verified> = Vec::new();
         for file in &files {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            let verified = verify(file);
+            let verified = if strict { verify_strictly(file) } else { verify(file) };
             let took = started.elapsed();
             match &verified {
                 Ok(reports) => {
@@ -582,7 +700,6 @@ impl Args {
         {
             return Err(error.into());
         }
-        let strict = self.strict.unwrap_or(self.junit.is_some());
         let cases = || answers.iter().flat_map(|verified| cases(verified, strict)).collect();
         if let Some(file) = junit {
             print::write_junit("verify", cases(), file)?;
@@ -595,7 +712,12 @@ impl Args {
             (Printed::Json, reports) => print_json(&reports, output),
             (Printed::Text, reports) => reports.iter().try_for_each(|report| print_verify(report, output)),
         })?;
-        Ok(Outcome::Verified { outcome: worst(&answers), strict })
+        let all_compared = reports.iter().all(|report| report.is_all_compared());
+        let outcome = match worst(&answers) {
+            Verification::Identical if strict && !all_compared => Verification::IdenticalReadablePart,
+            worst => worst,
+        };
+        Ok(Outcome::Verified { outcome, strict })
     }
 }
 
@@ -623,7 +745,8 @@ fn worst(answers: &[Verified]) -> Verification {
         Verification::Identical => 0,
         Verification::IdenticalReadablePart => 1,
         Verification::NotReplayable => 2,
-        Verification::Diverged => 3,
+        Verification::Impossible => 3,
+        Verification::Diverged => 4,
     };
     let outcomes = answers.iter().flat_map(|(_, verified)| match verified {
         Ok(reports) => reports.iter().map(|report| report.outcome).collect(),

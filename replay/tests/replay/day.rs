@@ -77,6 +77,30 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     );
 }
 
+/// Eleven crashes speak against any rate that a club wants, whatever is simulated; and one log is one flight.
+#[test]
+fn flights_that_did_not_land_are_no_go_and_one_log_counts_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("fits.json");
+    fits(&path, &[1.0; 11]);
+    let mut all: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    for fit in all["fits"].as_array_mut().unwrap() {
+        fit["landed"] = false.into();
+    }
+    std::fs::write(&path, all.to_string()).unwrap();
+    let asked = [path.to_str().unwrap(), "--mission", "mk2", "--prior", "field", "--limit", "0.5"];
+    let (code, stdout, stderr) = learn(&asked);
+    assert!(code == 1 && stdout.contains("flown     0 of 11 landed"), "{stdout}{stderr}");
+    assert!(stdout.contains("NO-GO"), "{stdout}");
+
+    let log = LANDED.log.to_str().unwrap();
+    let again = directory.path().join("again.mcap");
+    std::fs::copy(log, &again).unwrap();
+    let (_, stdout, stderr) = learn(&[log, again.to_str().unwrap(), log]);
+    assert!(stdout.contains("flown     1 of 1 landed") && stdout.contains("after 1 fit,"), "{stdout}");
+    assert_eq!(stderr.matches("is the same as").count(), 2, "{stderr}");
+}
+
 #[test]
 fn what_cannot_be_learnt_is_refused_with_the_reason() {
     let directory = tempfile::tempdir().unwrap();

@@ -28,6 +28,8 @@ pub(crate) struct Flight {
     pub(crate) start: ComputerStart,
     pub(crate) ticks: Vec<ComputerFrame>,
     pub(crate) verdict: v1::LandingVerdict,
+    /// What the pilot thought after each frame.
+    thoughts: Vec<Record>,
     header: LogHeader,
 }
 
@@ -36,10 +38,12 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
     let start = sortie::start(&flight);
-    let (mut ticks, mut last) = (Vec::new(), LastFrame::default());
+    let (mut ticks, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
     while ticks.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
         ticks.push(*last.take().unwrap());
+        let beside = sortie::thought_and_truth(&flight).into_iter();
+        thoughts.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
     }
     let limit = |name: &str| v1::LimitResult {
         name: name.to_owned(),
@@ -57,7 +61,7 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
             .into(),
         ..v1::LandingVerdict::default()
     };
-    Flight { start, ticks, verdict, header: campaign_header(&recipe, NUMBER) }
+    Flight { start, ticks, verdict, thoughts, header: campaign_header(&recipe, NUMBER) }
 });
 
 /// The mission of the flight.
@@ -95,13 +99,17 @@ pub(crate) fn write_log(ticks: &[ComputerFrame], recipe: &Recipe) -> Written {
         writer.write(&Record::ComputerStart(Box::new(FLIGHT.start)), 0).unwrap();
     }
     for (index, tick) in ticks.iter().enumerate() {
-        let time_ns = index as u64 * FRAME_NS;
+        let time_ns = (index as u64 + 1) * FRAME_NS;
         if recipe.with_frames {
             for record in around(tick) {
                 writer.write(&record, time_ns).unwrap();
             }
         }
         writer.write(&Record::ComputerFrame(Box::new(tick.clone())), time_ns).unwrap();
+        let place = usize::try_from(tick.input.frame).ok().and_then(|number| number.checked_sub(1));
+        if let Some(thought) = place.and_then(|place| FLIGHT.thoughts.get(place)) {
+            writer.write(thought, time_ns).unwrap();
+        }
         if index % 5 == 4 {
             writer.flush().unwrap();
             synced.push((size(&file), index + 1));

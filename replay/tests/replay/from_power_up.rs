@@ -28,7 +28,7 @@ const STATION: Station = Station { system: 255, component: 190, number: 1 };
 
 /// The inputs from the crew in one frame.
 #[derive(Debug, Clone)]
-struct Reached {
+pub(crate) struct Reached {
     frame: u64,
     request: Option<Request>,
     uplink: Uplink,
@@ -69,7 +69,7 @@ fn two_people(taps: u64) -> Vec<Reached> {
 }
 
 /// A crew that arms, starts, and does nothing else.
-fn armed_and_started(at: u64) -> Vec<Reached> {
+pub(crate) fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
 }
 
@@ -82,7 +82,7 @@ fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
 }
 
 /// A flight with its log.
-struct Flown {
+pub(crate) struct Flown {
     folder: TempDir,
     records: Vec<(Record, u64)>,
     header: LogHeader,
@@ -100,7 +100,7 @@ impl Flown {
         Self::from(StartPoint::Apogee, crew, faults)
     }
 
-    fn from(start: StartPoint, crew: &[Reached], faults: &[&str]) -> Self {
+    pub(crate) fn from(start: StartPoint, crew: &[Reached], faults: &[&str]) -> Self {
         let (vehicle, header) = vehicle(start, faults);
         Self::fly(vehicle, header, crew)
     }
@@ -132,6 +132,11 @@ impl Flown {
             }
         }
         panic!("the flight has not ended: {:?}", vehicle.phase());
+    }
+
+    /// Its log, whole.
+    pub(crate) fn log(&self) -> PathBuf {
+        self.written(self.records.iter().cloned())
     }
 
     /// Records a frame as the run loop does.

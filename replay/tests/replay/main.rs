@@ -40,6 +40,7 @@ mod resumed_sweep;
 mod season;
 mod simulated;
 mod solve_times;
+mod strict;
 mod tables;
 mod tampered;
 mod what_if;

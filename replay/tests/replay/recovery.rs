@@ -55,6 +55,35 @@ fn a_cut_log_recovers_what_was_synced() {
     }
 }
 
+/// Its own end says nothing about what the damaged log has lost.
+#[test]
+fn a_recovered_log_does_not_say_how_little_is_lost() {
+    let directory = tempfile::tempdir().unwrap();
+    let (recovery, _) = recovered(&WHOLE.bytes[..WHOLE.bytes.len() / 2], directory.path()).unwrap();
+    assert!(!recovery.was_whole());
+    let found = info(&directory.path().join("out.mcap")).unwrap().completeness;
+    assert_eq!((found.complete, found.missing_s), (false, None));
+    let (code, stdout, _) = run(&mut replay("info", &directory.path().join("out.mcap")));
+    assert!(code == 0 && !stdout.contains("0.000 s after that"), "{stdout}");
+}
+
+/// A number in the summary is believed only under the summary's checksum.
+#[test]
+fn a_changed_summary_does_not_count_what_is_lost() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut bytes = WHOLE.bytes.clone();
+    let mut at = usize::try_from(WHOLE.synced.last().unwrap().0).unwrap();
+    while bytes[at] != mcap::records::op::STATISTICS {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(length).unwrap();
+    }
+    // Another sixteen million messages.
+    bytes[at + 9 + 3] ^= 1;
+    let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
+    assert_eq!((recovery.messages_lost, recovery.was_whole()), (None, false));
+    assert!(recovery.lost[0].reason.contains("summary"), "{recovery:?}");
+}
+
 /// One broken chunk loses only itself, and its position is reported.
 #[test]
 fn chunks_after_a_broken_chunk_are_kept() {
@@ -68,9 +97,8 @@ fn chunks_after_a_broken_chunk_are_kept() {
     assert_eq!(again.frames_unbroken, before);
     assert_eq!(recovery.lost.len(), 1);
     let (from_s, until_s) = recovery.lost[0].span_s.unwrap();
-    assert!(
-        (from_s - before as f64 * FRAME_S).abs() < 1e-6 && (until_s - from_s - 4.0 * FRAME_S).abs() < 1e-6
-    );
+    let first_s = (before + 1) as f64 * FRAME_S;
+    assert!((from_s - first_s).abs() < 1e-6 && (until_s - from_s - 4.0 * FRAME_S).abs() < 1e-6);
 }
 
 /// The length of a record is broken: the next chunk is found by what it looks like.

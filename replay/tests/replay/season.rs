@@ -122,8 +122,39 @@ fn a_gate_overwrites_nothing() {
         assert!(code == 2 && stderr.contains(&file.display().to_string()), "{option}: {stdout}{stderr}");
         assert!(!season.baseline().exists() && std::fs::read(file).unwrap() == before, "{option}");
     }
-    let (code, _, stderr) = season.gate(&["--accept", "--force", &format!("--junit={}", baseline.display())]);
-    assert!(code == 0 && std::fs::read_to_string(&baseline).unwrap().contains("<testsuite"), "{stderr}");
+}
+
+#[test]
+fn a_renamed_flight_passes_and_a_copy_is_told() {
+    let season = Season::new();
+    assert_eq!(season.gate(&["--accept"]).0, 0);
+    let named = |name: &str| season.logs().join(name);
+    std::fs::rename(named("week-1/nominal.mcap"), named("week-2/z.mcap")).unwrap();
+    std::fs::copy(named("week-2/mk2.mcap"), named("week-1/a.mcap")).unwrap();
+    let (code, stdout, _) = season.gate(&[]);
+    assert!(code == 0 && stdout.ends_with("PASSED: 4 flights: 3 same, 1 copy\n"), "{stdout}");
+    assert!(row(&stdout, "week-1/a.mcap").contains("copy"), "{stdout}");
+}
+
+#[test]
+fn a_damaged_log_is_not_accepted_and_never_passes() {
+    let season = Season::new();
+    let log = season.logs().join("week-1/nominal.mcap");
+    let mut bytes = std::fs::read(&log).unwrap();
+    bytes.truncate(bytes.len() * 2 / 3);
+    std::fs::write(&log, bytes).unwrap();
+    let (code, stdout, stderr) = season.gate(&["--accept"]);
+    assert!(code == 2 && stderr.contains("nothing is accepted: week-1/nominal.mcap"), "{stdout}{stderr}");
+    assert!(!season.baseline().exists());
+    let nothing = r#"{"format": 1, "build": {}, "flights": {}}"#;
+    std::fs::write(season.baseline(), nothing).unwrap();
+    assert_eq!(season.gate(&[]).0, 1);
+}
+
+#[test]
+fn an_option_of_the_gate_without_a_baseline_is_an_error() {
+    let (code, _, stderr) = run(crate::command_line::replay("verify", &MK2.log).args(["--tolerance", "0.1"]));
+    assert!(code == 2 && stderr.contains("--baseline"), "{stderr}");
 }
 
 /// Counts the cases and the failures of a JUnit file.
@@ -278,5 +309,5 @@ fn another_flight_under_the_name_of_a_crash_is_not_that_crash_landing() {
     std::fs::copy(&DISPERSED.log, season.logs().join("week-1/nominal.mcap")).unwrap();
     let (code, table, _) = season.gate(&[]);
     assert_eq!(code, 1, "{table}");
-    assert!(table.contains("MISSING") && table.contains("new") && !table.contains("FLIPPED"), "{table}");
+    assert!(table.contains("MISSING") && table.contains("copy") && !table.contains("FLIPPED"), "{table}");
 }

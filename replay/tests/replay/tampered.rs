@@ -81,6 +81,25 @@ impl Held {
         self.messages.extend(other.messages.iter().map(|message| message.at(message.log_time_ns + later_ns)));
     }
 
+    /// Gives the messages of each topic the numbers that a writer of just these would.
+    pub(crate) fn renumber(&mut self) {
+        let mut next: BTreeMap<String, u32> = BTreeMap::new();
+        for message in &mut self.messages {
+            let number = next.entry(message.topic.clone()).or_default();
+            message.sequence = *number;
+            *number += 1;
+        }
+    }
+
+    /// The entries of a metadata record.
+    pub(crate) fn metadata(&mut self, wanted: &str) -> &mut BTreeMap<String, String> {
+        let found = self.about.iter_mut().find_map(|item| match item {
+            LogItem::Metadata { name, entries } if name == wanted => Some(entries),
+            _ => None,
+        });
+        found.unwrap()
+    }
+
     /// Writes it as a whole log.
     pub(crate) fn write(&self, path: &Path) {
         let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());

@@ -103,7 +103,10 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
             written(&both, &directory, name)
         };
         let path = both(&b, "both.mcap");
+        // Strictly, each flight would have to be flown again from facts of its own.
         let (code, stdout, _) = verify(&path, &["--strict"]);
+        assert!(code == 1 && stdout.contains("a file with several flights is not flown again"), "{stdout}");
+        let (code, stdout, _) = verify(&path, &[]);
         assert_eq!(code, 0, "{stdout}");
         assert!(
             stdout.contains(&format!("flight 1 of 2: {count_a} of {count_a} frames identical")),

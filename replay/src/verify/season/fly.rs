@@ -50,7 +50,9 @@ fn log(path: &Path) -> FlightResult {
         Ok(reports) => {
             let all = |wanted: Verification| reports.iter().all(|report| report.outcome == wanted);
             let obstacle = reports.iter().find_map(|report| {
-                report.obstacle.as_ref().map(ToString::to_string).or_else(|| report.damage.clone())
+                let cut = || report.cut.as_ref().map(ToString::to_string);
+                let obstacle = report.obstacle.as_ref().map(ToString::to_string);
+                obstacle.or_else(|| report.damage.clone()).or_else(cut)
             });
             match () {
                 () if reports.iter().any(|report| report.outcome == Verification::Diverged) => {
@@ -59,6 +61,10 @@ fn log(path: &Path) -> FlightResult {
                         Checked::Diverged,
                         first.map(|first| format!("first different at frame {}", first.frame)),
                     )
+                }
+                () if reports.iter().any(|report| report.outcome == Verification::Impossible) => {
+                    let inputs = reports.iter().find_map(|report| report.part("inputs")?.why.clone());
+                    (Checked::Unverified, inputs)
                 }
                 () if all(Verification::Identical) => (Checked::Identical, None),
                 () => (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned()))),

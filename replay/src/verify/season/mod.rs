@@ -14,7 +14,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 pub use find::{Found, SeasonError, Skipped, find};
 pub use fly::{SeasonState, fly_all};
@@ -173,6 +173,8 @@ pub enum Change {
     Lost,
     /// The baseline does not have it.
     New,
+    /// The same flight is here under another name.
+    Copy,
     /// It is no flight, and none that the baseline knows.
     NoFlight,
     /// The baseline has it, and the directory does not.
@@ -191,6 +193,7 @@ impl Change {
             Self::Diverged => "DIVERGED",
             Self::Lost => "LOST",
             Self::New => "new",
+            Self::Copy => "copy",
             Self::NoFlight => "no flight",
             Self::Missing => "MISSING",
         }
@@ -216,8 +219,12 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// Whether it fails the gate; `may_diverge`: another build may decide differently as long as nothing gets worse.
+    /// Whether it fails the gate; `may_diverge`: another build may decide differently as long as nothing gets worse. A log
+    /// that cannot be verified always fails.
     pub fn fails(&self, may_diverge: bool) -> bool {
+        if self.now.as_ref().is_some_and(|now| now.checked == Checked::Unverified) {
+            return true;
+        }
         match self.change {
             Change::Diverged => !may_diverge,
             change => change.fails() || (self.newly_diverged && !may_diverge),
@@ -225,17 +232,41 @@ impl Judged {
     }
 }
 
-/// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same.
+/// Whether both are the same flight, by their content.
+fn is_same_flight(a: &FlightResult, b: &FlightResult) -> bool {
+    a.flight.is_some() && a.flight == b.flight
+}
+
+/// Holds outcomes against a baseline. A margin that changed by no more than `tolerance` is the same. A flight is known by its
+/// content, whatever its name is.
 pub fn judge(outcomes: &BTreeMap<String, FlightResult>, baseline: &Baseline, tolerance: f64) -> Vec<Judged> {
     // Another flight under the name of one is no change of that one.
-    let same_flight = |name: &str, before: &FlightResult| {
+    let keeps_its_name = |name: &str, before: &FlightResult| {
         outcomes
             .get(name)
-            .is_some_and(|now| before.flight.is_none() || now.flight.is_none() || now.flight == before.flight)
+            .is_some_and(|now| before.flight.is_none() || now.flight.is_none() || is_same_flight(before, now))
+    };
+    let before = |name: &str, now: &FlightResult| {
+        let of_its_name = baseline.flights.get(name).filter(|before| keeps_its_name(name, before));
+        of_its_name.or_else(|| {
+            let renamed = |(name, before): &(&String, &FlightResult)| {
+                is_same_flight(before, now) && !keeps_its_name(name, before)
+            };
+            baseline.flights.iter().find(renamed).map(|(_, before)| before)
+        })
+    };
+    // The first of equal flights is judged; one that the baseline has by its name comes before all others.
+    let is_copy = |name: &str, now: &FlightResult| {
+        let place = |name: &String| (!baseline.flights.contains_key(name), name.clone());
+        let own = place(&name.to_owned());
+        outcomes.iter().any(|(other, found)| is_same_flight(found, now) && found == now && place(other) < own)
+            && !baseline.flights.get(name).is_some_and(|before| keeps_its_name(name, before))
     };
     let of_now = outcomes.iter().map(|(name, now)| {
-        let before = baseline.flights.get(name).filter(|before| same_flight(name, before));
+        let copy = is_copy(name, now);
+        let before = before(name, now).filter(|_| !copy);
         let change = match before {
+            _ if copy => Change::Copy,
             Some(before) => change(before, now, tolerance),
             None if now.checked == Checked::NoFlight => Change::NoFlight,
             None => Change::New,
@@ -244,7 +275,10 @@ pub fn judge(outcomes: &BTreeMap<String, FlightResult>, baseline: &Baseline, tol
             && before.is_some_and(|before| before.checked == Checked::Identical);
         Judged { name: name.clone(), change, newly_diverged, before: before.cloned(), now: Some(now.clone()) }
     });
-    let missing = baseline.flights.iter().filter(|(name, before)| !same_flight(name, before));
+    let is_here = |name: &str, before: &FlightResult| {
+        keeps_its_name(name, before) || outcomes.values().any(|now| is_same_flight(before, now))
+    };
+    let missing = baseline.flights.iter().filter(|(name, before)| !is_here(name, before));
     let missing = missing.map(|(name, before)| Judged {
         name: name.clone(),
         change: Change::Missing,
@@ -347,6 +381,7 @@ fn summary(report: &SeasonReport) -> String {
         Change::Better,
         Change::NowLands,
         Change::New,
+        Change::Copy,
         Change::NoFlight,
         Change::Worse,
         Change::NoLongerLands,
@@ -418,14 +453,15 @@ pub(super) struct Arguments {
     /// accepted, a JSON file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["explain", "strict"])]
     baseline: Option<PathBuf>,
-    /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed.
+    /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed. A log that cannot be verified
+    /// is not accepted.
     #[arg(long, requires = "baseline")]
     accept: bool,
     /// Let this build decide differently from the record, as long as no flight gets worse.
     #[arg(long, requires = "baseline")]
     may_diverge: bool,
     /// A margin that changed by no more than this is the same (1 is from the middle of the limits to their edge).
-    #[arg(long, value_name = "MARGIN", default_value_t = 0.02)]
+    #[arg(long, value_name = "MARGIN", default_value_t = 0.02, requires = "baseline")]
     tolerance: f64,
     /// Flights flown at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N", requires = "baseline")]
@@ -488,12 +524,27 @@ impl Arguments {
             Printed::Junit => print_junit("season", season_cases(&judged, self.may_diverge), output),
         })?;
         if self.accept && !interrupted {
+            accepted(&outcomes)?;
+            let copies = judged.iter().filter(|judged| judged.change == Change::Copy);
+            let copies: Vec<String> = copies.map(|judged| judged.name.clone()).collect();
+            let mut outcomes = outcomes;
+            outcomes.retain(|name, _| !copies.contains(name));
             Baseline::of(outcomes).write(baseline_path)?;
             say(&format!("accepted: {}", baseline_path.display()));
             return Ok(Outcome::Given);
         }
         Ok(if interrupted { Outcome::NotAll } else { Outcome::Decided { yes: passed } })
     }
+}
+
+/// Refuses outcomes of which some were not verified: accepted, they would pass for ever.
+fn accepted(outcomes: &BTreeMap<String, FlightResult>) -> Result<()> {
+    let unverified = outcomes.iter().find(|(_, outcome)| outcome.checked == Checked::Unverified);
+    if let Some((name, FlightResult { problem, .. })) = unverified {
+        let why = problem.as_deref().unwrap_or("it was not verified");
+        bail!("nothing is accepted: {name}: {why}; mend it or take it out of the directory");
+    }
+    Ok(())
 }
 
 /// Refuses a directory whose logs hold no flight.
@@ -601,6 +652,37 @@ mod tests {
         assert!(judged.iter().any(|judged| judged.fails(true)));
         let same = judge(&named("landed", true), &Baseline::of(named("landed", false)), 0.02);
         assert_eq!(same[0].change, Change::NowLands);
+    }
+
+    #[test]
+    fn a_renamed_flight_is_the_same_and_a_copy_is_not_new() {
+        let flight = |name: &str| {
+            let outcome = outcome(Checked::Identical, true, 0.5);
+            (name.to_owned(), FlightResult { flight: Some("content".to_owned()), ..outcome })
+        };
+        let changes = |now: &[&str]| {
+            let now = now.iter().map(|name| flight(name)).collect();
+            let judged = judge(&now, &Baseline::of(BTreeMap::from([flight("b")])), 0.02);
+            assert!(!judged.iter().any(|judged| judged.fails(false)), "{judged:?}");
+            judged.into_iter().map(|judged| (judged.name, judged.change.word())).collect::<Vec<_>>()
+        };
+        let told = |pairs: &[(&str, &'static str)]| {
+            pairs.iter().map(|(name, word)| ((*name).to_owned(), *word)).collect::<Vec<_>>()
+        };
+        assert_eq!(changes(&["c"]), told(&[("c", "same")]));
+        assert_eq!(changes(&["a", "b", "c"]), told(&[("a", "copy"), ("b", "same"), ("c", "copy")]));
+        assert_eq!(changes(&["c", "d"]), told(&[("c", "same"), ("d", "copy")]));
+    }
+
+    /// Whether the baseline has it or not.
+    #[test]
+    fn a_log_that_cannot_be_verified_fails() {
+        let named = |outcome| BTreeMap::from([("a".to_owned(), outcome)]);
+        let unverified = named(outcome(Checked::Unverified, true, 0.5));
+        for before in [BTreeMap::new(), unverified.clone()] {
+            assert!(judge(&unverified, &Baseline::of(before), 0.02).remove(0).fails(true));
+        }
+        assert!(accepted(&unverified).is_err());
     }
 
     #[test]

@@ -315,8 +315,8 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
             Row::Refuse(Refusal::AlreadyAborted)
         }
         // Too low for the parachute: a landing on the motor is the safest way down, and the chosen height the safest one to light
-        // it at. Of 1,000 mk2 flights aborted here at a random moment 992 (`field`) and 904 (`real`) land; lit at once, 852 and
-        // 738 (seed 2001).
+        // it at. Of mk2 flights aborted here at a random moment 992 of 1,000 (`field`) and 903 of 999 (`real`) land; lit at once, 852
+        // and 737 of them (seed 2001).
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
             let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)

@@ -1,0 +1,151 @@
+//! Judges the inputs of a flight computer: some values cannot be, whatever was flown.
+//!
+//! What decides nothing could be changed in a log without a divergence. A value far outside of what any sensor can say, or one
+//! that does not follow from the frame before it, gives that away.
+
+use flight::computer::{FRAME_S, flight_time_s};
+use protocol::log::computer_v1::{ComputerInput, Uplink};
+use protocol::log::flight_v1::{Estimate, GnssFix, Measurements, RigidState, Vector3};
+
+/// No servo turns further, rad.
+const ANGLE_MAX_RAD: f64 = 2.0;
+/// No battery of a model rocket has more, V.
+const BATTERY_MAX_V: f64 = 60.0;
+/// A battery under load does not drop or recover by more in one frame, V.
+const BATTERY_STEP_V: f64 = 10.0;
+/// No gyro has a wider range, rad/s.
+const RATE_MAX_RAD_S: f64 = 200.0;
+/// No accelerometer of a model rocket has a wider range, m/s2.
+const FORCE_MAX_M_S2: f64 = 5_000.0;
+/// No model rocket flies higher or further, m, or faster, m/s.
+const PLACE_MAX_M: f64 = 20_000.0;
+const SPEED_MAX_M_S: f64 = 1_000.0;
+/// No lidar of a model rocket sees further, m.
+const RANGE_MAX_M: f64 = 1_000.0;
+/// A fix is older than this only if the receiver is dead, s.
+const FIX_AGE_MAX_S: f64 = 60.0;
+/// Larger than any disk, bytes; a flight without a log says `u64::MAX`.
+const SPACE_MAX_BYTES: u64 = 1 << 60;
+/// Tolerance for rounding, and for a clock that measures ages, s.
+const ROUNDING_S: f64 = 1e-3;
+
+/// What is looked at from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Inputs {
+    last: Option<Seen>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    frame: u64,
+    in_flight: bool,
+    pin_out: bool,
+    booster_attached: bool,
+    battery_v: Option<f64>,
+    uplink_age_s: Option<f64>,
+    commander_age_s: Option<f64>,
+}
+
+impl Inputs {
+    /// Why the input cannot be; `None` if it can.
+    pub(super) fn judge(&mut self, input: &ComputerInput, in_flight: bool) -> Option<String> {
+        let now = Seen {
+            frame: input.frame,
+            in_flight,
+            pin_out: input.pin_out,
+            booster_attached: input.booster_attached == Some(true),
+            battery_v: input.battery_v,
+            uplink_age_s: input.uplink.as_ref().and_then(|uplink| uplink.age_s),
+            commander_age_s: input.commander.as_ref().map(|commander| commander.age_s),
+        };
+        let before = self.last.replace(now);
+        out_of_range(input).or_else(|| before.and_then(|before| out_of_order(&before, &now)))
+    }
+}
+
+/// A value and what it may be.
+fn outside(what: &str, value: f64, lowest: f64, highest: f64) -> Option<String> {
+    (!(lowest..=highest).contains(&value)).then(|| format!("{what} {value:?}: can be {lowest} to {highest}"))
+}
+
+fn within(what: &str, value: f64, most: f64) -> Option<String> {
+    outside(what, value, -most, most)
+}
+
+fn vector(what: &str, Vector3 { x, y, z }: &Vector3, most: f64) -> Option<String> {
+    [x, y, z].into_iter().find_map(|value| within(what, *value, most))
+}
+
+fn out_of_range(input: &ComputerInput) -> Option<String> {
+    let time_s = flight_time_s(input.frame);
+    if input.time_s.to_bits() != time_s.to_bits() {
+        return Some(format!("time {:?} s: the frame is at {time_s} s", input.time_s));
+    }
+    let angles = || input.gimbal_rad.iter().chain(&input.fins_rad);
+    let age = |what: &str, uplink: Option<&Uplink>| {
+        uplink.and_then(|uplink| outside(what, uplink.age_s?, -ROUNDING_S, f64::MAX))
+    };
+    angles()
+        .find_map(|angle| within("angle of a servo, rad,", *angle, ANGLE_MAX_RAD))
+        .or_else(|| outside("battery, V,", input.battery_v?, 0.0, BATTERY_MAX_V))
+        .or_else(|| {
+            let space = input.log_space_bytes;
+            let can_be = space <= SPACE_MAX_BYTES || space == u64::MAX;
+            (!can_be).then(|| format!("{space} bytes of space for the log: no disk has as many"))
+        })
+        .or_else(|| age("age of the uplink, s,", input.uplink.as_ref()))
+        .or_else(|| {
+            input.requests.iter().find_map(|request| age("age of the uplink, s,", request.uplink.as_ref()))
+        })
+        .or_else(|| {
+            outside("age of the commander, s,", input.commander.as_ref()?.age_s, -ROUNDING_S, f64::MAX)
+        })
+        .or_else(|| measured(input.measured.as_ref()?, time_s))
+        .or_else(|| known(input.known.as_ref()?))
+}
+
+fn measured(measured: &Measurements, time_s: f64) -> Option<String> {
+    let Measurements { gyro_rad_s, specific_force_m_s2, pressure_altitude_m, gnss, lidar_range_m } = measured;
+    vector("gyro, rad/s,", gyro_rad_s, RATE_MAX_RAD_S)
+        .or_else(|| vector("accelerometer, m/s2,", specific_force_m_s2, FORCE_MAX_M_S2))
+        .or_else(|| within("pressure altitude, m,", (*pressure_altitude_m)?, PLACE_MAX_M))
+        .or_else(|| outside("lidar range, m,", (*lidar_range_m)?, -1.0, RANGE_MAX_M))
+        .or_else(|| {
+            let GnssFix { position_m, velocity_m_s, valid_at_s } = gnss.as_ref()?;
+            let (first_s, last_s) = (time_s - FIX_AGE_MAX_S, time_s + ROUNDING_S);
+            vector("position of GNSS, m,", position_m, PLACE_MAX_M)
+                .or_else(|| vector("velocity of GNSS, m/s,", velocity_m_s, SPEED_MAX_M_S))
+                .or_else(|| outside("time of a fix, s,", *valid_at_s, first_s, last_s))
+        })
+}
+
+fn known(Estimate { state, .. }: &Estimate) -> Option<String> {
+    let RigidState { position_m, velocity_m_s, rate_rad_s, .. } = state;
+    vector("position, m,", position_m, PLACE_MAX_M)
+        .or_else(|| vector("velocity, m/s,", velocity_m_s, SPEED_MAX_M_S))
+        .or_else(|| vector("rate, rad/s,", rate_rad_s, RATE_MAX_RAD_S))
+}
+
+fn out_of_order(before: &Seen, now: &Seen) -> Option<String> {
+    let passed_s = now.frame.saturating_sub(before.frame) as f64 * FRAME_S;
+    // An age grows with the time, or begins anew with what is heard.
+    let aged = |what: &str, then: Option<f64>, now: Option<f64>| {
+        let (then, now) = (then?, now?);
+        (now > then + passed_s + ROUNDING_S)
+            .then(|| format!("{what} is {now:?} s old, {passed_s:.3} s after it was {then:?} s old"))
+    };
+    let flew = before.in_flight && now.in_flight;
+    if flew && before.pin_out && !now.pin_out {
+        return Some("the pin is in again, in flight".to_owned());
+    }
+    if flew && now.booster_attached && !before.booster_attached {
+        return Some("the booster is attached again, in flight".to_owned());
+    }
+    if let (Some(then), Some(now)) = (before.battery_v, now.battery_v)
+        && (now - then).abs() > BATTERY_STEP_V
+    {
+        return Some(format!("the battery goes from {then:?} to {now:?} V in {passed_s:.3} s"));
+    }
+    aged("the uplink", before.uplink_age_s, now.uplink_age_s)
+        .or_else(|| aged("the commander", before.commander_age_s, now.commander_age_s))
+}

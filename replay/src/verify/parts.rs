@@ -1,0 +1,63 @@
+//! What of a record was compared, and what was not.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use crate::print::shown;
+
+/// A part of a record.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Part {
+    pub name: &'static str,
+    /// How many of it there are, or should be.
+    pub recorded: u64,
+    /// Of these, how many were compared.
+    pub compared: u64,
+    /// Of these, how many differ.
+    pub different: u64,
+    /// Why not all of it was compared, or what is wrong with it first.
+    pub why: Option<String>,
+    /// It follows from the inputs, so a whole verification compares it.
+    pub follows: bool,
+}
+
+impl Part {
+    pub(super) fn of(name: &'static str, recorded: u64) -> Self {
+        Self { name, recorded, compared: 0, different: 0, why: None, follows: true }
+    }
+
+    /// A part that follows from nothing that is recorded.
+    pub(super) fn beside(name: &'static str, recorded: u64) -> Self {
+        Self { follows: false, ..Self::of(name, recorded) }
+    }
+
+    pub(super) fn compare(&mut self, same: bool) {
+        self.compared += 1;
+        self.different += u64::from(!same);
+    }
+
+    pub(super) fn because(self, why: impl Into<String>) -> Self {
+        Self { why: Some(why.into()), ..self }
+    }
+
+    /// All of it was compared, if it can be.
+    pub fn is_whole(&self) -> bool {
+        !self.follows || self.compared == self.recorded
+    }
+}
+
+/// Writes the parts as a table.
+pub(super) fn print_parts(parts: &[Part], output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "  {:<10} {:>8} {:>8} {:>9}", "part", "recorded", "compared", "different")?;
+    for Part { name, recorded, compared, different, why, follows } in parts {
+        let words = match why {
+            Some(why) => shown(why),
+            None if !follows => "follows from nothing recorded".to_owned(),
+            None => String::new(),
+        };
+        let row = format!("  {name:<10} {recorded:>8} {compared:>8} {different:>9}  {words}");
+        writeln!(output, "{}", row.trim_end())?;
+    }
+    Ok(())
+}
