@@ -23,8 +23,8 @@ fn with_heavy_loss_arming_works_and_the_abort_arrives() {
     rig.proxy.impair(BAD);
     let climbed = rig.arm();
     assert!(
-        (1..=climbed).contains(&rig.sent(ARM, 1.0)),
-        "an arm command was sent more often than it was typed"
+        (1..=5 * climbed).contains(&rig.sent(ARM, 1.0)),
+        "an arm command was sent more than five times for each that was typed"
     );
     rig.abort();
     let attempts = rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");

@@ -381,7 +381,8 @@ impl Places {
     fn turn_to(&mut self, place: (usize, Option<Origin>)) -> Option<Msg> {
         let known = self.known.iter().find(|(known, _)| *known == place).map(|(_, number)| *number);
         let number = known.unwrap_or_else(|| {
-            self.next = self.next.wrapping_add(1);
+            // The link's number in the upper byte.
+            self.next = (place.0 as u16) << 8 | (self.next.wrapping_add(1) & 0xff);
             self.known.drain(..(self.known.len() + 1).saturating_sub(PLACES_MAX));
             self.known.push_back((place, self.next));
             self.next

@@ -34,6 +34,8 @@ const PLACES_MAX: usize = 4;
 /// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
 /// between them.
 const NEAR_MS: i64 = 500;
+/// A place that was heard so recently is where a run reports.
+const ALIVE_WITHIN: Duration = Duration::from_secs(2);
 /// How often they contradict each other within [`GONE_AFTER`] until they are those of two vehicles.
 const CONTRADICTIONS: usize = 3;
 
@@ -48,7 +50,7 @@ pub struct Word {
     pub clock_ms: u32,
     /// The sequence number of the frame.
     pub sequence: u8,
-    /// From where the frame came: a number for each link and address.
+    /// From where the frame came: a number for each link and address, with that of the link in its upper byte.
     pub place: u16,
 }
 
@@ -65,6 +67,12 @@ struct Place {
     words: u32,
     clock_ms: u32,
     sequence: u8,
+    heard_at: Duration,
+}
+
+/// The link of a place.
+const fn link_of(place: u16) -> u16 {
+    place >> 8
 }
 
 #[derive(Debug, Clone)]
@@ -136,18 +144,35 @@ impl Run {
         let Some(place) = known else {
             self.places.drain(..(self.places.len() + 1).saturating_sub(PLACES_MAX));
             let Word { place: number, clock_ms, sequence, .. } = *word;
-            self.places.push(Place { number, began_ms, words: 1, clock_ms, sequence });
+            self.places.push(Place { number, began_ms, words: 1, clock_ms, sequence, heard_at: now });
             return;
         };
         let clock_by_ms = i64::from(word.clock_ms) - i64::from(place.clock_ms);
         let sequence_by = i64::from(word.sequence.wrapping_sub(place.sequence).cast_signed());
-        if clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() != sequence_by.signum() {
-            self.contradicted_at.push_back(now);
-            self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
-        }
+        let contradicts = clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() != sequence_by.signum();
         place.began_ms = place.began_ms.min(began_ms);
         place.words = place.words.saturating_add(1);
-        (place.clock_ms, place.sequence) = (word.clock_ms, word.sequence);
+        (place.clock_ms, place.sequence, place.heard_at) = (word.clock_ms, word.sequence, now);
+        if contradicts {
+            self.contradict(now);
+        }
+    }
+
+    /// Notes that two senders claim to be this run.
+    fn contradict(&mut self, now: Duration) {
+        self.contradicted_at.push_back(now);
+        self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
+    }
+
+    /// Whether a report comes from another address of the link over which this run reports, and does not keep step with it: what
+    /// another way brings of the same vehicle does.
+    fn is_out_of_step(&self, word: &Word, now: Duration) -> bool {
+        let usual = self.places.iter().filter(|place| is_within(place.heard_at, ALIVE_WITHIN, now));
+        let Some(usual) = usual.max_by_key(|place| place.words) else { return false };
+        let clock_by_ms = i64::from(word.clock_ms) - i64::from(usual.clock_ms);
+        let sequence_by = i64::from(word.sequence.wrapping_sub(usual.sequence).cast_signed());
+        let keeps_step = clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() == sequence_by.signum();
+        usual.number != word.place && link_of(usual.number) == link_of(word.place) && !keeps_step
     }
 
     /// How many frames after its last report a sequence number comes.
@@ -223,6 +248,17 @@ impl Heard {
     /// Whether this run may be the shown vehicle after a reset, rather than another vehicle.
     pub fn follows(&self, id: RunId, former: RunId) -> bool {
         self.of(id).zip(self.of(former)).is_some_and(|(run, former)| run.follows(former))
+    }
+
+    /// Whether a flight status only claims to be of the shown run. It is noted: two vehicles may have one boot and unique id.
+    pub fn disowns(&mut self, word: &Word, now: Duration) -> bool {
+        let shown = self.shown;
+        let run = self.runs.iter_mut().find(|run| Some(run.id) == shown);
+        let Some(run) = run.filter(|run| run.fits(word, now) && run.is_out_of_step(word, now)) else {
+            return false;
+        };
+        run.contradict(now);
+        true
     }
 
     /// Takes a flight status, and says which run it comes from. The first one is shown.
@@ -506,6 +542,39 @@ mod tests {
             assert!(boots(&heard, at(103_000)) > 0, "{apart_ms} {places:?}");
             assert!(!heard.choose(7, at(103_000)) || !heard.is_chosen(at(103_000)), "no command can name it");
         }
+    }
+
+    /// From another address of the same link, with the boot, the unique id and about the clock of the vehicle.
+    #[test]
+    fn a_status_that_only_claims_to_be_the_vehicle_s_is_not_taken_and_seen_as_a_second_one() {
+        let mut heard = Heard::default();
+        let mut ours = Sender { place: 0x101, ..Sender::new(1, 7, 0) };
+        let mut disowned = 0;
+        for ms in (10_000..20_000).step_by(100) {
+            let word = ours.word(ms);
+            assert!(!heard.disowns(&word, at(ms)));
+            heard.hear(&word, at(ms));
+            // The same over another link, and a copy that another way of the same link brings first.
+            for (place, later) in [(0x201, 0), (0x102, 1)] {
+                let copy = Word {
+                    place,
+                    sequence: word.sequence.wrapping_add(later),
+                    clock_ms: word.clock_ms + u32::from(later),
+                    ..word
+                };
+                assert!(!heard.disowns(&copy, at(ms)), "{place}");
+            }
+            if ms % 1_000 == 0 {
+                let forged = Word {
+                    place: 0x103,
+                    clock_ms: word.clock_ms + 20,
+                    sequence: word.sequence.wrapping_add(200),
+                    ..word
+                };
+                disowned += usize::from(heard.disowns(&forged, at(ms)));
+            }
+        }
+        assert_eq!((disowned, boots(&heard, at(20_000))), (10, 1));
     }
 
     #[test]

@@ -190,10 +190,8 @@ impl Vehicle {
     }
 
     /// The phase, from the newer of its two sources.
-    /// Only our vehicles send a flight status: before it the mode of a heartbeat may be anything of another maker's.
     pub fn phase(&self) -> Option<Sample<TdPhase>> {
         let status = self.status.as_ref().map(|status| Sample::new(status.value.phase, status.received_at));
-        status.as_ref()?;
         let heartbeat = self.heartbeat.and_then(|heartbeat| {
             heartbeat.value.phase.map(|phase| Sample::new(phase, heartbeat.received_at))
         });

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::command::CommandAnswer;
-use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA};
+use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TIMESYNC_DATA};
 use protocol::frame::Frame;
 use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
@@ -80,6 +80,11 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     {
         return;
     }
+    if let MavMessage::TD_FLIGHT_STATUS(status) = &message
+        && model.heard.disowns(&word(status, frame, model.link.place), now)
+    {
+        return;
+    }
     let speaker = speaker(model, frame, &message, now);
     if let Some(other) = speaker.filter(|run| model.heard.shown() != Some(*run)) {
         // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
@@ -127,19 +132,22 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     commands::observe(model, now);
 }
 
+fn word(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, place: u16) -> Word {
+    Word {
+        uid: status.vehicle_uid,
+        boot: status.boot_number,
+        clock_ms: status.time_boot_ms,
+        sequence: frame.sequence(),
+        place,
+    }
+}
+
 /// Which vehicle has sent a message, and since which power-up; `None` before the first flight status.
 fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<RunId> {
     match message {
-        MavMessage::TD_FLIGHT_STATUS(status) => Some(model.heard.hear(
-            &Word {
-                uid: status.vehicle_uid,
-                boot: status.boot_number,
-                clock_ms: status.time_boot_ms,
-                sequence: frame.sequence(),
-                place: model.link.place,
-            },
-            now,
-        )),
+        MavMessage::TD_FLIGHT_STATUS(status) => {
+            Some(model.heard.hear(&word(status, frame, model.link.place), now))
+        }
         // What another autopilot says beside ours is noted at the shown one.
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.heard.shown(),
         _ => model.heard.speaker(time_boot_ms(message), frame.sequence(), now),

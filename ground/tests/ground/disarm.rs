@@ -1,10 +1,11 @@
 //! Disarming, and late answers to an arming: both have the command number 400.
 
 use crate::keys::ladder;
-use crate::rig::Rig;
+use crate::rig::{Rig, is_arm};
 use ground::key::Key;
 use ground::model::{Acknowledgement, CommandKind};
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
+use protocol::identity::GROUND;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const ACCEPTED: u8 = 0;
@@ -26,7 +27,8 @@ fn a_late_answer_to_an_arming_does_not_end_the_disarm() {
         rig.keys(&[Key::Char('D'), Key::Enter]);
         let sent = rig.take_commands();
         assert!(sent.iter().filter(|command| is_disarm(command)).count() == 1, "{sent:?}");
-        rig.answer(ARM, result);
+        let number = sent.iter().find(|command| is_arm(command)).unwrap().param2 as i32;
+        rig.answer_with(GROUND, ARM, result, number);
         rig.armed = result == ACCEPTED;
         let disarm = rig.model.commands.of(CommandKind::Disarm).unwrap();
         assert_eq!(disarm.acknowledged, Acknowledgement::Waiting);

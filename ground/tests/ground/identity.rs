@@ -222,7 +222,7 @@ fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
     for (columns, rows) in [(80, 24), (120, 36)] {
         let screen = rig.screen(columns, rows);
         let line = screen.lines().find(|line| line.contains("mission")).unwrap_or_default();
-        assert!(line.contains("mk2 from pad") && line.contains(&hash.to_string()[..9]), "{screen}");
+        assert!(line.contains("mk2 from pad") && line.contains(&hash.to_string()[..8]), "{screen}");
     }
 }
 

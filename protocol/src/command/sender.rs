@@ -272,15 +272,19 @@ impl CommandSender {
         };
         let waiting =
             self.pending.iter().position(|pending| answers(pending.message.command, pending.number()));
-        let Some(index) = waiting else {
-            let late = |late: &&mut Late| answers(late.command, late.number) && now < late.until;
-            let Some(late) = self.late.iter_mut().find(late) else { return false };
+        let late = |late: &&mut Late| answers(late.command, late.number) && now < late.until;
+        if waiting.is_none()
+            && let Some(late) = self.late.iter_mut().find(late)
+        {
             if final_answer && !core::mem::replace(&mut late.is_answered, true) {
                 let (command, result, ticket) = (answer.command, answer.result, late.ticket);
                 self.events.push(CommandEvent::AnsweredLate { command, result, ticket });
             }
             return true;
-        };
+        }
+        // A screen and a replay follow the commands of a station that has counted others before: its numbers are not theirs.
+        let of_its_kind = || self.pending.iter().position(|p| p.message.command as u16 == answer.command);
+        let Some(index) = waiting.or_else(of_its_kind) else { return false };
         if self.pending[index].resend == Resend::UntilWithdrawn {
             self.note_answer(index, *answer, final_answer);
         } else if final_answer {
