@@ -110,7 +110,7 @@ fn every_message_becomes_a_table_with_every_field() {
     let head = text.lines().next().unwrap();
     assert_eq!(
         head,
-        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,x_m,altitude_m,pitch_rad,u_m_s,w_m_s,\
+        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,contact_ms,x_m,altitude_m,pitch_rad,u_m_s,w_m_s,\
          q_rad_s,limits_violated,landed"
     );
     // As many rows as frames of the dialect.
