@@ -261,8 +261,9 @@ impl Watched {
             } else if is(&sent, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
                 whens.iter().any(|history| ends_at_any_speed(history, &[Key::Char('D')], "", 5))
             } else if is(&sent, MavCmd::MAV_CMD_TD_PAD_CHECK) {
+                // The end of a check moves nothing: it needs no ladder.
                 let key = if sent.param1 > 1.5 { 'E' } else { 'X' };
-                sent.param1 > 0.5 && by_hand(&[Key::Char(key)], "", 5)
+                sent.param1 < 0.5 || by_hand(&[Key::Char(key)], "", 5)
             } else {
                 by_hand(&[Key::Char('S')], "START", 10)
             };

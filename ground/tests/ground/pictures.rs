@@ -338,6 +338,8 @@ fn recorded(until: Option<fn(&Moment) -> bool>) -> Moment {
                     MavMessage::TD_FLIGHT_STATUS(status) => {
                         (moment.phase, moment.status) = (status.phase, status);
                     }
+                    // The station of the recording is the one whose screen is drawn.
+                    MavMessage::TD_UPLINK(told) => moment.rig.model.settings.session = told.session,
                     MavMessage::LOCAL_POSITION_NED(place) => moment.height_m = -f64::from(place.z),
                     _ => {}
                 }
