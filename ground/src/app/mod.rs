@@ -170,10 +170,9 @@ async fn start(
     };
     let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
-    let capacity = wire.endpoints().next().and_then(LinkAddress::capacity_bytes_s);
     let mut model = Model::new(Settings {
         // With several links, each has its own.
-        link_capacity_bytes_s: if links.len() == 1 { capacity } else { None },
+        link_capacity_bytes_s: wire.capacity_bytes_s(),
         vehicle_name: demo.as_ref().map(|_| cli.demonstration().profile.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),

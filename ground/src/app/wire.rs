@@ -135,6 +135,12 @@ impl Wire {
         self.open.iter().map(|link| link.transport.address())
     }
 
+    /// What the only link carries, bytes per second; `None` if no bound is known, and for several links.
+    pub fn capacity_bytes_s(&self) -> Option<u32> {
+        let [only] = &self.open[..] else { return None };
+        only.transport.address().capacity_bytes_s()
+    }
+
     /// The next data of any link, with the number of the link. What waits for a slow line is sent meanwhile.
     pub async fn receive(&mut self) -> (usize, Received) {
         loop {

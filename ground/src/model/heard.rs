@@ -536,7 +536,9 @@ mod tests {
             (both[0].place, both[1].place, both[1].sequence) = (places[0], places[1], 100);
             for ms in (100_000..103_000).step_by(100) {
                 let two = &mut both;
-                two.iter_mut().for_each(|sender| _ = heard.hear(&sender.word(ms), at(ms)));
+                for sender in two {
+                    heard.hear(&sender.word(ms), at(ms));
+                }
                 heard.settle(at(ms));
             }
             assert!(boots(&heard, at(103_000)) > 0, "{apart_ms} {places:?}");

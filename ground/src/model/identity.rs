@@ -315,7 +315,9 @@ mod boot_tests {
     fn a_vehicle_is_simulated_only_if_both_flags_were_always_set() {
         let of = |heard: &[MavMessage]| {
             let mut boot = Boot::default();
-            heard.iter().for_each(|message| boot.hear(message));
+            for message in heard {
+                boot.hear(message);
+            }
             boot.is_simulated()
         };
         assert!(of(&[status(7, true), beat(true)]));

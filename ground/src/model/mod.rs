@@ -281,7 +281,7 @@ impl Model {
         let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
         let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
         let commands = Commands::of_session(settings.session);
-        Self { settings, alarms, commands, ..Self::default() }
+        Self { settings, commands, alarms, ..Self::default() }
     }
 
     /// The history has been received. Alarms that still hold ring from now on; ended ones do not.

@@ -347,7 +347,7 @@ mod tests {
             }
             sender.poll(ms(now));
             for (_, of) in answers_ms.iter().filter(|(at, _)| *at == now) {
-                let detail = FIRST_NUMBER as i32 + 7 + of;
+                let detail = FIRST_NUMBER.cast_signed() + 7 + of;
                 let answer =
                     CommandAnswer { command: ARM as u16, result: 0, progress: 0, detail, target: GROUND };
                 sender.on_answer(&answer, ms(now));
