@@ -70,6 +70,19 @@ struct Place {
     heard_at: Duration,
 }
 
+impl Place {
+    /// How much later than its last report another one was said, ms.
+    fn clock_by_ms(&self, word: &Word) -> i64 {
+        i64::from(word.clock_ms) - i64::from(self.clock_ms)
+    }
+
+    /// Whether clock and sequence number have risen, or fallen, together since its last report.
+    fn is_in_order(&self, word: &Word) -> bool {
+        let sequence_by = i64::from(word.sequence.wrapping_sub(self.sequence).cast_signed());
+        self.clock_by_ms(word).signum() == sequence_by.signum()
+    }
+}
+
 /// The link of a place.
 const fn link_of(place: u16) -> u16 {
     place >> 8
@@ -147,9 +160,7 @@ impl Run {
             self.places.push(Place { number, began_ms, words: 1, clock_ms, sequence, heard_at: now });
             return;
         };
-        let clock_by_ms = i64::from(word.clock_ms) - i64::from(place.clock_ms);
-        let sequence_by = i64::from(word.sequence.wrapping_sub(place.sequence).cast_signed());
-        let contradicts = clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() != sequence_by.signum();
+        let contradicts = place.clock_by_ms(word).abs() <= NEAR_MS && !place.is_in_order(word);
         place.began_ms = place.began_ms.min(began_ms);
         place.words = place.words.saturating_add(1);
         (place.clock_ms, place.sequence, place.heard_at) = (word.clock_ms, word.sequence, now);
@@ -167,11 +178,12 @@ impl Run {
     /// Whether a report comes from another address of the link over which this run reports, and does not keep step with it: what
     /// another way brings of the same vehicle does.
     fn is_out_of_step(&self, word: &Word, now: Duration) -> bool {
-        let usual = self.places.iter().filter(|place| is_within(place.heard_at, ALIVE_WITHIN, now));
-        let Some(usual) = usual.max_by_key(|place| place.words) else { return false };
-        let clock_by_ms = i64::from(word.clock_ms) - i64::from(usual.clock_ms);
-        let sequence_by = i64::from(word.sequence.wrapping_sub(usual.sequence).cast_signed());
-        let keeps_step = clock_by_ms.abs() <= NEAR_MS && clock_by_ms.signum() == sequence_by.signum();
+        let recent = self.places.iter().filter(|place| is_within(place.heard_at, ALIVE_WITHIN, now));
+        // The newest one: a vehicle that gets another address goes on from there.
+        let Some(usual) = recent.max_by_key(|place| place.heard_at) else { return false };
+        let since_ms = ms(now.saturating_sub(usual.heard_at));
+        let is_on_time = (usual.clock_by_ms(word) - since_ms).abs() <= NEAR_MS;
+        let keeps_step = is_on_time && (since_ms > NEAR_MS || usual.is_in_order(word));
         usual.number != word.place && link_of(usual.number) == link_of(word.place) && !keeps_step
     }
 
@@ -577,6 +589,22 @@ mod tests {
             }
         }
         assert_eq!((disowned, boots(&heard, at(20_000))), (10, 1));
+    }
+
+    /// As when a router gives it another port: at once, or after a pause.
+    #[test]
+    fn a_vehicle_that_gets_another_address_stays_one() {
+        for pause_ms in [0, 1_000] {
+            let mut heard = Heard::default();
+            let mut ours = Sender { place: 0x101, ..Sender::new(1, 7, 0) };
+            for ms in (10_000..20_000).step_by(100).filter(|ms| !(15_000..15_000 + pause_ms).contains(ms)) {
+                ours.place = if ms < 15_000 { 0x101 } else { 0x102 };
+                let word = ours.word(ms);
+                assert!(!heard.disowns(&word, at(ms)), "{ms} after {pause_ms}");
+                heard.hear(&word, at(ms));
+                assert_eq!(boots(&heard, at(ms)), 0);
+            }
+        }
     }
 
     #[test]
