@@ -201,8 +201,12 @@ impl Run {
         self.began_ms() + i64::from(self.clock_ms)
     }
 
+    fn is_at(&self, place: u16) -> bool {
+        self.places.iter().any(|known| known.number == place)
+    }
+
     fn shares_a_place(&self, other: &Self) -> bool {
-        self.places.iter().any(|place| other.places.iter().any(|others| others.number == place.number))
+        self.places.iter().any(|place| other.is_at(place.number))
     }
 
     /// Whether it may be the same vehicle after its next power-up.
@@ -294,10 +298,19 @@ impl Heard {
         id
     }
 
-    /// Which run another message comes from, by its clock or its sequence number; `None` before the first flight status.
-    /// Whatever fits several goes to the shown one.
-    pub fn speaker(&self, clock_ms: Option<u32>, sequence: u8, now: Duration) -> Option<RunId> {
+    /// Which run another message comes from: the only one at this place, else by its clock or its sequence number; `None` before the
+    /// first flight status. Whatever fits several goes to the shown one.
+    pub fn speaker(
+        &self,
+        place: u16,
+        (clock_ms, sequence): (Option<u32>, u8),
+        now: Duration,
+    ) -> Option<RunId> {
         let shown = self.shown_run()?;
+        let mut here = self.runs.iter().filter(|run| run.is_heard(now) && run.is_at(place));
+        if let (Some(only), None) = (here.next(), here.next()) {
+            return Some(only.id);
+        }
         let off = |run: &Run| match clock_ms {
             Some(clock_ms) => run.away_ms(clock_ms, now).abs(),
             None => run.behind(sequence),
@@ -312,6 +325,16 @@ impl Heard {
     pub fn is_stray(&self, sequence: u8, now: Duration) -> bool {
         self.shown_run().is_some_and(|shown| is_within(shown.heard_at, FRESH_WITHIN, now))
             && self.runs.iter().filter(|run| run.is_heard(now)).all(|run| run.behind(sequence) > STRAY_FROM)
+    }
+
+    /// Whether a place is another address of the link over which the shown run reports, and no run has reported from it: somebody
+    /// else speaks there, and has not said yet who it is.
+    pub fn is_strange(&self, place: u16, now: Duration) -> bool {
+        let reports_beside = |run: &Run| {
+            let beside = |known: &Place| link_of(known.number) == link_of(place);
+            is_within(run.heard_at, ALIVE_WITHIN, now) && run.places.iter().any(beside)
+        };
+        self.shown_run().is_some_and(reports_beside) && !self.runs.iter().any(|run| run.is_at(place))
     }
 
     /// Notes whether a run is armed, in a countdown, in flight, or down and not yet safe.
@@ -676,7 +699,7 @@ mod tests {
                 let word = ours.word(ms);
                 prop_assert_eq!(heard.hear(&word, at(ms)), shown);
                 // Everything else that ours says is still taken for ours.
-                prop_assert_eq!(heard.speaker(None, word.sequence.wrapping_add(1), at(ms)), Some(shown));
+                prop_assert_eq!(heard.speaker(word.place, (None, word.sequence.wrapping_add(1)), at(ms)), Some(shown));
                 prop_assert_eq!(heard.settle(at(ms)), None);
             }
         }

@@ -75,9 +75,14 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         model.link.undecodable += 1;
         return;
     };
-    if matches!(&message, MavMessage::HEARTBEAT(beat) if may_be_ours(beat))
-        && model.heard.is_stray(frame.sequence(), now)
-    {
+    // Of somebody who has not said yet who it is only texts are taken, and that another autopilot beats.
+    let is_nobodys = match &message {
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
+        MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
+        MavMessage::HEARTBEAT(_) if model.heard.is_stray(frame.sequence(), now) => true,
+        _ => model.heard.is_strange(model.link.place, now),
+    };
+    if is_nobodys {
         return;
     }
     if let MavMessage::TD_FLIGHT_STATUS(status) = &message
@@ -150,7 +155,7 @@ fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration
         }
         // What another autopilot says beside ours is noted at the shown one.
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.heard.shown(),
-        _ => model.heard.speaker(time_boot_ms(message), frame.sequence(), now),
+        _ => model.heard.speaker(model.link.place, (time_boot_ms(message), frame.sequence()), now),
     }
 }
 

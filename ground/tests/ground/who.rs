@@ -8,8 +8,8 @@ use ground::model::{CommandKind, KeyOwner, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
-    MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_OPERATOR_DATA, TD_UPLINK_DATA,
-    TIMESYNC_DATA, TdAct, TdInterlock, TdPhase, TdRole, VFR_HUD_DATA,
+    MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA,
+    TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdPhase, TdRole, VFR_HUD_DATA,
 };
 use protocol::identity::GROUND;
 
@@ -133,6 +133,20 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
     let sent = rig.take_commands();
     assert!(sent.iter().any(|sent| sent.command == MavCmd::MAV_CMD_DO_PAUSE_CONTINUE), "{sent:?}");
     assert!(rig.events().contains("TWO VEHICLES in the countdown: HOLD"), "{}", rig.events());
+}
+
+/// It begins with what a station should know first: its mission, its limits.
+#[test]
+fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
+    let mut rig = counting();
+    rig.msg(Msg::HeardFrom(1));
+    rig.run(1.0);
+    rig.msg(Msg::HeardFrom(2));
+    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
+    assert_eq!(rig.model.vehicle.mission, None);
+    rig.msg(Msg::HeardFrom(1));
+    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
+    assert_eq!(rig.model.vehicle.mission.as_ref().map(|mission| mission.hash.0), Some([8; 8]));
 }
 
 #[test]
