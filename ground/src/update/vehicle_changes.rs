@@ -72,10 +72,10 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     }
 }
 
-/// What a vehicle did when it was reset.
+/// What a vehicle did when it was reset, by its last status: a heartbeat may be the first one after the reset.
 fn reset_words(vehicle: &Vehicle) -> String {
     let counted = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    match vehicle.phase_now() {
+    match vehicle.status.as_ref().map(|status| status.value.phase) {
         Some(TdPhase::TD_PHASE_PAD_ARMED) if counted => " in the countdown".to_owned(),
         Some(TdPhase::TD_PHASE_PAD_ARMED) => " while it was armed".to_owned(),
         Some(phase) if is_flight(phase) => " in flight".to_owned(),
