@@ -20,7 +20,7 @@
 //!
 //! In wind, let the frame move with the air: `(u, w)` and the positions are then relative to it.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The set of planar equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -34,7 +34,7 @@ pub enum ModelKind {
 }
 
 /// Planar state: position, pitch, body-axis velocity, pitch rate.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PlanarState {
     /// Horizontal position, m.
     pub x_m: f64,

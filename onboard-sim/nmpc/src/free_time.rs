@@ -19,6 +19,7 @@
 //! off again after contact. The number of solves is capped; there is no clock.
 
 use super::{LANDING_MISS, Problem, Solution, SolveStatus, WarmStart, Workspace, solve_into};
+use serde::Serialize;
 
 /// Grid of a cold search, over the allowed ends.
 const GRID: usize = 5;
@@ -65,7 +66,7 @@ pub struct FreeTimeProblem {
 }
 
 /// The outcome of a search: a landing and its final time.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FreeTimeSolution {
     /// The landing; its iterations are those of the whole search.
     pub solution: Solution,

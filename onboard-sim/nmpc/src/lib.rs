@@ -40,6 +40,7 @@ pub use problem::{FinalBox, Problem, SolverLimits};
 pub use workspace::Workspace;
 
 use alloc::vec::Vec;
+use serde::Serialize;
 
 use crate::dynamics::PlanarState;
 
@@ -47,7 +48,7 @@ use crate::dynamics::PlanarState;
 pub const LANDING_MISS: f64 = 1e-3;
 
 /// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub enum SolveStatus {
     /// No problem was solved.
     #[default]
@@ -104,7 +105,7 @@ pub struct WarmStart {
 }
 
 /// The outcome of a solve.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Solution {
     /// How it ended.
     pub status: SolveStatus,

@@ -2,11 +2,11 @@
 
 use alloc::format;
 use alloc::string::{String, ToString as _};
+use serde::Serialize;
 
 use super::news::Severity;
 use super::table::PhaseTable;
 use super::{Commander, Computer, Input};
-use crate::computer::memory::remembers;
 use crate::rules::arming;
 use crate::rules::arming::{Check, Uplink};
 use crate::rules::operator::Operator;
@@ -184,14 +184,12 @@ pub(super) fn refused(
 // Decides the crew's requests, and holds the countdown when the commanding station falls silent or a tap is overdue.
 
 /// What the computer remembers of its crew.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct CrewMemory {
     pub two_person: TwoPerson,
     /// Who has held the last countdown, or whose silence has.
     pub held_by: Option<Operator>,
 }
-
-remembers!(CrewMemory { two_person, held_by });
 
 /// An ask, and who has confirmed it.
 type Agreed = (Ask, Operator);

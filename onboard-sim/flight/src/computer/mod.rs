@@ -11,10 +11,10 @@
 //! * [`pad`]: from power-up to the release.
 //! * [`pilot`]: flies the rocket from its release.
 //! * [`saved`]: power-up; what is kept through a reset, and going on from it.
-//! * `memory`: one number for the whole memory, to compare a replay with a log.
+//! * `digest`: one number for the whole memory, to compare a replay with a log.
 
 pub mod crew;
-pub(crate) mod memory;
+mod digest;
 pub mod news;
 pub mod pad;
 pub mod pad_check;
@@ -30,7 +30,6 @@ use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
-use self::memory::remembers;
 use self::news::{MotorWatch, News, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
@@ -62,10 +61,8 @@ struct Release {
     time_s: f64,
 }
 
-remembers!(Release { frame, time_s });
-
 /// The flight computer and everything that it remembers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Computer {
     table: PhaseTable,
     /// The wait on the pad.
@@ -73,14 +70,20 @@ pub struct Computer {
     /// Flies from the release on.
     pilot: Box<Pilot>,
     /// The law and the state at power-up, to power up again.
+    #[serde(skip)]
     law: Law,
+    #[serde(skip)]
     believed: RigidState,
     /// The input of the pilot's last frame.
+    #[serde(skip)]
     flown: Option<PilotInput>,
     /// The gate check that the crew was last told of.
     gate_told: Option<&'static str>,
+    #[serde(skip)]
     frame: u64,
+    #[serde(skip)]
     arming: ArmingLimits,
+    #[serde(skip)]
     countdown_s: f64,
     commands: Commands,
     self_test: SelfTest,
@@ -88,13 +91,18 @@ pub struct Computer {
     rehearsed: Option<Rehearsed>,
     motor_watch: MotorWatch,
     log: LogState,
+    #[serde(skip)]
     uplink: Uplink,
+    #[serde(skip)]
     commander: Option<Commander>,
+    #[serde(skip)]
     people: Option<People>,
     crew: CrewMemory,
     fins_answering: [bool; 4],
     igniter_continuity: bool,
+    #[serde(skip)]
     booster_attached: bool,
+    #[serde(skip)]
     battery_v: Option<f64>,
     pad_check: PadCheck,
     release: Option<Release>,
@@ -305,15 +313,14 @@ pub fn flight_time_s(frame: u64) -> f64 {
 
 // The input of one frame of the flight computer: everything it depends on besides its memory.
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct LogState {
     /// The log is being written, or the operator chose to fly without one.
     pub running: bool,
     /// Free space for it, bytes.
+    #[serde(skip)]
     pub space_bytes: u64,
 }
-
-remembers!(LogState { running } but { space_bytes });
 
 impl LogState {
     /// No log yet.
@@ -321,7 +328,7 @@ impl LogState {
 }
 
 /// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rehearsed {
     /// It found plans, and landed on its legs.
     pub warm: bool,
@@ -387,8 +394,6 @@ pub struct Commands {
     /// What lights, parts and ejects.
     pub outputs: Outputs,
 }
-
-remembers!(Commands { gimbal_rad, fins_rad, outputs });
 
 /// The output of one frame.
 #[derive(Debug, Clone, PartialEq)]

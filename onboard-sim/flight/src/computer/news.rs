@@ -3,8 +3,8 @@
 use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
+use serde::Serialize;
 
-use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::rules::arming::{Check, UPLINK_CHECK};
 use crate::rules::phase::{
     Effect, HOLD_LIMIT_S, Interlocks, MISFIRE_WAIT_S, MOTOR_HOT_S, Mode, MotorStatus, Phase,
@@ -78,14 +78,8 @@ pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(
 }
 
 /// The failing arming check that the crew on the pad was last told of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub(super) struct Readiness(Option<&'static str>);
-
-impl Remembers for Readiness {
-    fn remember(&self, memory: &mut Memory) {
-        self.0.remember(memory);
-    }
-}
 
 impl Readiness {
     /// A message with the check that fails now, if it is another one than before. The uplink is left out: it comes and
@@ -102,7 +96,7 @@ impl Readiness {
 // it.
 
 /// The state that the crew was last told of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 struct Told {
     status: MotorStatus,
     /// On the ground after the flight.
@@ -111,17 +105,9 @@ struct Told {
     free: bool,
 }
 
-remembers!(Told { status, landed, free });
-
 /// Watches the landing motor.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct MotorWatch(Told);
-
-impl Remembers for MotorWatch {
-    fn remember(&self, memory: &mut Memory) {
-        self.0.remember(memory);
-    }
-}
 
 impl Default for MotorWatch {
     /// A vehicle with its pin in, as it is powered up.

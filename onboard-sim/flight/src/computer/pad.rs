@@ -4,10 +4,10 @@
 use alloc::format;
 use alloc::vec::Vec;
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::news::Severity;
 use super::{Computer, Input, Release};
-use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::computer::pilot::Sensed;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
 use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
@@ -49,7 +49,7 @@ impl Stance {
 }
 
 /// Result of one second on the pad.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Found {
     /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was not at rest.
     at_rest: Option<PadStart>,
@@ -64,7 +64,7 @@ struct Found {
 }
 
 /// The sums of the current second, and the result of the last one.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(super) struct PadWatch {
     alignment: PadAlignment,
     frames: u32,
@@ -77,21 +77,6 @@ pub(super) struct PadWatch {
     falling_frames: u32,
     found: Option<Found>,
 }
-
-remembers!(Found { at_rest, lean_rad, pressure_altitude_m, rotation_rad_s, velocity_m_s });
-remembers!(PadStart { world_from_body, gyro_bias_rad_s });
-remembers!(PadWatch {
-    alignment,
-    frames,
-    gyro_sum_rad_s,
-    fixes,
-    velocity_sum_m_s,
-    force_sum_m_s2,
-    pressures,
-    altitude_sum_m,
-    falling_frames,
-    found
-});
 
 impl PadWatch {
     /// Adds a frame.
@@ -204,18 +189,12 @@ pub(super) const ANSWERING_RAD: f64 = 0.02;
 const LIMIT_S: f64 = 3.0;
 
 /// Progress of the self-test.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) enum SelfTest {
     NotBegun,
     Moved,
     BroughtBack,
     Failed,
-}
-
-impl Remembers for SelfTest {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
 }
 
 /// The next action of the self-test.

@@ -14,7 +14,7 @@ use alloc::boxed::Box;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::memory::checksum;
+use super::digest::checksum;
 use super::news::{MotorWatch, Readiness};
 use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;

@@ -5,6 +5,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use serde::Serialize;
 
 use super::Computer;
 use super::news::{News, Severity, words_of, words_of_landing_here};
@@ -12,13 +13,16 @@ use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
 
 /// Phase and latches, and the reports of this frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct PhaseTable {
     mode: Mode,
     /// What latched first. It follows from the events and decides nothing, so no digest holds it.
+    #[serde(skip)]
     latch: Option<Latch>,
     /// Vehicle time of this frame, s.
+    #[serde(skip)]
     time_s: f64,
+    #[serde(skip)]
     news: Vec<News>,
 }
 

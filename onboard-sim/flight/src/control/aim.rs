@@ -11,9 +11,7 @@
 //!   at once.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
-
-use crate::computer::memory::remembers;
+use serde::{Deserialize, Serialize};
 
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
@@ -92,10 +90,14 @@ pub struct AimGains {
 }
 
 /// The loop and what it remembers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AimLoop {
+    // What is skipped is a constant of the mission.
+    #[serde(skip)]
     gains: AimGains,
+    #[serde(skip)]
     frame_s: f64,
+    #[serde(skip)]
     latency_frames: usize,
     /// Angular accelerations that were commanded but have not acted yet, about body y and z, oldest first, rad/s^2.
     under_way_rad_s2: [[f64; 2]; MAX_LATENCY_FRAMES],
@@ -107,14 +109,6 @@ pub struct AimLoop {
 }
 
 // Gains and lengths come from the mission.
-remembers!(AimLoop {
-    under_way_rad_s2,
-    rate_before_rad_s,
-    disturbance_rad_s2,
-    nozzle_rad,
-    side,
-} but { gains, frame_s, latency_frames });
-
 impl AimLoop {
     /// A loop at rest, called every `frame_s`.
     pub fn new(gains: AimGains, frame_s: f64) -> Self {

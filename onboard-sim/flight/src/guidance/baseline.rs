@@ -14,8 +14,8 @@ use alloc::borrow::ToOwned as _;
 use alloc::string::String;
 use core::f64::consts::TAU;
 use nalgebra::Vector3;
+use serde::Serialize;
 
-use crate::computer::memory::remembers;
 use crate::control::aim::{Aim, AimLoop};
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::MotorEstimate;
@@ -104,14 +104,22 @@ impl Law {
 }
 
 /// A simple law for the landing burn.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Baseline {
+    // What is skipped is a constant of the mission.
+    #[serde(skip)]
     controller: Controller,
+    #[serde(skip)]
     mission: Mission,
+    #[serde(skip)]
     mass: MassModel,
+    #[serde(skip)]
     brake: Brake,
+    #[serde(skip)]
     fins_rad: [f64; 4],
+    #[serde(skip)]
     ignition_height_m: f64,
+    #[serde(skip)]
     largest_swing_rad: f64,
     swing_rad: f64,
     frames: u32,
@@ -229,11 +237,6 @@ fn largest_swing_rad(mission: &Mission, mass: &MassModel, curve: &ThrustCurve) -
     let travel_rad = SWING_TRAVEL_SHARE * mission.airframe.gimbal.limit_rad();
     (turning_rad_s2 * travel_rad / (frequency * frequency)).min(SWING_MAX_RAD)
 }
-
-// The prepared values do not change in flight.
-remembers!(Baseline { swing_rad, frames, aim_loop } but {
-    controller, mission, mass, brake, fins_rad, ignition_height_m, largest_swing_rad,
-});
 
 // The vertical motion of an upright vehicle under its motor. The simple controllers compute it before the flight.
 

@@ -5,9 +5,8 @@
 //! height lies at a set place in the band that all three have in common, so the landing exists for any of them. The
 //! command is sent early by the delay of the igniter.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use crate::computer::memory::remembers;
 use crate::guidance::vertical::{Band, Column};
 use crate::vehicle::burn::Burn;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -32,7 +31,7 @@ pub struct IgnitionSettings {
 }
 
 /// What a tick computes for the choice of the ignition.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct IgnitionOutlook {
     /// Heights from which the certified motor lands if its thrust begins there at the expected speed, m.
     pub band: Option<Band>,
@@ -47,8 +46,6 @@ pub struct IgnitionOutlook {
     /// Time until the command should go out, s; negative when late.
     pub command_in_s: Option<f64>,
 }
-
-remembers!(IgnitionOutlook { band, common, chosen_m, onset_height_m, onset_vertical_m_s, command_in_s });
 
 impl IgnitionOutlook {
     /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin

@@ -13,9 +13,9 @@
 //! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
 //! burn and the tilt late in it.
 
-use crate::computer::memory::remembers;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
+use serde::Serialize;
 
 /// Number of end times tried between the thrust's fall through the weight and the latest end.
 const END_TIMES: usize = 4;
@@ -63,15 +63,13 @@ pub struct Column {
 }
 
 /// Heights from which a landing exists, m.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Band {
     /// Lowest start.
     pub low_m: f64,
     /// Highest start.
     pub high_m: f64,
 }
-
-remembers!(Band { low_m, high_m });
 
 impl Band {
     /// Place of a height in the band: 0 at its low end, 1 at its high end, other values outside.

@@ -4,6 +4,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
+use serde::Serialize;
 
 use crate::rules::phase::UPLINK_PROVEN_S;
 use crate::rules::verdict::LandingVerdict;
@@ -22,7 +23,7 @@ pub enum Uplink {
 }
 
 /// Where a rehearsed landing ends.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictedLanding {
     /// Inside every touchdown limit.
     pub lands: bool,

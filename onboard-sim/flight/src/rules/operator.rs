@@ -1,10 +1,10 @@
 //! The people who may command: their names and their roles. Which key belongs to whom is not known here.
 
-use crate::computer::memory::{Memory, Remembers};
 use core::fmt;
+use serde::Serialize;
 
 /// What an operator is there for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Role {
     /// Looks on, and commands nothing.
@@ -41,7 +41,7 @@ impl Role {
 }
 
 /// A name of at most [`Name::LEN`] bytes; a longer one is cut at a character.
-#[derive(Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Name([u8; Name::LEN]);
 
 impl Name {
@@ -79,19 +79,12 @@ impl fmt::Debug for Name {
 }
 
 /// A person with a key of their own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Operator {
     /// The number of their key, 1 to 15: no other operator has it.
     pub number: u8,
     pub role: Role,
     pub name: Name,
-}
-
-impl Remembers for Operator {
-    fn remember(&self, memory: &mut Memory) {
-        [self.number, self.role as u8].remember(memory);
-        self.name.bytes().remember(memory);
-    }
 }
 
 impl fmt::Display for Operator {

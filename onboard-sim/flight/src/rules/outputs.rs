@@ -7,7 +7,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::computer::memory::remembers;
 use crate::rules::phase::{Mode, Motor, Phase};
 
 /// Something that gets current.
@@ -80,8 +79,6 @@ pub struct Outputs {
     ascent_igniter: bool,
     separation: bool,
 }
-
-remembers!(Outputs { landing_igniter, parachute, ascent_igniter, separation });
 
 impl Outputs {
     /// No current anywhere.

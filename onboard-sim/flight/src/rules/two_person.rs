@@ -16,10 +16,10 @@
 //! frame's input, so a replay decides the same.
 
 use core::fmt;
+use serde::Serialize;
 
 use super::operator::Operator;
 use super::phase::UPLINK_SILENT_S;
-use crate::computer::memory::{Memory, Remembers, remembers};
 
 /// How long an ask waits for its confirmation, s.
 pub const CONFIRM_WITHIN_S: f64 = 10.0;
@@ -38,17 +38,11 @@ fn ask_number(first: u16, nth: u16) -> u16 {
 }
 
 /// What takes two people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Act {
     Arm = 1,
     Start = 2,
-}
-
-impl Remembers for Act {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
 }
 
 impl Act {
@@ -61,7 +55,7 @@ impl Act {
 }
 
 /// A ground station, as the vehicle tells it apart from others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Station {
     /// MAVLink system.
     pub system: u8,
@@ -72,16 +66,6 @@ pub struct Station {
     pub number: u32,
 }
 
-impl Remembers for Station {
-    fn remember(&self, memory: &mut Memory) {
-        [self.system, self.component].remember(memory);
-        // Logs from before stations were told apart have the same digest.
-        if self.number != 0 {
-            self.number.remember(memory);
-        }
-    }
-}
-
 impl fmt::Display for Station {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}/{}", self.system, self.component)
@@ -89,7 +73,7 @@ impl fmt::Display for Station {
 }
 
 /// An ask that waits for its confirmation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ask {
     pub act: Act,
     /// A confirmation names it: 1 to 65,535, another one for each ask.
@@ -98,8 +82,6 @@ pub struct Ask {
     pub station: Station,
     pub at_s: f64,
 }
-
-remembers!(Ask { act, number, by, station, at_s });
 
 impl Ask {
     /// Time left to confirm it, s; not positive once it has lapsed.
@@ -114,14 +96,12 @@ impl Ask {
 }
 
 /// Whose taps keep the countdown running.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tapping {
     pub by: Operator,
     /// The last tap, s.
     pub at_s: f64,
 }
-
-remembers!(Tapping { by, at_s });
 
 impl Tapping {
     /// Time left for the next tap, s; negative once it is overdue.
@@ -159,7 +139,7 @@ pub enum Reply {
 }
 
 /// What is asked, and whose taps are waited for.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct TwoPerson {
     /// How many asks there were.
     asks: u16,
@@ -263,8 +243,6 @@ impl TwoPerson {
         self.tapping.filter(|tapping| !in_time(tapping)).map(|tapping| tapping.by)
     }
 }
-
-remembers!(TwoPerson { asks, ask, armed, tapping });
 
 #[cfg(test)]
 mod tests {

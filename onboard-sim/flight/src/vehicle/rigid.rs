@@ -13,7 +13,6 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::computer::memory::remembers;
 use crate::vehicle::dynamics::PlanarState;
 
 /// Position, velocity, attitude and rotation of a rigid rocket.
@@ -27,8 +26,6 @@ pub struct RigidState {
     /// Rotation rate in body axes, rad/s.
     pub rate_rad_s: Vector3<f64>,
 }
-
-remembers!(RigidState { position_m, velocity_m_s, world_from_body, rate_rad_s });
 
 impl RigidState {
     /// Upright at rest, not rolled, with the centre of gravity at a height, m.

@@ -14,13 +14,13 @@ mod tests;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use serde::Serialize;
 
 use self::sweep::{Still, Sweep};
 use super::crew::{Answer, Asked, Ending};
 use super::news::Severity;
 use super::pad::{SelfTest, as_measured};
 use super::{Computer, Input};
-use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::estimation::estimator::Measurements;
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
@@ -28,7 +28,7 @@ use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 
 /// How the last check stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[repr(u8)]
 pub enum CheckState {
     /// There was none since power-up.
@@ -47,7 +47,7 @@ pub enum CheckState {
 const RETURN_FRAMES: u64 = 200;
 
 /// What is being done.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 enum Stage {
     Resting,
     Sweeping(Sweep),
@@ -55,7 +55,7 @@ enum Stage {
 }
 
 /// The last check, and the running one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PadCheck {
     run: u16,
     state: CheckState,
@@ -66,31 +66,6 @@ pub struct PadCheck {
     /// The surfaces return to rest until this frame.
     returns_until: u64,
     findings: Vec<Finding>,
-}
-
-remembers!(PadCheck { run, state, stage, by, swept_frames, returns_until, findings });
-remembers!(Finding { item, value, least, most, verdict });
-
-impl Remembers for CheckState {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
-}
-
-impl Remembers for Stage {
-    fn remember(&self, memory: &mut Memory) {
-        match self {
-            Self::Resting => 0u8.remember(memory),
-            Self::Sweeping(sweep) => {
-                1u8.remember(memory);
-                sweep.remember(memory);
-            }
-            Self::Still(still) => {
-                2u8.remember(memory);
-                still.remember(memory);
-            }
-        }
-    }
 }
 
 /// One frame on the pad, as the check sees it.
@@ -235,7 +210,7 @@ impl PadCheck {
 pub const SURFACES: usize = 6;
 
 /// What was looked at. Values are SI: rad, s, rad/s, m/s^2, m, m/s, V, bytes; a switch is 1 or 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Item {
     /// How far a surface went, from end to end.
     Range(usize),
@@ -316,14 +291,8 @@ impl Item {
     }
 }
 
-impl Remembers for Item {
-    fn remember(&self, memory: &mut Memory) {
-        self.number().remember(memory);
-    }
-}
-
 /// What a value means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Verdict {
     /// Shown only: here nothing is wrong with any value.
@@ -332,14 +301,8 @@ pub enum Verdict {
     NotOk = 2,
 }
 
-impl Remembers for Verdict {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
-}
-
 /// A value with its limits; NaN is no limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Finding {
     pub item: Item,
     /// NaN: there was none.

@@ -4,9 +4,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::{Finding, Item, SURFACES, Told, larger};
-use crate::computer::memory::remembers;
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
@@ -77,7 +77,7 @@ impl Reach {
 }
 
 /// What one surface has shown so far.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Shown {
     least_rad: f64,
     most_rad: f64,
@@ -90,8 +90,10 @@ const NOTHING_SHOWN: Shown =
     Shown { least_rad: f64::INFINITY, most_rad: f64::NEG_INFINITY, error_rad: 0.0, lag_s: 0.0 };
 
 /// The sweep of all surfaces.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Sweep {
+    // What is skipped is a constant of the mission.
+    #[serde(skip)]
     reaches: [Reach; SURFACES],
     surface: usize,
     /// The place of the present target among the surface's.
@@ -102,9 +104,6 @@ pub(super) struct Sweep {
     arrived_s: Option<f64>,
     shown: Shown,
 }
-
-remembers!(Shown { least_rad, most_rad, error_rad, lag_s });
-remembers!(Sweep { surface, target, frames, frames_before, arrived_s, shown } but { reaches });
 
 impl Sweep {
     pub(super) fn new(airframe: &Airframe) -> Self {
@@ -204,7 +203,7 @@ const SPREAD_MOST: f64 = 2.0;
 const FIXES_LEAST: f64 = STILL_FRAMES as f64 * FRAME_S;
 
 /// Mean and sum of squared differences from it (Welford 1962), of one number.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 struct Spread {
     samples: u32,
     mean: f64,
@@ -228,7 +227,7 @@ impl Spread {
     }
 }
 
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct Still {
     frames: u32,
     gyro_rad_s: [Spread; 3],
@@ -238,9 +237,6 @@ pub(super) struct Still {
     velocity_sum_m_s: Vector3<f64>,
     lidar_m: Option<f64>,
 }
-
-remembers!(Spread { samples, mean, squares });
-remembers!(Still { frames, gyro_rad_s, force_m_s2, pressure_altitude_m, fixes, velocity_sum_m_s, lidar_m });
 
 impl Still {
     pub(super) fn take(&mut self, measured: &Measurements) {

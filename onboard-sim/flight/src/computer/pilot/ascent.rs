@@ -6,7 +6,6 @@ use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use super::Sensed;
-use crate::computer::memory::remembers;
 use crate::computer::news::Severity;
 use crate::computer::pad::ANSWERING_RAD;
 use crate::estimation::estimator::Estimate;
@@ -78,21 +77,6 @@ pub(super) struct AscentWatch {
     marked_at_s: f64,
     climbing: bool,
 }
-
-remembers!(AscentWatch {
-    gained_m_s,
-    lifted_off,
-    braking_s,
-    separating_since_s,
-    falling_frames,
-    highest_m,
-    sunk_s,
-    ground_m,
-    risen_s,
-    mark_m,
-    marked_at_s,
-    climbing
-});
 
 impl Default for AscentWatch {
     fn default() -> Self {
@@ -270,9 +254,6 @@ struct Watched {
 pub(super) struct FinWatch {
     fins: [Watched; 4],
 }
-
-remembers!(Watched { rests_at_rad, called_for_s });
-remembers!(FinWatch { fins });
 
 impl FinWatch {
     /// Takes a frame: measured and commanded angles of the fins, rad.

@@ -2,8 +2,8 @@
 //! From that, the motor and the fin opening that a plan assumes.
 
 use nalgebra::{Vector2, Vector3};
+use serde::Serialize;
 
-use crate::computer::memory::remembers;
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::MotorEstimate;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation};
@@ -15,17 +15,18 @@ use crate::vehicle::mission::Mission;
 use crate::vehicle::rigid::RigidState;
 
 /// The vehicle as the pilot knows it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Known {
+    // What is skipped is a constant of the mission.
+    #[serde(skip)]
     pub(super) mission: Mission,
+    #[serde(skip)]
     pub(super) mass: MassModel,
     /// Estimated motor and scale of the aerodynamic forces.
     pub(super) motor: MotorEstimate,
 }
 
 // The mission, its motor and its masses come from the profile in the log; they do not change in flight.
-remembers!(Known { motor } but { mission, mass });
-
 /// The vehicle with its motor burning, in one frame.
 #[expect(clippy::struct_field_names, reason = "the time since thrust began is called that everywhere")]
 pub(super) struct Burning {

@@ -15,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
 use self::known::{Burning, Known};
 pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
-use crate::computer::memory::remembers;
 use crate::computer::{Input, flight_time_s};
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
@@ -88,7 +87,7 @@ pub(super) struct PilotOutput {
 }
 
 /// The pilot and everything that it remembers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Pilot {
     known: Known,
     estimator: Estimator,
@@ -110,25 +109,6 @@ pub struct Pilot {
     /// Since when a lasting reason has kept the gate shut, s.
     gate_shut_since_s: Option<f64>,
 }
-
-remembers!(Pilot {
-    known,
-    estimator,
-    estimate,
-    ascent,
-    apogee_m,
-    ignited_at_s,
-    outlook,
-    powered,
-    baseline,
-    aim_loop,
-    fin_share,
-    fins_rad,
-    fin_watch,
-    gimbal_rad,
-    gate_refusal,
-    gate_shut_since_s,
-});
 
 impl Pilot {
     /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of that estimate.

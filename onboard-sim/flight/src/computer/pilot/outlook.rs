@@ -1,9 +1,9 @@
 //! The pilot's forecast for the next seconds, and the parachute if it shows that no landing will be possible.
 
 use nalgebra::{Vector2, Vector3};
+use serde::Serialize;
 
 use super::{Pilot, PilotInput};
-use crate::computer::memory::remembers;
 use crate::estimation::estimator::Estimate;
 use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
@@ -19,7 +19,7 @@ const COMMIT_MARGIN: f64 = 1.5;
 const FALL_MIN_M_S: f64 = 5.0;
 
 /// The forecast before ignition, renewed five or twenty times a second.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Outlook {
     pub ignition: IgnitionOutlook,
     /// Height of the feet below which the parachute has no room to spare, m.
@@ -33,15 +33,6 @@ pub struct Outlook {
     /// Distance from the pad at which the vehicle would touch down without further steering, m.
     pub touchdown_distance_m: f64,
 }
-
-remembers!(Outlook {
-    ignition,
-    commit_height_m,
-    height_m,
-    predicted_speed_m_s,
-    lands_ahead,
-    touchdown_distance_m
-});
 
 impl Outlook {
     /// Height of the feet below which the parachute does not fill before it reaches the ground, m.

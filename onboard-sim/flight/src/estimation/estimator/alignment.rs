@@ -1,9 +1,9 @@
 //! Finds the initial attitude on the pad: at rest the accelerometer shows the vertical and the gyro shows its own bias.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use serde::Serialize;
 
 use super::ImuSample;
-use crate::computer::memory::remembers;
 use crate::vehicle::rigid::upright;
 
 /// Fewest samples for an alignment: one second at 200 Hz.
@@ -14,14 +14,12 @@ pub(crate) const STILL_RAD_S: f64 = 0.017;
 pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.3..=10.3;
 
 /// Running means over the samples taken at rest.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PadAlignment {
     samples: u32,
     gyro_rad_s: Vector3<f64>,
     specific_force_m_s2: Vector3<f64>,
 }
-
-remembers!(PadAlignment { samples, gyro_rad_s, specific_force_m_s2 });
 
 /// Why there is no alignment yet.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -47,7 +45,7 @@ pub enum AlignmentError {
 }
 
 /// The result of the alignment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PadStart {
     /// The attitude, with the given heading.
     pub world_from_body: UnitQuaternion<f64>,

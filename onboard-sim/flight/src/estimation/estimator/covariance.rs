@@ -9,8 +9,7 @@
 //! (27).
 
 use nalgebra::{Matrix3, Vector3};
-
-use crate::computer::memory::remembers;
+use serde::Serialize;
 
 /// Length of the error state.
 pub(super) const N: usize = 28;
@@ -36,12 +35,10 @@ pub(super) type Row = [f64; N];
 const SMALLEST_VARIANCE: f64 = 1e-14;
 
 /// The matrix is exactly symmetric: after each change the upper half is copied to the lower half.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Covariance {
     rows: [Row; N],
 }
-
-remembers!(Covariance { rows });
 
 /// Propagation of the error over one interval.
 #[derive(Debug, Clone, Copy, PartialEq)]

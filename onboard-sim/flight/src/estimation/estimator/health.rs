@@ -5,7 +5,6 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{EstimatorConfig, Sigmas};
-use crate::computer::memory::{Memory, Remembers, remembers};
 
 /// Number of frames without a usable inertial sample that the last sample bridges.
 const BRIDGED_FRAMES: u32 = 4;
@@ -19,22 +18,6 @@ pub enum Health {
     Good,
     /// The estimate must not be used.
     Doubtful(Doubt),
-}
-
-impl Remembers for Health {
-    fn remember(&self, memory: &mut Memory) {
-        let doubt: u8 = match self {
-            Self::Good => 0,
-            Self::Doubtful(Doubt::Restarted) => 1,
-            Self::Doubtful(Doubt::Imu) => 2,
-            Self::Doubtful(Doubt::Surprised) => 3,
-            Self::Doubtful(Doubt::Velocity) => 4,
-            Self::Doubtful(Doubt::Height) => 5,
-            Self::Doubtful(Doubt::Horizontal) => 6,
-            Self::Doubtful(Doubt::Tilt) => 7,
-        };
-        doubt.remember(memory);
-    }
 }
 
 /// Why an estimate must not be used.
@@ -115,7 +98,7 @@ pub(super) fn judge(
 // row, the filter is wrong.
 
 /// The counts of one gate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct GateCounters {
     /// Measurements used.
     pub accepted: u32,
@@ -125,10 +108,8 @@ pub struct GateCounters {
     pub rejected_in_a_row: u32,
 }
 
-remembers!(GateCounters { accepted, rejected, rejected_in_a_row });
-
 /// The counts of all gates, one for each sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Gates {
     /// Inertial samples; an impossible sample is replaced by the sample before it.
     pub imu: GateCounters,
@@ -141,8 +122,6 @@ pub struct Gates {
     /// Sideways force, for the wind.
     pub wind: GateCounters,
 }
-
-remembers!(Gates { imu, barometer, gnss_velocity, gnss_position, lidar, wind });
 
 impl GateCounters {
     /// Counts a verdict and returns it.
@@ -160,12 +139,10 @@ impl GateCounters {
 
 /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too
 /// much from their predictions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Surprise {
     mean: f64,
 }
-
-remembers!(Surprise { mean });
 
 /// Weight of the newest value in the running mean of the normalised innovation squared: the mean remembers three
 /// fixes of three numbers.
@@ -216,8 +193,6 @@ pub struct HeightSources {
     pub barometric_m: Option<f64>,
 }
 
-remembers!(HeightSources { inertial_m, inertial_sigma_m, barometric_m });
-
 impl HeightSources {
     /// The difference of the two heights, m; `None` when there is only one.
     pub fn disagreement_m(&self) -> Option<f64> {
@@ -226,7 +201,7 @@ impl HeightSources {
 }
 
 /// Height and the satellite height's offset, with their covariance.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct HeightChannel {
     height_m: f64,
     offset_m: f64,
@@ -237,16 +212,6 @@ pub(super) struct HeightChannel {
     barometric_m: f64,
     barometer_age_s: f64,
 }
-
-remembers!(HeightChannel {
-    height_m,
-    offset_m,
-    height_m2,
-    offset_m2,
-    cross_m2,
-    barometric_m,
-    barometer_age_s,
-});
 
 impl HeightChannel {
     pub(super) fn new(height_m: f64, height_sigma_m: f64, offset_sigma_m: f64) -> Self {

@@ -38,7 +38,6 @@ use self::strapdown::{History, Noise, Nominal, Pending};
 use self::updates::FixAge;
 use self::wind::Sideways;
 pub use self::wind::VehicleNow;
-use crate::computer::memory::remembers;
 use crate::vehicle::rigid::RigidState;
 
 /// Standard deviations of an estimate, from the diagonal of the covariance.
@@ -55,15 +54,6 @@ pub struct Sigmas {
     /// Wind, world x and y, m/s.
     pub wind_m_s: Vector2<f64>,
 }
-
-remembers!(Sigmas {
-    position_m,
-    velocity_m_s,
-    attitude_rad,
-    gyro_bias_rad_s,
-    accelerometer_bias_m_s2,
-    wind_m_s,
-});
 
 /// The output of the estimator after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -86,18 +76,6 @@ pub struct Estimate {
     /// Whether the estimate may be used.
     pub health: Health,
 }
-
-remembers!(Estimate {
-    time_s,
-    state,
-    specific_force_m_s2,
-    wind_m_s,
-    gyro_bias_rad_s,
-    accelerometer_bias_m_s2,
-    sigmas,
-    heights,
-    health,
-});
 
 impl Estimate {
     /// An exact estimate from the true state, for flights and tests without an estimator.
@@ -138,10 +116,14 @@ impl Estimate {
 }
 
 /// The filter. Only `step` advances it. A clone continues with exactly the same bits.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimator {
+    // What is skipped is a constant of the mission.
+    #[serde(skip)]
     config: EstimatorConfig,
+    #[serde(skip)]
     noise: Noise,
+    #[serde(skip)]
     start: StartUncertainty,
     start_s: f64,
     frames: u64,
@@ -164,11 +146,6 @@ pub struct Estimator {
 }
 
 // Configuration, noise and the initial uncertainty come from the mission.
-remembers!(Estimator {
-    start_s, frames, nominal, covariance, pending, history, heights, sideways, gates, surprise, fix_age, last_imu, rate_rad_s,
-    specific_force_m_s2, last_good, restarts, restarted_at_s, surprised_at_s,
-} but { config, noise, start });
-
 impl Estimator {
     /// Starts at a time, s, from a state with this uncertainty.
     pub fn new(config: &EstimatorConfig, start: &StartUncertainty, time_s: f64, state: &RigidState) -> Self {
@@ -364,15 +341,13 @@ pub const LARGEST_RATE_RAD_S: f64 = 75.0;
 pub const LARGEST_SPECIFIC_FORCE_M_S2: f64 = 2000.0;
 
 /// Inertial measurement unit, the mean over the frame that has just ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImuSample {
     /// Rotation rate in body axes, rad/s.
     pub gyro_rad_s: Vector3<f64>,
     /// Specific force (acceleration minus gravity) at the centre of gravity, body axes, m/s^2.
     pub specific_force_m_s2: Vector3<f64>,
 }
-
-remembers!(ImuSample { gyro_rad_s, specific_force_m_s2 });
 
 impl ImuSample {
     /// Whether an inertial unit can send these numbers: they are below [`LARGEST_RATE_RAD_S`] and

@@ -1,13 +1,13 @@
 //! Propagates the state and its error with the inertial unit, and keeps the recent motion for late measurements.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+use serde::Serialize;
 
 use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
     GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition, VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
-use crate::computer::memory::remembers;
 use crate::vehicle::rigid::RigidState;
 
 /// The covariance is propagated once in this many frames, and before every correction.
@@ -16,7 +16,7 @@ const FRAMES_BETWEEN: u32 = 2;
 const LOWEST_SHEAR_M: f64 = 2.0;
 
 /// The estimated state; its error is in the filter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Nominal {
     pub(super) position_m: Vector3<f64>,
     pub(super) velocity_m_s: Vector3<f64>,
@@ -34,23 +34,6 @@ pub(super) struct Nominal {
     pub(super) slope: Vector2<f64>,
     pub(super) barometer_suction: f64,
 }
-
-remembers!(Nominal {
-    position_m,
-    velocity_m_s,
-    world_from_body,
-    gyro_bias_rad_s,
-    accelerometer_bias_m_s2,
-    wind_m_s,
-    barometer_offset_m,
-    barometer_ram,
-    gnss_offset_m,
-    gnss_time_tag_s,
-    barometer_late_s,
-    lidar_late_s,
-    slope,
-    barometer_suction,
-});
 
 impl Nominal {
     pub(super) fn at(state: &RigidState) -> Self {
@@ -153,7 +136,7 @@ impl Noise {
 }
 
 /// The motion over the frames that the covariance does not contain yet.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Pending {
     frames: u32,
     felt_m_s: Vector3<f64>,
@@ -161,8 +144,6 @@ pub(super) struct Pending {
     wind_factor: f64,
     burning: bool,
 }
-
-remembers!(Pending { frames, felt_m_s, world_from_body_s, wind_factor, burning });
 
 impl Default for Pending {
     fn default() -> Self {
@@ -251,7 +232,7 @@ impl Estimator {
 /// Frames kept: 320 ms at 200 Hz.
 const LENGTH: usize = 64;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Sums {
     time_s: f64,
     /// Velocity gained since the start, world, m/s.
@@ -259,8 +240,6 @@ struct Sums {
     /// Its integral, m.
     position_m: Vector3<f64>,
 }
-
-remembers!(Sums { time_s, velocity_m_s, position_m });
 
 /// The motion since a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -274,14 +253,14 @@ pub(super) struct Since {
     pub(super) acceleration_m_s2: Vector3<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct History {
+    // A slice, because serde knows arrays of up to 32 elements.
+    #[serde(serialize_with = "<[Sums]>::serialize")]
     ring: [Sums; LENGTH],
     filled: usize,
     newest: usize,
 }
-
-remembers!(History { ring, filled, newest });
 
 impl History {
     pub(super) fn new(time_s: f64) -> Self {

@@ -6,7 +6,7 @@ use super::covariance::{
 };
 use super::strapdown::Since;
 use super::{Estimator, EstimatorConfig, GnssFix};
-use crate::computer::memory::remembers;
+use serde::Serialize;
 
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
 /// 20 in 0.2 s.
@@ -42,14 +42,13 @@ const AGE_SIGMAS: f64 = 3.0;
 
 /// How much the ages of the fixes vary, from how far their positions are off along the motion: innovation-based adaptive
 /// estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17, 1972), of this one number.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct FixAge {
     variance_s2: f64,
     fixes: f64,
+    #[serde(skip)]
     smallest_s2: f64,
 }
-
-remembers!(FixAge { variance_s2, fixes } but { smallest_s2 });
 
 impl FixAge {
     pub(super) fn new(config: &EstimatorConfig) -> Self {

@@ -5,10 +5,10 @@
 //! estimated wind, because a wrong drag coefficient must not tilt the attitude.
 
 use nalgebra::{Matrix2, Matrix2x3, Rotation3, Vector2, Vector3};
+use serde::Serialize;
 
 use super::Estimator;
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
-use crate::computer::memory::remembers;
 use crate::vehicle::airframe::{Airframe, MassProperties};
 use crate::vehicle::fins::{COS_30, PITCH, ROLL, SIN_30, YAW};
 use crate::vehicle::mission::Exhaust;
@@ -21,13 +21,11 @@ const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
 const COEFFICIENT_ERROR_LASTS_S: f64 = 2.0;
 
 /// The running mean of the sideways specific force, body y and z.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct Sideways {
     sum_m_s2: Vector2<f64>,
     frames: u32,
 }
-
-remembers!(Sideways { sum_m_s2, frames });
 
 impl Sideways {
     pub(super) fn clear(&mut self) {

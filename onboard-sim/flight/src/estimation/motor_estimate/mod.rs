@@ -15,7 +15,6 @@ mod tests;
 use nalgebra::{Matrix5, Vector2, Vector5};
 use serde::{Deserialize, Serialize};
 
-use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::vehicle::airframe::BadValue;
 use crate::vehicle::burn::{Burn, Deviation};
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -136,18 +135,6 @@ pub enum MotorStage {
     },
 }
 
-impl Remembers for MotorStage {
-    fn remember(&self, memory: &mut Memory) {
-        let (stage, at_s): (u8, Option<f64>) = match self {
-            Self::Waiting => (0, None),
-            Self::Burning => (1, None),
-            Self::EndedEarly { at_s } => (2, Some(*at_s)),
-        };
-        stage.remember(memory);
-        at_s.remember(memory);
-    }
-}
-
 /// Thrust with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedThrust {
@@ -174,8 +161,6 @@ pub struct MotorEstimate {
 }
 
 // The prior is constant; everything that changes is in the mean and the covariance.
-remembers!(MotorEstimate { detector, stage, mean, covariance, felt_at_s, starved_frames, chuffed_s } but { prior });
-
 const IMPULSE: usize = 0;
 const STRETCH: usize = 1;
 const IGNITION: usize = 2;
@@ -499,8 +484,6 @@ struct Detector {
     /// When the thrust rose through the threshold, if the last frame was above it, s.
     crossed_s: Option<f64>,
 }
-
-remembers!(Detector { last, crossed_s });
 
 impl Detector {
     /// Whether the last frame was above the threshold; the next frame then decides.

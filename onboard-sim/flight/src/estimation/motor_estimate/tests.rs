@@ -1,6 +1,7 @@
 //! The filter finds the parameters of simulated motors that are drawn from the prior.
 
 use super::*;
+use serde::Serialize;
 
 /// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls for a long time.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +36,7 @@ impl Normal {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize)]
 struct Motor {
     impulse: f64,
     stretch: f64,

@@ -20,14 +20,13 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
 use nmpc::{Problem, SolveStatus};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 pub use self::report::{ControlLevel, LandingSolved, PoweredReport, PoweredSettings};
 use self::situation::{Ahead, Flown, largest_tilt_rad};
 pub use self::situation::{Plane, PoweredSituation};
 use self::space::SpaceGuidance;
 pub use self::space::SpaceSettings;
-use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{FinalBox, SolverLimits};
@@ -69,24 +68,26 @@ fn ended_m_s(plan: &FreeTimeSolution) -> f64 {
 }
 
 /// The guidance and its memory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct PoweredGuidance {
+    #[serde(skip)]
     settings: PoweredSettings,
     plane: Option<Plane>,
     flown: Option<Flown>,
     report: PoweredReport,
+    // The next search writes all of these before it reads them. (If a problem cannot be posed, the trial keeps an older
+    // final time, which is reported but decides nothing.)
+    #[serde(skip)]
     workspace: FreeTimeWorkspace,
+    #[serde(skip)]
     trial: FreeTimeSolution,
+    #[serde(skip)]
     set_aside: FreeTimeSolution,
     /// Becomes the flown plan with the first plan.
+    #[serde(skip)]
     unused: Flown,
     space: SpaceGuidance,
 }
-
-// The settings come from the mission. A search does not depend on the workspace. The trial solutions are cleared before
-// each solve and only keep their capacity, and so does what becomes the flown plan. (If a problem cannot be posed, the trial
-// keeps an older final time, which is reported but decides nothing.)
-remembers!(PoweredGuidance { plane, flown, report, space } but { settings, workspace, trial, set_aside, unused });
 
 impl PoweredGuidance {
     /// Guidance without a plan, whose plans in a plane need no more memory than it has, however long the motor burns.

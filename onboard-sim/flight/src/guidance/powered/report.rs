@@ -2,12 +2,11 @@
 //! reads and changes the guidance.
 
 use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, pose, solve_free_time};
-use nmpc::{Problem, Solution, SolveStatus};
+use nmpc::{Problem, SolveStatus};
 use serde::{Deserialize, Serialize};
 
 use super::situation::Ahead;
 use super::{Homing, Plane, PoweredGuidance, PoweredSituation, SpaceSettings};
-use crate::computer::memory::{Memory, Remembers, remembers};
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{FinalBox, SolverLimits, StateWeights};
 use crate::vehicle::rigid::RigidState;
@@ -28,12 +27,6 @@ pub enum ControlLevel {
     ShiftedPlan = 4,
     /// Upright, with a lean against the sideways velocity.
     Stabiliser = 5,
-}
-
-impl Remembers for ControlLevel {
-    fn remember(&self, memory: &mut Memory) {
-        self.index().remember(memory);
-    }
 }
 
 impl ControlLevel {
@@ -71,7 +64,7 @@ impl ControlLevel {
 }
 
 /// The report of a tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoweredReport {
     /// The source of the nose's direction.
     pub level: ControlLevel,
@@ -94,19 +87,6 @@ pub struct PoweredReport {
     /// Largest planned tilt, rad.
     pub largest_tilt_rad: f64,
 }
-
-remembers!(PoweredReport {
-    level,
-    status,
-    iterations,
-    kkt_stationarity,
-    kkt_feasibility,
-    cost,
-    condition_miss,
-    touchdown_in_s,
-    touchdown,
-    largest_tilt_rad,
-});
 
 impl PoweredReport {
     /// Before the first tick.
@@ -247,30 +227,3 @@ fn at_final_time(posed: &FreeTimeProblem, ahead: &Ahead<'_, '_>, final_time_s: f
 }
 
 // The guidance's memory, for the pilot's digest.
-
-remembers!(FreeTimeSolution { solution, final_time_s, earliest_s, price_slope, solves });
-remembers!(Solution {
-    status,
-    iterations,
-    qp_iterations,
-    cost,
-    price,
-    step_s,
-    kkt_stationarity,
-    kkt_feasibility,
-    condition_miss,
-    best_touchdown_speed_m_s,
-    states,
-    costates,
-    limit_multipliers,
-    inputs_rad,
-    end_multipliers,
-    floor_multipliers,
-});
-remembers!(PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s });
-
-impl Remembers for SolveStatus {
-    fn remember(&self, memory: &mut Memory) {
-        self.index().remember(memory);
-    }
-}

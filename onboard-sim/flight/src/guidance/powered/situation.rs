@@ -4,8 +4,8 @@ use alloc::vec::Vec;
 use core::f64::consts::{FRAC_PI_2, TAU};
 use nalgebra::Vector3;
 use nmpc::free_time::{FreeTimeSolution, Motor};
+use serde::Serialize;
 
-use crate::computer::memory::remembers;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
 use crate::vehicle::rigid::RigidState;
@@ -130,15 +130,13 @@ fn elevation_rad(up: f64, along: f64) -> f64 {
 }
 
 /// A vertical plane through the pad's axis, and the direction across it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Plane {
     /// Horizontal direction in the plane, of length 1.
     pub along: Vector3<f64>,
     /// Horizontal direction across it: up cross along.
     pub across: Vector3<f64>,
 }
-
-remembers!(Plane { along, across });
 
 impl Plane {
     /// The plane with the largest correction: along the horizontal velocity to be lost and the way back to the pad. If
@@ -209,15 +207,13 @@ impl Plane {
 // The plan being flown, and its values at a given time.
 
 /// A plan being flown.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct Flown {
     pub(super) begins_s: f64,
     /// Rotational acceleration of a unit sine of the gimbal angle in each interval, rad/s^2.
     pub(super) turning_rad_s2: Vec<f64>,
     pub(super) plan: FreeTimeSolution,
 }
-
-remembers!(Flown { begins_s, turning_rad_s2, plan });
 
 impl Flown {
     pub(super) fn left_s(&self, time_s: f64) -> f64 {

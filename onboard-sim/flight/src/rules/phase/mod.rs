@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 
 pub use self::event::{Effect, Effects, Event, Refusal};
 pub use self::transition::{Transition, transition};
-use crate::computer::memory::{Memory, Remembers, remembers};
 pub use crate::vehicle::mission::StartPoint;
 
 /// How long nobody may approach the pad after an abort there, s.
@@ -146,15 +145,6 @@ pub struct Interlocks {
     pub lands_here: bool,
 }
 
-remembers!(Interlocks {
-    pin_out,
-    armed,
-    landing_motor_inhibited,
-    abort_latched,
-    no_light_latched,
-    lands_here
-});
-
 /// Phase, latches, countdown and motor: the whole state of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
@@ -170,17 +160,6 @@ pub struct Mode {
     pub hold: Option<Hold>,
     /// The state of the landing motor.
     pub motor: Motor,
-}
-
-impl Remembers for Mode {
-    fn remember(&self, memory: &mut Memory) {
-        let Self { phase, interlocks, entered_at_s, countdown_end_s, hold, motor } = self;
-        phase.index().remember(memory);
-        interlocks.remember(memory);
-        (*entered_at_s, *countdown_end_s).remember(memory);
-        hold.remember(memory);
-        motor.remember(memory);
-    }
 }
 
 impl Mode {
@@ -259,12 +238,6 @@ pub enum HoldCause {
     LogFailed = 5,
 }
 
-impl Remembers for HoldCause {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
-}
-
 /// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
@@ -272,8 +245,6 @@ pub struct Hold {
     /// When the countdown was held, vehicle time, s.
     pub at_s: f64,
 }
-
-remembers!(Hold { cause, at_s });
 
 impl StartPoint {
     /// From when on nothing holds, s before the release. `None` below a drone: its pilot lets go at no set time after the
@@ -367,7 +338,7 @@ pub enum Motor {
 }
 
 /// The motor's state for a person near the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum MotorStatus {
     /// Not lit, and the pin is in: the igniter line is cut by hand.
     PinIn,
@@ -379,12 +350,6 @@ pub enum MotorStatus {
     Hot,
     /// Burnt out and cooled.
     Burnt,
-}
-
-impl Remembers for MotorStatus {
-    fn remember(&self, memory: &mut Memory) {
-        (*self as u8).remember(memory);
-    }
 }
 
 impl Mode {

@@ -10,11 +10,10 @@ use nalgebra::Vector3;
 use nmpc::SolveStatus;
 use nmpc::free_time::Motor;
 use nmpc::space::{Drag, End, Outcome, Push, SpaceProblem, SpaceWorkspace, State, Status, Weights};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use self::plan::SpacePlan;
 use super::{END_LEAN_MAX_RAD, HARD_M_S, LEAST_INTERVALS, MOST_INTERVALS, Plane, PoweredReport};
-use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
 use crate::guidance::powered::situation::Ahead;
 use crate::guidance::powered::{ControlLevel, PoweredSettings, PoweredSituation, here_m};
@@ -40,22 +39,27 @@ const LEAST_STEP_S: f64 = 0.01;
 const DIFFERENCE_S: f64 = 1e-4;
 
 /// Plans landings in space, and flies one.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct SpaceGuidance {
+    // The next search writes these before it reads them.
+    #[serde(skip)]
     workspace: SpaceWorkspace,
+    #[serde(skip)]
     problem: Option<SpaceProblem>,
+    #[serde(skip)]
     trial: SpacePlan,
+    #[serde(skip)]
     found: SpacePlan,
+    #[serde(skip)]
     warm: SpacePlan,
     flown: Option<SpacePlan>,
     /// Becomes the flown plan with the first plan.
+    #[serde(skip)]
     unused: SpacePlan,
     /// The flown plan's motion in the plane of the report.
+    #[serde(skip)]
     projected: Vec<PlanarState>,
 }
-
-// The workspace and the plans beside the flown one are written before they are read; the projection is only reported.
-remembers!(SpaceGuidance { flown } but { workspace, problem, trial, found, warm, unused, projected });
 
 impl SpaceGuidance {
     /// Forgets its plans, and keeps their room.

@@ -1,17 +1,17 @@
 //! A plan of a landing in space, and what is read from it.
 
 use alloc::vec::Vec;
+use serde::Serialize;
 
 use nalgebra::Vector3;
 use nmpc::space::{INPUTS, Nose, STATES, SpaceProblem, SpaceWorkspace, Start, State, last_multipliers};
 
-use crate::computer::memory::remembers;
 use crate::control::aim::Aim;
 use crate::guidance::powered::Plane;
 use crate::vehicle::dynamics::PlanarState;
 
 /// A plan, with the multipliers from which the next solve starts.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct SpacePlan {
     begins_s: f64,
     step_s: f64,
@@ -23,18 +23,6 @@ pub(super) struct SpacePlan {
     turning_rad_s2: Vec<f64>,
     settled_nodes: usize,
 }
-
-remembers!(SpacePlan {
-    begins_s,
-    step_s,
-    states,
-    inputs,
-    costates,
-    limits,
-    conditions,
-    turning_rad_s2,
-    settled_nodes,
-});
 
 impl SpacePlan {
     pub(super) fn step_s(&self) -> f64 {
