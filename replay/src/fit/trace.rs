@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use flight::computer::Commands;
-use flight::computer::pilot::{PilotInput, Sensed};
+use flight::computer::Input;
+use flight::computer::pilot::Sensed;
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
@@ -98,7 +99,7 @@ impl Trace {
     /// Adds a frame; one without sensors or with numbers that are not finite is left out.
     pub fn push(
         &mut self,
-        input: &PilotInput,
+        input: &Input<'_>,
         commands: &Commands,
         phase: Phase,
         believed: &Estimate,
@@ -175,7 +176,7 @@ impl Trace {
                     let phase =
                         phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
                     let read = read.input();
-                    let input = PilotInput::of(&read, 0);
+                    let input = read.since(0);
                     let believed =
                         estimate_from_log(&estimate, number).map_err(|error| unknown(error.to_string()))?;
                     if trace.is_none() {

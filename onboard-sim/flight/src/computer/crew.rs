@@ -220,7 +220,7 @@ impl Computer {
         if asked == Asked::Abort && !mode.interlocks.abort_latched {
             let who = match (by, station) {
                 (Some(by), _) => Some(format!("{by}")),
-                (None, Some(station)) if self.people.is_some() => {
+                (None, Some(station)) if self.input.people.is_some() => {
                     Some(format!("station {station}, with the key that all share,"))
                 }
                 _ => None,
@@ -262,7 +262,7 @@ impl Computer {
 
     /// Why this sender may ask for nothing of the kind.
     fn why_not_of(&self, request: &Request) -> Option<String> {
-        let people = self.people?;
+        let people = self.input.people?;
         let Request { asked, station, by, .. } = *request;
         if station.is_none() {
             let shared = act_of(asked).is_some() && people != People::One;
@@ -282,21 +282,21 @@ impl Computer {
     /// Why nobody starts from there now. Who starts is who armed: the station whose silence holds the countdown. Of two people
     /// one taps, too, and they may start from any two of their stations.
     fn why_not_start(&self, request: &Request) -> Option<String> {
-        let station = request.station.filter(|_| !matches!(self.people, Some(People::Two { .. })));
-        let armed_by = self.commander.filter(|_| self.table.mode().interlocks.armed);
+        let station = request.station.filter(|_| !matches!(self.input.people, Some(People::Two { .. })));
+        let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed);
         if let (Some(station), Some(Commander { station: armed_by, by, .. })) = (station, armed_by)
             && armed_by != station
         {
             let who = named(armed_by, by);
             return Some(format!("{who} armed it: start there, or take command when it is silent"));
         }
-        (!self.log.running).then(|| "the log has failed: disarm, and see to it".into())
+        (!self.input.log.running).then(|| "the log has failed: disarm, and see to it".into())
     }
 
     /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
     fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
         let Request { asked, station, by, confirms, .. } = *request;
-        let (first_ask, act) = match (self.people, act_of(asked)) {
+        let (first_ask, act) = match (self.input.people, act_of(asked)) {
             (Some(People::Two { first_ask }), Some(act)) => (first_ask, act),
             (None | Some(People::One), _) | (Some(People::Two { .. }), None) => return Ok(None),
         };
@@ -322,7 +322,7 @@ impl Computer {
     /// Notes what an accepted request means for the crew.
     fn note_done(&mut self, asked: Asked, by: Option<Operator>, agreed: Option<Agreed>) {
         let time_s = self.table.time_s();
-        let commander = self.commander.and_then(|commander| commander.by);
+        let commander = self.input.commander.and_then(|commander| commander.by);
         let commands = |by: Operator| commander.is_some_and(|commander| commander.number == by.number);
         let two_person = &mut self.crew.two_person;
         match (asked, agreed) {
@@ -370,7 +370,8 @@ impl Computer {
             return self.deny(Asked::TakeCommand, "no station".into());
         };
         let armed = self.table.mode().interlocks.armed;
-        let Some(Commander { station: before, age_s, by: before_by, .. }) = self.commander.filter(|_| armed)
+        let Some(Commander { station: before, age_s, by: before_by, .. }) =
+            self.input.commander.filter(|_| armed)
         else {
             return self.deny(Asked::TakeCommand, "no station has armed the vehicle".into());
         };
@@ -419,7 +420,7 @@ impl Computer {
 
     /// Holds the countdown if the log has failed: nobody would learn afterwards what happened.
     pub(super) fn watch_the_log(&mut self) {
-        if !self.log.running {
+        if !self.input.log.running {
             self.hold(HoldCause::LogFailed, || "the log has failed in the countdown".into());
         }
     }

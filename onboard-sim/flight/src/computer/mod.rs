@@ -33,15 +33,15 @@ use self::crew::{Answer, People, Request};
 use self::news::{MotorWatch, News, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
-use self::pilot::{Pilot, PilotInput, PilotOutput, Sensed};
+use self::pilot::{Pilot, Pointed, Sensed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
-use crate::estimation::estimator::Estimate;
+use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
-use crate::rules::outputs::{Outputs, Seen};
+use crate::rules::outputs::{FlightProgress, Outputs};
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
 use crate::rules::two_person::Station;
 use crate::vehicle::mission::ArmingLimits;
@@ -74,13 +74,11 @@ pub struct Computer {
     law: Law,
     #[serde(skip)]
     believed: RigidState,
-    /// The input of the pilot's last frame.
+    /// The input of the last frame, without requests and rehearsal. What of it decides later is in the next one, too.
     #[serde(skip)]
-    flown: Option<PilotInput>,
+    input: Input<'static>,
     /// The gate check that the crew was last told of.
     gate_told: Option<&'static str>,
-    #[serde(skip)]
-    frame: u64,
     #[serde(skip)]
     arming: ArmingLimits,
     #[serde(skip)]
@@ -90,61 +88,57 @@ pub struct Computer {
     readiness: Readiness,
     rehearsed: Option<Rehearsed>,
     motor_watch: MotorWatch,
-    log: LogState,
-    #[serde(skip)]
-    uplink: Uplink,
-    #[serde(skip)]
-    commander: Option<Commander>,
-    #[serde(skip)]
-    people: Option<People>,
     crew: CrewMemory,
     fins_answering: [bool; 4],
-    igniter_continuity: bool,
-    #[serde(skip)]
-    booster_attached: bool,
-    #[serde(skip)]
-    battery_v: Option<f64>,
     pad_check: PadCheck,
     release: Option<Release>,
     level: ControlLevel,
 }
 
 impl Computer {
-    /// One frame: note the input, estimate, answer the crew, watch over the countdown, fly or wait on the pad, keep the
-    /// time, switch what lights, parts and ejects, report.
+    /// One frame. In the air: estimate, predict, answer the crew, decide, plan, point. On the pad: answer the crew, and wait.
+    /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
-        self.frame = input.frame;
         self.table.begin(input.time_s);
-        self.take_note(input);
-        if self.table.mode().phase.on_pad() {
-            self.pad.feel(&input.sensed);
+        self.report_changes(input);
+        self.input = input.kept();
+        let commanded_rad = self.commands.fins_rad;
+        self.fins_answering =
+            core::array::from_fn(|fin| (commanded_rad[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);
+        if self.rehearsed.is_none() {
+            self.rehearsed = input.rehearsed.cloned();
         }
-        let in_flight = self.release.map(|release| {
-            let flown = *self.flown.insert(PilotInput::of(input, release.frame));
-            let estimate = self.pilot.look(&mut self.table, &flown);
-            (flown, estimate)
-        });
+        if self.table.mode().phase.on_pad() {
+            self.pad.update_stillness(&input.sensed);
+        }
+        let flown = self.flown();
+        if let Some(flown) = &flown {
+            self.pilot.estimate_state(self.table.mode().phase, flown);
+            self.pilot.predict(&mut self.table, flown);
+        }
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
         self.watch_the_log();
-        let planned = if let Some((flown, estimate)) = &in_flight {
-            self.fly(flown, estimate)
+        let mut planned = false;
+        if let Some(flown) = &flown {
+            self.pilot.decide(&mut self.table, flown);
+            planned = self.pilot.plan(self.table.mode(), flown);
+            let pointed = self.pilot.point(self.table.mode(), flown);
+            self.take_over(pointed);
         } else {
             self.wait_on_the_pad(input);
-            false
-        };
+        }
         self.keep_time();
-        // Last, and nowhere else: whatever this frame has decided, an output follows from the mode that it ends in.
-        let seen = Seen {
-            flying: in_flight.is_some(),
+        let progress = FlightProgress {
+            flying: flown.is_some(),
             lifted_off: self.pilot.has_lifted_off(),
             separation_due: self.pilot.separates(),
         };
-        self.commands.outputs = Outputs::decided(self.table.mode(), seen);
+        self.commands.outputs = Outputs::decided(self.table.mode(), progress);
         Output {
             commands: self.commands,
-            released: in_flight.is_none() && self.release.is_some(),
+            released: flown.is_none() && self.release.is_some(),
             answers,
             news: self.table.take_news(),
             planned,
@@ -155,38 +149,27 @@ impl Computer {
     pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
         let before = self.pilot.clone();
         let output = self.step(input);
-        let flown = self.flown.as_ref();
-        let solved = flown.and_then(|input| self.pilot.landing_planned(&before, self.table.mode(), input));
+        let solved =
+            self.flown().and_then(|flown| self.pilot.landing_planned(&before, self.table.mode(), &flown));
         (output, solved)
     }
 
-    /// Takes over the state of switches, log and actuators from the input.
-    fn take_note(&mut self, input: &Input<'_>) {
+    /// Reports what the input changes: the pin, and a log that has stopped.
+    fn report_changes(&mut self, input: &Input<'_>) {
         let pin_out = self.table.mode().interlocks.pin_out;
         if input.pin_out != pin_out {
             // Refused in the air, where nobody can move it.
             let _ = self.table.happen(if input.pin_out { Event::PinPulled } else { Event::PinInserted });
         }
-        if self.log.running && !input.log.running {
+        if self.input.log.running && !input.log.running {
             let words = "the log has stopped: this flight is no longer recorded whole";
             self.table.say(Severity::Error, words.into());
         }
-        self.log = input.log;
-        self.uplink = input.uplink;
-        (self.people, self.commander) = (input.people, input.commander);
-        (self.igniter_continuity, self.booster_attached) = (input.igniter_continuity, input.booster_attached);
-        self.battery_v = input.battery_v;
-        let told = self.commands.fins_rad;
-        self.fins_answering =
-            core::array::from_fn(|fin| (told[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);
-        if self.rehearsed.is_none() {
-            self.rehearsed = input.rehearsed.cloned();
-        }
     }
 
-    /// The rest of a frame in the air, or on the ground after the flight. Returns whether it planned.
-    fn fly(&mut self, input: &PilotInput, estimate: &Estimate) -> bool {
-        let PilotOutput { gimbal_rad, fins_rad, level } = self.pilot.fly(&mut self.table, input, estimate);
+    /// Commands fins and gimbal as the pilot points them, and reports a shut gate and another control level.
+    fn take_over(&mut self, pointed: Pointed) {
+        let Pointed { gimbal_rad, fins_rad, level } = pointed;
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
@@ -198,8 +181,6 @@ impl Computer {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
         }
         self.level = level;
-        (phase.in_descent() || phase.in_landing_burn())
-            && input.frame.is_multiple_of(crate::computer::pilot::FRAMES_PER_PLAN)
     }
 
     /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
@@ -235,7 +216,12 @@ impl Computer {
 
     /// Number of the last frame.
     pub fn frame(&self) -> u64 {
-        self.frame
+        self.input.frame
+    }
+
+    /// The input of the last frame, without requests and rehearsal.
+    pub fn input(&self) -> &Input<'static> {
+        &self.input
     }
 
     /// Phase, latches, countdown and motor.
@@ -274,9 +260,10 @@ impl Computer {
         &self.pilot
     }
 
-    /// The input of the pilot's last frame; its time counts from the release.
-    pub fn flown(&self) -> Option<&PilotInput> {
-        self.flown.as_ref()
+    /// The input of the last frame in the air, its frame and time counted from the release.
+    pub fn flown(&self) -> Option<Input<'static>> {
+        let release = self.release?;
+        (self.input.frame > release.frame).then(|| self.input.since(release.frame))
     }
 
     /// What decided where the nose points in the last frame.
@@ -313,12 +300,11 @@ pub fn flight_time_s(frame: u64) -> f64 {
 
 // The input of one frame of the flight computer: everything it depends on besides its memory.
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
     /// The log is being written, or the operator chose to fly without one.
     pub running: bool,
     /// Free space for it, bytes.
-    #[serde(skip)]
     pub space_bytes: u64,
 }
 
@@ -380,6 +366,75 @@ pub struct Input<'a> {
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
+}
+
+impl Input<'_> {
+    /// Before the first frame: nothing is known, and nothing answers.
+    const NONE: Input<'static> = Input {
+        frame: 0,
+        time_s: 0.0,
+        sensed: Sensed::Measured(Measurements::of_imu(ImuSample::NONE)),
+        gimbal_rad: [0.0; 2],
+        fins_rad: [0.0; 4],
+        contact: false,
+        igniter_continuity: false,
+        booster_attached: false,
+        pin_out: false,
+        battery_v: None,
+        log: LogState::NONE,
+        uplink: Uplink::NeverHeard,
+        commander: None,
+        people: None,
+        requests: &[],
+        rehearsed: None,
+    };
+
+    /// The same input without what lives for one frame only.
+    fn kept(&self) -> Input<'static> {
+        let &Self {
+            frame,
+            time_s,
+            sensed,
+            gimbal_rad,
+            fins_rad,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            pin_out,
+            battery_v,
+            log,
+            uplink,
+            commander,
+            people,
+            requests: _,
+            rehearsed: _,
+        } = self;
+        Input {
+            frame,
+            time_s,
+            sensed,
+            gimbal_rad,
+            fins_rad,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            pin_out,
+            battery_v,
+            log,
+            uplink,
+            commander,
+            people,
+            requests: &[],
+            rehearsed: None,
+        }
+    }
+
+    /// The same input with frame and time counted from a release.
+    #[must_use]
+    pub fn since(&self, release_frame: u64) -> Self {
+        let frame = self.frame.saturating_sub(release_frame);
+        Self { frame, time_s: flight_time_s(frame), ..*self }
+    }
 }
 
 // The output of one frame of the flight computer.

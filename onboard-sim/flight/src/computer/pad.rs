@@ -80,7 +80,7 @@ pub(super) struct PadWatch {
 
 impl PadWatch {
     /// Adds a frame.
-    pub(super) fn feel(&mut self, sensed: &Sensed) {
+    pub(super) fn update_stillness(&mut self, sensed: &Sensed) {
         let measurements = as_measured(sensed);
         self.alignment.take(&measurements.imu);
         let felt_m_s2 = measurements.imu.specific_force_m_s2;
@@ -247,7 +247,7 @@ impl Computer {
 
     /// The arming checks with the present values; the uplink is that of the station heard best.
     pub fn arming_checks(&self) -> Vec<Check> {
-        self.arming_checks_by(self.uplink)
+        self.arming_checks_by(self.input.uplink)
     }
 
     pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Vec<Check> {
@@ -264,14 +264,14 @@ impl Computer {
             rotation_rad_s: stance.rotation_rad_s,
             speed_m_s: stance.speed_m_s,
             self_test_passed: self.table.mode().phase != Phase::Safe,
-            is_checking: self.pad_check.is_busy(self.frame),
+            is_checking: self.pad_check.is_busy(self.input.frame),
             estimator_converged: stance.settled,
             hanging_m: stance.hanging_m,
             fins_answering: self.fins_answering,
-            igniter_continuity: self.igniter_continuity,
-            log_running: self.log.running,
-            log_space_bytes: self.log.space_bytes,
-            battery_v: self.battery_v,
+            igniter_continuity: self.input.igniter_continuity,
+            log_running: self.input.log.running,
+            log_space_bytes: self.input.log.space_bytes,
+            battery_v: self.input.battery_v,
             controller_warm,
             controller_found,
             predicted_landing,
@@ -386,7 +386,7 @@ impl Computer {
 
     /// A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
     fn begin_flight(&mut self) {
-        self.release = Some(Release { frame: self.frame, time_s: self.table.time_s() });
+        self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
         let mission = self.pilot.mission();
         if let (Some(launch), Some(start)) = (&mission.launch, self.pad.at_rest())
             && mission.start.at == StartPoint::Pad

@@ -20,11 +20,10 @@ use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
 use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
-use super::{Commands, Computer, CrewMemory, LogState, Release, Severity, flight_time_s};
+use super::{Commands, Computer, CrewMemory, Input, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::ControlLevel;
-use crate::rules::arming::Uplink;
 use crate::rules::outputs::Outputs;
 use crate::rules::phase::{Event, Interlocks, Latch, Mode};
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
@@ -123,7 +122,7 @@ impl Computer {
             pilot: self.pilot.saved(),
         });
         let latch = self.table.latch();
-        Saved { frame: self.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
+        Saved { frame: self.input.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
     }
 
     /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
@@ -133,7 +132,7 @@ impl Computer {
         if !(0.0..=LONGEST_RESET_S).contains(&lost_s) {
             return;
         }
-        self.frame = saved.frame;
+        self.input.frame = saved.frame;
         match &saved.in_the_air {
             Some(flown) => {
                 self.table.go_on(saved.mode, saved.latch);
@@ -195,9 +194,8 @@ impl Computer {
             pilot: Box::new(pilot),
             law,
             believed: *believed,
-            flown: None,
+            input: Input::NONE,
             gate_told: None,
-            frame: 0,
             arming,
             countdown_s: mission.start.countdown_s,
             commands: Commands {
@@ -209,15 +207,8 @@ impl Computer {
             readiness: Readiness::default(),
             rehearsed: None,
             motor_watch: MotorWatch::default(),
-            log: LogState::NONE,
-            uplink: Uplink::NeverHeard,
-            commander: None,
-            people: None,
             crew: CrewMemory::default(),
             fins_answering: [false; 4],
-            igniter_continuity: false,
-            booster_attached: false,
-            battery_v: None,
             pad_check: PadCheck::default(),
             release: None,
             level: ControlLevel::Idle,
@@ -235,7 +226,7 @@ impl Computer {
     /// release.
     #[must_use]
     pub fn released(mut self, frame: u64) -> Self {
-        self.frame = frame;
+        self.input.frame = frame;
         self.table.begin(flight_time_s(frame));
         for event in [
             Event::SelfTestPassed,
@@ -249,7 +240,7 @@ impl Computer {
         self.let_go();
         self.table.take_news();
         self.motor_watch.news(self.table.mode(), self.table.time_s());
-        self.log = LogState { running: true, space_bytes: u64::MAX };
+        self.input.log = LogState { running: true, space_bytes: u64::MAX };
         self
     }
 
@@ -291,7 +282,7 @@ mod tests {
     fn falling() -> Computer {
         let mut computer = powered_up().released(0);
         for frame in 1..=40 {
-            computer.step(&sample::in_the_air(&sample::input(frame, 0.005 * frame as f64)));
+            computer.step(&sample::input(frame, 0.005 * frame as f64));
         }
         computer
     }
@@ -339,7 +330,6 @@ mod tests {
         assert_eq!(here.digest(), there.digest());
         for frame in 61..=100 {
             let input = sample::input(frame, 0.005 * frame as f64);
-            let input = sample::in_the_air(&input);
             assert_eq!(here.step(&input), there.step(&input));
             assert_eq!(here.digest(), there.digest(), "frame {frame}");
         }

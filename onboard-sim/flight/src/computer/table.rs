@@ -135,7 +135,7 @@ impl Computer {
     /// The table refuses it, and nothing has changed.
     pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
         let before = self.table.mode().phase;
-        let effects = match &self.flown {
+        let effects = match self.flown() {
             Some(input) => self.pilot.told(&mut self.table, event, input.time_s),
             None => self.table.happen(event),
         }?;
@@ -151,7 +151,7 @@ impl Computer {
         if self.release.is_none() {
             return Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
         }
-        self.pilot.abort_event(self.table.mode(), self.flown.as_ref())
+        self.pilot.abort_event(self.table.mode(), self.flown().as_ref())
     }
 
     /// Whether a landing under thrust can be planned; true until the first attempt.

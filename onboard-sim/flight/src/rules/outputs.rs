@@ -21,7 +21,7 @@ pub enum Line {
 
 /// What the outputs depend on besides the mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Seen {
+pub struct FlightProgress {
     /// The frame belongs to a flight; the one in which the countdown ends does not yet.
     pub flying: bool,
     /// The vehicle has left its rail.
@@ -31,13 +31,13 @@ pub struct Seen {
 }
 
 /// Every reason for which an output has no current now; none of them: it has.
-pub fn why_not(line: Line, mode: &Mode, seen: Seen) -> impl Iterator<Item = &'static str> {
+pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterator<Item = &'static str> {
     let Mode { phase, interlocks: locks, motor, .. } = *mode;
     let reasons: [Option<&'static str>; 6] = match line {
         Line::AscentIgniter => [
             (phase != Phase::Boost).then_some("only BOOST lights the ascent motor"),
-            (!seen.flying).then_some("the flight begins with the next frame"),
-            seen.lifted_off.then_some("the vehicle has lifted off"),
+            (!progress.flying).then_some("the flight begins with the next frame"),
+            progress.lifted_off.then_some("the vehicle has lifted off"),
             (!locks.armed).then_some("not armed"),
             (!locks.pin_out).then_some("the pin is in"),
             locks.abort_latched.then_some("an abort is latched"),
@@ -52,7 +52,7 @@ pub fn why_not(line: Line, mode: &Mode, seen: Seen) -> impl Iterator<Item = &'st
             None,
         ],
         Line::Separation => [
-            (!seen.separation_due).then_some("apogee is not near"),
+            (!progress.separation_due).then_some("apogee is not near"),
             phase.on_pad().then_some("the vehicle is on its pad"),
             None,
             None,
@@ -86,8 +86,8 @@ impl Outputs {
         Self { landing_igniter: false, parachute: false, ascent_igniter: false, separation: false };
 
     /// The outputs at the end of a frame.
-    pub fn decided(mode: &Mode, seen: Seen) -> Self {
-        Self::of(|line| why_not(line, mode, seen).next().is_none())
+    pub fn decided(mode: &Mode, progress: FlightProgress) -> Self {
+        Self::of(|line| why_not(line, mode, progress).next().is_none())
     }
 
     /// The outputs that a log or a board tells of.
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::rules::phase::{Event, HoldCause, StartPoint, transition};
 
-    const SEEN: Seen = Seen { flying: true, lifted_off: false, separation_due: false };
+    const SEEN: FlightProgress = FlightProgress { flying: true, lifted_off: false, separation_due: false };
 
     fn boosting() -> Mode {
         let mut mode = Mode { phase: Phase::Boost, ..Mode::power_up(0.0) };
@@ -136,9 +136,9 @@ mod tests {
 
     #[test]
     fn each_output_that_is_off_names_every_reason() {
-        let reasons = |line, mode: &Mode, seen| why_not(line, mode, seen).collect::<Vec<_>>();
+        let reasons = |line, mode: &Mode, progress| why_not(line, mode, progress).collect::<Vec<_>>();
         assert!(reasons(Line::AscentIgniter, &boosting(), SEEN).is_empty());
-        let risen = Seen { lifted_off: true, ..SEEN };
+        let risen = FlightProgress { lifted_off: true, ..SEEN };
         assert_eq!(reasons(Line::AscentIgniter, &boosting(), risen), ["the vehicle has lifted off"]);
         let at_power_up = Mode::power_up(0.0);
         assert_eq!(
@@ -208,7 +208,7 @@ mod tests {
             for first in [Event::SelfTestPassed, Event::PinPulled] {
                 mode = transition(&mode, first, 0.0).mode;
             }
-            let (mut seen, mut time_s) = (Seen { flying: false, ..SEEN }, 0.0);
+            let (mut progress, mut time_s) = (FlightProgress { flying: false, ..SEEN }, 0.0);
             let (mut ascent_began, mut landing_began) = (false, false);
             let mut before = Outputs::NONE;
             // What stays off until somebody starts anew, or for ever.
@@ -216,14 +216,14 @@ mod tests {
             for _ in 0..24 {
                 let dice = random.next_u32();
                 time_s += [0.005, 0.5, 1.0, 1.1][(dice >> 5 & 3) as usize];
-                let asked = event(dice, seen.lifted_off);
+                let asked = event(dice, progress.lifted_off);
                 let answer = transition(&mode, asked, time_s);
                 let accepted = answer.refusal.is_none();
                 mode = answer.mode;
-                seen.flying |= !mode.phase.on_pad();
-                seen.lifted_off |= accepted && asked == Event::LiftOff;
-                seen.separation_due |= accepted && asked == Event::SeparationDue;
-                let outputs = Outputs::decided(&mode, seen);
+                progress.flying |= !mode.phase.on_pad();
+                progress.lifted_off |= accepted && asked == Event::LiftOff;
+                progress.separation_due |= accepted && asked == Event::SeparationDue;
+                let outputs = Outputs::decided(&mode, progress);
                 let stops = matches!(
                     asked,
                     Event::AbortRequested { .. } | Event::DisarmRequested { .. } | Event::Hold { .. }

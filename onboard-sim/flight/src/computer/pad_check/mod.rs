@@ -417,7 +417,7 @@ impl Computer {
 
     /// Ends a running check, and brings the surfaces to rest. Returns whether one ran.
     pub(super) fn end_check(&mut self, why: &str) -> bool {
-        let ran = self.pad_check.stop(self.frame);
+        let ran = self.pad_check.stop(self.input.frame);
         if ran {
             self.rest_surfaces();
             self.table.say(Severity::Warning, format!("check of the vehicle ended early: {why}"));
@@ -444,12 +444,12 @@ impl Computer {
             surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
             measured: &as_measured(&input.sensed),
             switches: PadSwitches {
-                igniter_continuity: self.igniter_continuity,
-                booster_attached: self.booster_attached,
+                igniter_continuity: self.input.igniter_continuity,
+                booster_attached: self.input.booster_attached,
                 pin_out: input.pin_out,
-                battery_v: self.battery_v,
-                log_running: self.log.running,
-                log_space_bytes: self.log.space_bytes,
+                battery_v: self.input.battery_v,
+                log_running: self.input.log.running,
+                log_space_bytes: self.input.log.space_bytes,
             },
         };
         let told = self.pad_check.step(&seen, self.pilot.mission(), &self.arming);

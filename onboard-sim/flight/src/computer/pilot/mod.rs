@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
-use self::known::{Burning, Known};
+use self::known::Known;
 pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
-use crate::computer::{Input, flight_time_s};
+use crate::computer::Input;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
@@ -41,43 +41,9 @@ pub enum Sensed {
     Known(Estimate),
 }
 
-/// Everything that a frame in the air depends on besides the pilot's memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PilotInput {
-    /// Number of the frame since the release.
-    pub frame: u64,
-    /// Time from the release to the end of the frame, s.
-    pub time_s: f64,
-    pub sensed: Sensed,
-    /// Fin angles reported by the servos, rad.
-    pub fins_rad: [f64; 4],
-    /// A foot touches the ground.
-    pub contact: bool,
-    /// The igniter has continuity.
-    pub igniter_continuity: bool,
-    /// The wire between booster and vehicle is whole.
-    pub booster_attached: bool,
-}
-
-impl PilotInput {
-    /// The pilot's part of an input; `released` is the number of the frame in which the vehicle was released.
-    pub fn of(input: &Input<'_>, released: u64) -> Self {
-        let frame = input.frame.saturating_sub(released);
-        Self {
-            frame,
-            time_s: flight_time_s(frame),
-            sensed: input.sensed,
-            fins_rad: input.fins_rad,
-            contact: input.contact,
-            igniter_continuity: input.igniter_continuity,
-            booster_attached: input.booster_attached,
-        }
-    }
-}
-
 /// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PilotOutput {
+pub(super) struct Pointed {
     /// Gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Fin openings, rad.
@@ -272,16 +238,11 @@ impl Pilot {
         &self,
         before: &Self,
         mode: &Mode,
-        input: &PilotInput,
+        input: &Input<'_>,
     ) -> Option<LandingSolved> {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
-        let burning_s = self.known.burning_s(input.time_s).filter(|_| planned)?;
         let estimate = self.estimate.as_ref()?;
-        // As in the frame itself, `Pilot::fly`.
-        let density_kg_m3 = self.density_kg_m3(estimate);
-        let mass = self.known.mass_now(Some(burning_s));
-        let lands_here = mode.interlocks.lands_here;
-        let burning = Burning { burning_s, mass, density_kg_m3, lands_here };
+        let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
         let (preferred, fallback) = self.known.situations_to_plan(estimate, &burning, &input.fins_rad);
         before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
     }
@@ -378,7 +339,7 @@ pub(super) mod sample {
 
     use nalgebra::Vector3;
 
-    use super::{Pilot, PilotInput, Sensed};
+    use super::{Pilot, Sensed};
     use crate::computer::table::PhaseTable;
     use crate::computer::{Computer, Input, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
@@ -399,42 +360,21 @@ pub(super) mod sample {
         Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
     }
 
-    /// The input of a computer that was released at once.
-    pub(in crate::computer) fn in_the_air(input: &PilotInput) -> Input<'static> {
-        Input {
-            frame: input.frame,
-            time_s: input.time_s,
-            sensed: input.sensed,
-            gimbal_rad: [0.0; 2],
-            fins_rad: input.fins_rad,
-            contact: input.contact,
-            igniter_continuity: input.igniter_continuity,
-            booster_attached: input.booster_attached,
-            pin_out: true,
-            battery_v: None,
-            log: LogState { running: true, space_bytes: u64::MAX },
-            uplink: Uplink::NotNeeded,
-            commander: None,
-            people: None,
-            requests: &[],
-            rehearsed: None,
-        }
-    }
-
-    /// The input of a frame with almost no specific force, turning at a rate.
-    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> PilotInput {
+    /// The input of a frame with almost no specific force, turning at a rate, of a computer that was released at once.
+    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> Input<'static> {
         let imu = ImuSample {
             gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
             specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
         };
-        PilotInput {
+        Input {
             frame,
             time_s: 0.005 * frame as f64,
             sensed: Sensed::Measured(Measurements::of_imu(imu)),
-            fins_rad: [0.0; 4],
-            contact: false,
             igniter_continuity: true,
-            booster_attached: false,
+            pin_out: true,
+            log: LogState { running: true, space_bytes: u64::MAX },
+            uplink: Uplink::NotNeeded,
+            ..Input::NONE
         }
     }
 }
@@ -448,7 +388,8 @@ mod tests {
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
-        pilot.look(&mut released(), &input(1, 0.0));
+        pilot.estimate_state(released().mode().phase, &input(1, 0.0));
+        pilot.predict(&mut released(), &input(1, 0.0));
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);

@@ -3,7 +3,8 @@
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
-use super::{Pilot, PilotInput};
+use super::Pilot;
+use crate::computer::Input;
 use crate::estimation::estimator::Estimate;
 use crate::guidance::ignition::IgnitionOutlook;
 use crate::guidance::vertical::fall_ends_m_s;
@@ -126,7 +127,7 @@ impl Pilot {
     pub(super) fn gate_will_not_open(
         &mut self,
         mode: &Mode,
-        input: &PilotInput,
+        input: &Input<'_>,
         estimate: &Estimate,
     ) -> Option<Event> {
         let found = self.gate_input(mode, input, estimate);
@@ -189,20 +190,23 @@ mod tests {
     use super::*;
     use nalgebra::{Vector2, Vector3};
 
+    use crate::computer::pilot::Sensed;
     use crate::computer::pilot::sample::{self, input, released};
-    use crate::computer::pilot::{PilotInput, Sensed};
     use crate::computer::table::PhaseTable;
     use crate::estimation::estimator::StartUncertainty;
     use crate::vehicle::rigid::RigidState;
 
     /// One frame, in which the crew may abort.
-    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &PilotInput, abort: bool) -> [f64; 4] {
-        let estimate = pilot.look(table, input);
+    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
+        pilot.estimate_state(table.mode().phase, input);
+        pilot.predict(table, input);
         if abort {
             let event = pilot.abort_event(table.mode(), Some(input));
             pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
         }
-        pilot.fly(table, input, &estimate).fins_rad
+        pilot.decide(table, input);
+        pilot.plan(table.mode(), input);
+        pilot.point(table.mode(), input).fins_rad
     }
 
     /// Whether an abort in the very next frame releases the parachute.
@@ -236,7 +240,7 @@ mod tests {
     }
 
     /// What is wrong in a fall, at the height of the centre of gravity, m.
-    type Wrong = fn(f64, &mut Estimate, &mut PilotInput);
+    type Wrong = fn(f64, &mut Estimate, &mut Input<'static>);
 
     const NO_ABORT_M: f64 = 0.0;
 
@@ -264,17 +268,9 @@ mod tests {
             let time_s = frame as f64 * 0.005;
             let mut estimate = falling(time_s);
             let height_m = estimate.state.position_m.z;
-            let mut input = PilotInput {
-                frame,
-                time_s,
-                sensed: Sensed::Known(estimate),
-                fins_rad,
-                contact: false,
-                igniter_continuity: true,
-                booster_attached: false,
-            };
+            let mut input = Input { fins_rad, ..sample::input(frame, 0.0) };
             wrong(height_m, &mut estimate, &mut input);
-            let input = PilotInput { sensed: Sensed::Known(estimate), ..input };
+            let input = Input { sensed: Sensed::Known(estimate), ..input };
             let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
             fins_rad = frame_with(&mut pilot, &mut table, &input, aborts);
             let phase = table.mode().phase;

@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use super::ascent::{AscentSeen, axial_m_s2, words_of_ascent};
 use super::known::Burning;
 use super::outlook::{commit_height_m, touchdown_m};
-use super::{FRAMES_PER_PLAN, Outlook, Pilot, PilotInput, PilotOutput, Sensed};
+use super::{FRAMES_PER_PLAN, Outlook, Pilot, Pointed, Sensed};
+use crate::computer::Input;
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
@@ -53,76 +54,86 @@ fn on_the_way_up(
 }
 
 impl Pilot {
-    /// The first part of a frame, before the crew is answered: estimate, motor, ascent, outlook. Every event goes through
-    /// the `table`.
-    pub(in crate::computer) fn look(&mut self, table: &mut PhaseTable, input: &PilotInput) -> Estimate {
-        let estimate = self.sense(table.mode().phase, input);
+    /// Estimates the vehicle's state, and its motor and drag.
+    pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &Input<'_>) {
+        let estimate = self.estimated(phase, input);
         self.estimate = Some(estimate);
-        let density_kg_m3 = self.density_kg_m3(&estimate);
-        self.feel(table.mode().phase, input, &estimate, density_kg_m3);
-        // Before the outlook: at apogee an abort has to know at once whether the parachute has room.
-        self.watch_the_ascent(table, input, &estimate);
-        // A drop lasts for two seconds or three, and its speed changes all the time.
-        let dropped = self.known.mission.start.at == StartPoint::Drone;
-        let far = table.mode().phase == Phase::AeroDescent && !dropped;
-        let looking = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
-        // Without an outlook, right after apogee and after a restart, an abort would not know whether the parachute has
-        // room.
-        let looking = looking || self.outlook == Outlook::default();
-        if looking && table.mode().phase.in_descent() {
-            self.look_ahead(&estimate, density_kg_m3);
-        }
-        self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
-        estimate
+        self.update_models(phase, input, &estimate);
     }
 
-    /// The second part of a frame, with what was estimated in the first: move through the phases, plan, point fins and gimbal.
-    pub(in crate::computer) fn fly(
-        &mut self,
-        table: &mut PhaseTable,
-        input: &PilotInput,
-        estimate: &Estimate,
-    ) -> PilotOutput {
-        let time_s = input.time_s;
-        let density_kg_m3 = self.density_kg_m3(estimate);
-        self.move_through_phases(table, input, estimate);
-        let mode = *table.mode();
-        let planning = input.frame.is_multiple_of(FRAMES_PER_PLAN);
+    /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
+    pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
+        let Some(estimate) = self.estimate else { return };
+        // Before the outlook: at apogee an abort has to know at once whether the parachute has room.
+        self.watch_the_ascent(table, input, &estimate);
+        // A drop lasts 2 to 3 s, so it is predicted in every planning frame.
+        let dropped = self.known.mission.start.at == StartPoint::Drone;
+        let far = table.mode().phase == Phase::AeroDescent && !dropped;
+        let due = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
+        // Without an outlook, right after apogee and after a restart, an abort would not know whether the parachute has
+        // room.
+        if (due || self.outlook == Outlook::default()) && table.mode().phase.in_descent() {
+            self.look_ahead(&estimate, self.density_kg_m3(&estimate));
+        }
+        self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
+    }
 
-        let burning_s = self.known.burning_s(time_s);
-        let mass = self.known.mass_now(burning_s);
-        let lands_here = mode.interlocks.lands_here;
-        let situation = burning_s.map(|burning_s| Burning { burning_s, mass, density_kg_m3, lands_here });
+    /// Plans the landing in every tenth frame of a burn that no simpler law flies. Returns whether this was a frame to plan
+    /// or predict in.
+    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) -> bool {
+        let due = input.frame.is_multiple_of(FRAMES_PER_PLAN);
+        let burning = self.burning(mode, input.time_s).filter(|_| mode.phase.in_landing_burn());
+        if let (Some(burning), Some(estimate), None, true) = (burning, self.estimate, &self.baseline, due) {
+            self.plan_landing(input.time_s, &estimate, &burning, &input.fins_rad);
+        }
+        due && (mode.phase.in_descent() || mode.phase.in_landing_burn())
+    }
+
+    /// Points fins and gimbal.
+    pub(in crate::computer) fn point(&mut self, mode: &Mode, input: &Input<'_>) -> Pointed {
         let flying = mode.phase.in_landing_burn();
-        let burning = situation.as_ref().filter(|_| flying);
-        let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, estimate));
-        if let Some((gimbal_rad, fins_rad)) = by_baseline {
-            (self.gimbal_rad, self.fins_rad) = (gimbal_rad, fins_rad);
-        } else {
-            self.gimbal_rad = match burning {
-                Some(burning) => {
-                    if planning {
-                        self.plan(time_s, estimate, burning, &input.fins_rad);
+        let mut simpler = false;
+        if let Some(estimate) = self.estimate {
+            let estimate = &estimate;
+            let thrusting = self.burning(mode, input.time_s);
+            let burning = thrusting.as_ref().filter(|_| flying);
+            let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, estimate));
+            if let Some((gimbal_rad, fins_rad)) = by_baseline {
+                (self.gimbal_rad, self.fins_rad) = (gimbal_rad, fins_rad);
+                simpler = true;
+            } else {
+                self.gimbal_rad = match burning {
+                    Some(burning) => {
+                        self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
+                        self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
                     }
-                    self.fin_share = self.powered.fin_share(time_s).unwrap_or(self.fin_share);
-                    self.gimbal(time_s, estimate, burning, &input.fins_rad)
-                }
-                None => match situation.as_ref().filter(|_| self.balances(&mode)) {
-                    Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
-                    None => [0.0; 2],
-                },
-            };
-            self.fins_rad = self.fins(&mode, estimate, &mass, density_kg_m3, burning.is_some());
+                    None => match thrusting.as_ref().filter(|_| self.balances(mode)) {
+                        Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
+                        None => [0.0; 2],
+                    },
+                };
+                let mass = self.known.mass_now(self.known.burning_s(input.time_s));
+                self.fins_rad =
+                    self.fins(mode, estimate, &mass, self.density_kg_m3(estimate), burning.is_some());
+            }
         }
-        PilotOutput {
-            gimbal_rad: self.gimbal_rad,
-            fins_rad: self.fins_rad,
-            level: match flying {
-                true if by_baseline.is_some() => ControlLevel::Stabiliser,
-                true => self.powered.report().level,
-                false => ControlLevel::Idle,
-            },
-        }
+        let level = match flying {
+            true if simpler => ControlLevel::Stabiliser,
+            true => self.powered.report().level,
+            false => ControlLevel::Idle,
+        };
+        Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
+    }
+
+    /// The vehicle with its motor burning; `None` if it does not burn.
+    pub(super) fn burning(&self, mode: &Mode, time_s: f64) -> Option<Burning> {
+        let burning_s = self.known.burning_s(time_s)?;
+        Some(Burning {
+            burning_s,
+            mass: self.known.mass_now(Some(burning_s)),
+            density_kg_m3: self.density_kg_m3(self.estimate.as_ref()?),
+            lands_here: mode.interlocks.lands_here,
+        })
     }
 
     /// Of the air at the estimated height, kg/m3.
@@ -136,7 +147,7 @@ impl Pilot {
         Some(baseline.commands_rad(burning_s, estimate, &self.known.motor))
     }
 
-    fn sense(&mut self, phase: Phase, input: &PilotInput) -> Estimate {
+    fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
         match input.sensed {
             Sensed::Known(estimate) => estimate,
             Sensed::Measured(measurements) => {
@@ -164,7 +175,7 @@ impl Pilot {
 
     /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
     /// parachute.
-    fn feel(&mut self, phase: Phase, input: &PilotInput, estimate: &Estimate, density_kg_m3: f64) {
+    fn update_models(&mut self, phase: Phase, input: &Input<'_>, estimate: &Estimate) {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
@@ -173,7 +184,7 @@ impl Pilot {
         let vehicle = VehicleNow::of(
             self.known.airframe(),
             &mass,
-            density_kg_m3,
+            self.density_kg_m3(estimate),
             input.fins_rad,
             burning,
             self.known.mission.lidar_ahead_of_feet_m,
@@ -236,7 +247,7 @@ impl Pilot {
     }
 
     /// Moves through the phases up to apogee.
-    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
         let phase = table.mode().phase;
         let Some(launch) = self.known.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
@@ -265,7 +276,10 @@ impl Pilot {
         self.happen(table, event, input.time_s);
     }
 
-    fn move_through_phases(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+    /// Moves through the phases of the descent and the landing.
+    pub(in crate::computer) fn decide(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
+        let Some(estimate) = self.estimate else { return };
+        let estimate = &estimate;
         let time_s = input.time_s;
         if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate) {
             self.happen(table, hopeless, time_s);
@@ -308,7 +322,7 @@ impl Pilot {
         }
     }
 
-    fn consider_ignition(&mut self, table: &mut PhaseTable, input: &PilotInput, estimate: &Estimate) {
+    fn consider_ignition(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
         if self.ignition_overdue_s(estimate).is_some() {
             let open = self.gate_open(table.mode(), input, estimate);
             self.happen(table, Event::IgnitionGate { open }, input.time_s);
@@ -330,7 +344,7 @@ impl Pilot {
     }
 
     /// The event that an abort is now, from the findings of the last frame, if there was one.
-    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&PilotInput>) -> Event {
+    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&Input<'_>>) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open = found.is_some_and(|(input, estimate)| {
             self.gate_shut_by(&self.gate_input(mode, input, estimate)).is_none()
@@ -349,12 +363,12 @@ impl Pilot {
         outlook.height_m > enough_m
     }
 
-    fn gate_open(&mut self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> bool {
+    fn gate_open(&mut self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> bool {
         self.gate_refusal = self.gate_shut_by(&self.gate_input(mode, input, estimate));
         self.gate_refusal.is_none()
     }
 
-    pub(super) fn gate_input(&self, mode: &Mode, input: &PilotInput, estimate: &Estimate) -> GateInput {
+    pub(super) fn gate_input(&self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> GateInput {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
         GateInput {
@@ -407,7 +421,7 @@ impl Pilot {
         Ok(effects)
     }
 
-    fn plan(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
+    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
         let state = &estimate.state;
         if self.known.mission.powered.space.is_some() {
             let fins_m2 = self.known.largest_fin_drag_area_m2();

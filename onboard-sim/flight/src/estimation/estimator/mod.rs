@@ -350,6 +350,10 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
+    /// Before the first sample.
+    pub(crate) const NONE: Self =
+        Self { gyro_rad_s: Vector3::new(0.0, 0.0, 0.0), specific_force_m_s2: Vector3::new(0.0, 0.0, 0.0) };
+
     /// Whether an inertial unit can send these numbers: they are below [`LARGEST_RATE_RAD_S`] and
     /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
     pub fn is_plausible(&self) -> bool {
@@ -382,7 +386,7 @@ pub struct Measurements {
 
 impl Measurements {
     /// Of a frame in which no other sensor reported.
-    pub fn of_imu(imu: ImuSample) -> Self {
+    pub const fn of_imu(imu: ImuSample) -> Self {
         Self { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None }
     }
 }
