@@ -1,4 +1,4 @@
-//! Generates the MAVLink dialect from its XML, and records which build this is, so that every log can name it.
+//! Generates the MAVLink dialect from its XML and the records of the log from their `.proto` files, and notes which build this is, so that every log can name it.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,11 +6,15 @@ use std::process::Command;
 use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
+use prost::Message as _;
 use sha2::Digest as _;
 
 fn main() -> Result<()> {
     let out_dir = PathBuf::from(env::var("OUT_DIR").context("OUT_DIR")?);
     generate_dialect(&out_dir)?;
+    for package in ["log", "flight", "computer"] {
+        generate_records(&out_dir, package)?;
+    }
     note_the_build()
 }
 
@@ -32,6 +36,19 @@ fn generate_dialect(out_dir: &Path) -> Result<()> {
     mavlink_bindgen::generate(mavlink_bindgen::XmlDefinitions::Files(vec![&file]), out_dir)
         .with_context(|| file.display().to_string())?;
     Ok(())
+}
+
+fn generate_records(out_dir: &Path, package: &str) -> Result<()> {
+    let file = format!("proto/touchdown/{package}/v1.proto");
+    println!("cargo:rerun-if-changed={file}");
+    let descriptors = protox::compile([&file], ["proto"]).with_context(|| file.clone())?;
+    fs::write(out_dir.join(format!("{package}_v1.fds")), descriptors.encode_to_vec())?;
+    let mut config = prost_build::Config::new();
+    if package == "computer" {
+        // What it imports is generated already.
+        config.extern_path(".touchdown.flight.v1", "crate::records::flight_v1");
+    }
+    config.compile_fds(descriptors).with_context(|| file.clone())
 }
 
 /// What a vehicle says and hears of the standard's messages; beside them it knows all of ours. The code of all 254 messages would

@@ -330,7 +330,7 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
 #[test]
 fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_alive() {
     let folder = tempfile::tempdir().unwrap();
-    let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/vehicles/missions/mk2.toml");
+    let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/flight/vehicles/missions/mk2.toml");
     let profile = std::fs::read_to_string(of).unwrap();
     let countdown = profile.lines().find(|line| line.starts_with("countdown_s")).unwrap();
     // The second station joins within it, however busy the machine is.

@@ -150,7 +150,7 @@ fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
         out.write_all(load_flight(name)?.recipe.mission_toml.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
-    for (name, _) in vehicles::mission::BUILTIN {
+    for (name, _) in flight::vehicles::mission::BUILTIN {
         writeln!(out, "{name:<20} {}", load_flight(name)?.recipe.mission.summary)?;
     }
     Ok(ExitCode::SUCCESS)

@@ -89,7 +89,8 @@ fn a_logged_flight_flies_again_bit_for_bit() {
     assert_eq!(reader.damage(), None);
     assert!(frames.len() > 2000, "{} frames", frames.len());
 
-    let (mission, start) = (vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
+    let (mission, start) =
+        (flight::vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
     let believed = state_from_log(&start.believed);
     let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
     let (mut expected_frame, mut restarts) = (1, 0);

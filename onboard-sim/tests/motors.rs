@@ -28,7 +28,7 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 /// The built-in motor F10; its header is line 10.
-const F10: &str = include_str!("../vehicles/motors/Apogee_F10.eng");
+const F10: &str = include_str!("../flight/vehicles/motors/Apogee_F10.eng");
 
 #[test]
 fn motors_of_a_folder_are_ranked_into_files_that_are_not_overwritten() {

@@ -18,6 +18,7 @@
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
 //! * [`mission`]: which mission is meant;
 //! * [`book`]: who did what, as a chain of hashes;
+//! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
 //! * [`hostile`]: hostile input for tests and fuzzing.
 //!
@@ -89,6 +90,7 @@ pub mod link_stats;
 pub mod log;
 pub mod mission;
 pub mod parameter;
+pub mod records;
 pub mod signing;
 pub mod text;
 #[cfg(feature = "transport")]

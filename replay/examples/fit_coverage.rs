@@ -11,7 +11,7 @@ use anyhow::Context as _;
 use replay::fit::{Fit, Trace, fit};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use world::sensors::Sensors;
+use sim::world::sensors::Sensors;
 
 /// Flies a flight and keeps what its log would hold.
 fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {

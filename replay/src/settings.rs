@@ -18,7 +18,7 @@ use flight::vehicle::mission::Mission;
 use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
 use serde::de::{DeserializeSeed, Deserializer, IntoDeserializer as _, MapAccess, Visitor};
-use world::Truth;
+use sim::world::Truth;
 
 /// A value for one key of the mission.
 #[derive(Debug, Clone, PartialEq)]
@@ -211,7 +211,7 @@ pub fn is_whole_in_mission(mission_toml: &str, path: &str) -> Result<bool, Setti
 /// A name is unknown, or the result is not a valid mission.
 pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission, SettingError> {
     let text = mission_toml_with(mission_toml, settings)?;
-    vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
+    flight::vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
         let reason = error.to_string();
         match settings {
             [] => SettingError::Toml { origin: "profile.toml".to_owned(), reason: explained(&reason) },
@@ -268,7 +268,7 @@ pub fn mission_value_of(mission_toml: &str, truth: &Truth, path: &str) -> Option
 /// Replaces the name of a built-in airframe by its text.
 fn expand_airframe(table: &mut toml::Table) -> Result<(), SettingError> {
     if let Some(name) = table.get(AIRFRAME).and_then(toml::Value::as_str)
-        && let Some(text) = vehicles::airframe::builtin_toml(name)
+        && let Some(text) = flight::vehicles::airframe::builtin_toml(name)
     {
         let airframe = parsed_table(text, name)?;
         table.insert(AIRFRAME.to_owned(), toml::Value::Table(airframe));
@@ -643,7 +643,7 @@ mod tests {
     }
 
     fn toml() -> &'static str {
-        vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap().1
+        flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap().1
     }
 
     fn with(given: &[&str]) -> Result<Mission, SettingError> {
@@ -662,14 +662,14 @@ mod tests {
         assert_eq!(with(&given).unwrap(), expected);
         assert_eq!(
             with(&["airframe=mk2-h53"]).unwrap().airframe,
-            vehicles::airframe::builtin("mk2-h53").unwrap()
+            flight::vehicles::airframe::builtin("mk2-h53").unwrap()
         );
     }
 
     #[test]
     fn every_key_of_the_built_in_missions_is_known_and_others_are_refused_with_the_nearest() {
         let known = known_mission_paths();
-        for (name, text) in vehicles::mission::BUILTIN {
+        for (name, text) in flight::vehicles::mission::BUILTIN {
             let mut table = text.parse::<toml::Table>().unwrap();
             expand_airframe(&mut table).unwrap();
             super::collect_leaves("", &table, &mut |path, _| {

@@ -3,7 +3,7 @@
 use flight::computer::news::News;
 use flight::computer::{Commands, Computer, Input, Output, flight_time_s};
 use flight_log::frame::{LoggedInput, frame_to_log};
-use log_records::computer_v1::ComputerFrame;
+use protocol::records::computer_v1::ComputerFrame;
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {

@@ -8,7 +8,7 @@ use flight::computer::saved::Saved;
 use flight::guidance::baseline::Controller;
 use flight_log::again::{FrameError, RecordedComputer, mission_flown};
 use flight_log::frame::output_to_log;
-use log_records::computer_v1::ComputerInput;
+use protocol::records::computer_v1::ComputerInput;
 
 pub use vehicle_link::vehicle::VehicleKind;
 
@@ -164,7 +164,7 @@ impl Flying {
     /// The flight computer before its first frame, and the crew's end of it; or why there is none.
     fn power_up(kind: VehicleKind, begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
         let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
-        let mission = vehicles::mission::from_toml(&begin.toml, "mission");
+        let mission = flight::vehicles::mission::from_toml(&begin.toml, "mission");
         let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start);
         let computer = RecordedComputer::started(&mission, &begin.start, controller);
         let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, mission, &begin.toml));

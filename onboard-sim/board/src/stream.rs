@@ -13,8 +13,10 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use log_records::computer_v1::{Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink};
 use prost::Message;
+use protocol::records::computer_v1::{
+    Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink,
+};
 
 /// Longest accepted record, bytes: several times a mission with its motors' files (20 KB), the longest there is.
 pub const LONGEST_BYTES: usize = 128 * 1024;

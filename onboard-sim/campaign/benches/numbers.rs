@@ -58,7 +58,7 @@ fn main() {
         if !wanted {
             continue;
         }
-        let file = row.file.strip_prefix("onboard-sim/vehicles/missions/");
+        let file = row.file.strip_prefix("onboard-sim/flight/vehicles/missions/");
         let mission = file.map_or("mk2", |file| file.trim_end_matches(".toml")).to_owned();
         let path = format!("{CLONE}/{}", row.file);
         let source = fs::read_to_string(&path).unwrap();

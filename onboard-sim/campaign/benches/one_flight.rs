@@ -13,7 +13,7 @@ fn main() {
 /// Flight 0 of a set of dispersions on mk2.
 #[divan::bench(args = ["none", "field"], sample_count = 5)]
 fn one_flight(bencher: divan::Bencher<'_, '_>, set: &str) {
-    let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let dispersion = Dispersion::builtin(set).unwrap();
     let draw = draw(&mission, &dispersion, 1, 0);
     bencher.bench_local(|| Sortie::drawn_as(&mission, &dispersion, &draw, Law::Nmpc).unwrap().run());

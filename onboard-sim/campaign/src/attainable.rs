@@ -25,7 +25,7 @@ use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use sim::draw::Draw;
-use world::vertical::Vertical;
+use sim::world::vertical::Vertical;
 
 /// Heights of the feet at the ignition command, m, from which a landing exists.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,9 +16,9 @@ use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
 use sim::recipe::{Recipe, RecipeError};
 use sim::sortie::{SetUpError, Sortie};
+use sim::world::wind::Wind;
+use sim::world::{Actuators, Fault};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
-use world::wind::Wind;
-use world::{Actuators, Fault};
 
 use crate::run::in_parallel;
 
@@ -618,7 +618,7 @@ mod tests {
                 "{impulse_n_s} {found:?}"
             );
         }
-        let of = |name: &str| vehicles::mission::builtin(name).unwrap().unwrap();
+        let of = |name: &str| flight::vehicles::mission::builtin(name).unwrap().unwrap();
         let mut mk2 = of("mk2");
         assert_eq!((Rule::of(&mk2).feet, Rule::of(&mk2).complex), (100.0, false));
         mk2.start.at = StartPoint::Pad;

@@ -12,7 +12,7 @@ use sim::draw::draw;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
-use world::{RestOutcome, Touchdown};
+use sim::world::{RestOutcome, Touchdown};
 
 use crate::attainable;
 use crate::row::Row;

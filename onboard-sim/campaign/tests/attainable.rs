@@ -6,7 +6,7 @@ use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::mission::Mission;
 use sim::draw::{Draw, draw};
 use sim::recipe::Recipe;
-use world::vertical::Vertical;
+use sim::world::vertical::Vertical;
 
 /// Controls are constant for this long, s, and the motion in it is integrated in `PARTS` parts.
 const HOLD_S: f64 = 0.1;

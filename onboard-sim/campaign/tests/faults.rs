@@ -16,7 +16,7 @@ const SENSORS_ONLY: &str = "sensors = true";
 const EXPECTED: &str = include_str!("expected-faults.csv");
 
 fn fly(controller: Controller, faults: &[&str]) -> Row {
-    let mission = vehicles::mission::BUILTIN[0];
+    let mission = flight::vehicles::mission::BUILTIN[0];
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let recipe = Recipe::from_texts(mission, ("sensors only", SENSORS_ONLY)).unwrap();
     tally::fly(&Recipe { controller, faults, ..recipe }, 0).unwrap()

@@ -18,7 +18,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::recipe::Recipe;
 
 fn mission(name: &str) -> Mission {
-    vehicles::mission::builtin(name).unwrap().unwrap()
+    flight::vehicles::mission::builtin(name).unwrap().unwrap()
 }
 
 /// The limits of a mission's airframe with a motor and some ballast, kg.
@@ -28,7 +28,7 @@ fn limits(mission: &Mission, frame: &Frame, curve: &ThrustCurve, ballast_kg: [f6
 }
 
 fn chosen(mission: &Mission, motor: &str, ballast_kg: [f64; 2]) -> Result<Choice, Refusal> {
-    let curve = vehicles::motors::builtin(motor).unwrap();
+    let curve = flight::vehicles::motors::builtin(motor).unwrap();
     let frame = Frame::of(mission).unwrap();
     choose(mission, &frame, &curve, &limits(mission, &frame, &curve, ballast_kg))
 }
@@ -50,7 +50,7 @@ fn val_vlr_drops_land_on_their_motors_from_their_height() {
         let dropped = mission(name);
         let from_m = start_height_m(&dropped);
         let frame = Frame::of(&dropped).unwrap();
-        let curve = vehicles::motors::builtin(motor).unwrap();
+        let curve = flight::vehicles::motors::builtin(motor).unwrap();
         let usual = limits(&dropped, &frame, &curve, [-0.2, 0.2]);
         let choose = |start| choose(&dropped, &frame, &curve, &Limits { start, ..usual }).unwrap();
         let own_kg = dropped.airframe.mass.loaded_kg;
@@ -195,7 +195,7 @@ fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
     let ranked = ranking(1);
     assert_eq!(ranked, ranking(3));
     // Five broken files.
-    let of = vehicles::motors::names().count() + 5;
+    let of = flight::vehicles::motors::names().count() + 5;
     assert_eq!(ranked.len(), of);
     let names: Vec<String> = ranked
         .iter()
@@ -235,8 +235,8 @@ fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
 #[test]
 fn a_motor_of_a_list_flies_as_the_mission_that_is_written_for_it() {
     let mini = mission("mini-f10");
-    let curve = vehicles::motors::builtin("G12").unwrap();
-    let motor = vehicles::thrust_curve::to_rasp(&curve);
+    let curve = flight::vehicles::motors::builtin("G12").unwrap();
+    let motor = flight::vehicles::thrust_curve::to_rasp(&curve);
     let candidate =
         Candidate { origin: "a list".to_owned(), motor, curve: curve.clone(), in_production: None };
     let choice = chosen(&mini, "G12", [0.0, 0.25]).unwrap();

@@ -5,7 +5,7 @@ use flight::computer::{Computer, Output, flight_time_s};
 use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::LandingSolved;
 use flight::vehicle::mission::Mission;
-use log_records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
+use protocol::records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
 
 use crate::estimate::{RecordError, state_from_log, vector_from_log};
 use crate::frame::{LoggedInput, frame_to_log, input_from_log};

@@ -6,8 +6,8 @@ use flight::estimation::estimator::{
 };
 use flight::estimation::motor_estimate::MotorEstimate;
 use flight::vehicle::rigid::RigidState;
-use log_records::flight_v1 as v1;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
+use protocol::records::flight_v1 as v1;
 
 /// Why a recorded frame cannot be given to this build's flight computer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

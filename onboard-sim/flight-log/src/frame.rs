@@ -12,7 +12,7 @@ use flight::rules::outputs::{Line, Outputs};
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use flight::vehicle::mission::StartPoint;
-use log_records::computer_v1 as v1;
+use protocol::records::computer_v1 as v1;
 
 use crate::estimate::{
     RecordError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
@@ -495,7 +495,7 @@ mod tests {
     fn an_unknown_value_is_refused_with_the_number_of_its_frame() {
         let input = v1::ComputerInput {
             frame: 7,
-            measured: Some(log_records::flight_v1::Measurements::default()),
+            measured: Some(protocol::records::flight_v1::Measurements::default()),
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
             requests: vec![v1::Request { asked: 10, ..v1::Request::default() }],
@@ -506,7 +506,8 @@ mod tests {
         let error =
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
-        let both = v1::ComputerInput { known: Some(log_records::flight_v1::Estimate::default()), ..input };
+        let both =
+            v1::ComputerInput { known: Some(protocol::records::flight_v1::Estimate::default()), ..input };
         assert_eq!(input_from_log(&both).unwrap_err(), RecordError::Sensed { frame: 7 });
     }
 }

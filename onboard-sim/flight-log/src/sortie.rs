@@ -21,7 +21,7 @@ use sim::limits::Limits;
 use sim::outside::Watch;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use world::{Strain, Touchdown};
+use sim::world::{Strain, Touchdown};
 
 use crate::estimate::{state_to_log, thought_to_log, vector_to_log};
 use crate::frame::{frame_to_log, start_to_log};

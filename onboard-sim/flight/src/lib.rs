@@ -103,14 +103,5 @@ pub mod rules {
 
 pub mod computer;
 
-// The unit tests fly the built-in vehicles. They cannot use the crate `vehicles`, because that crate is linked with
-// another build of `flight` than the one under test.
-#[cfg(test)]
-#[path = "../../vehicles/src/lib.rs"]
-#[allow(
-    dead_code,
-    unreachable_pub,
-    unused_imports,
-    reason = "a crate's public items, of which the unit tests use some"
-)]
-mod vehicles;
+#[cfg(any(test, feature = "files"))]
+pub mod vehicles;

@@ -1,7 +1,7 @@
 //! The uncertain values of a flight, as data.
 
+use crate::world::sensors::SensorParams;
 use serde::Deserialize;
-use world::sensors::SensorParams;
 
 /// A set of dispersions. Each value is the standard deviation of a normal distribution unless its name says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]

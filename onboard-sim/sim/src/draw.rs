@@ -2,14 +2,14 @@
 
 use core::f64::consts::TAU;
 
+use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
+use crate::world::wind::Wind;
+use crate::world::{AscentTruth, Hanging};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
-use world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
-use world::wind::Wind;
-use world::{AscentTruth, Hanging};
 
 use crate::dispersion::{Dispersion, Mismatch};
 

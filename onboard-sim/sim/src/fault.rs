@@ -7,8 +7,8 @@
 use core::fmt;
 use core::str::FromStr;
 
+use crate::world::Fault;
 use flight::rules::phase::Phase;
-use world::Fault;
 
 use crate::draw::fault_shares;
 

@@ -3,6 +3,7 @@
 //! It has no clock, no network and no statistics. The live vehicle, a campaign and a replay all use it, so all three
 //! fly the same flight.
 //!
+//! * [`world`]: the simulated truth.
 //! * [`recipe`]: everything that a flight is made from.
 //! * [`dispersion`]: which values of a flight are uncertain and by how much, as data.
 //! * [`draw`]: the random values of one flight, from a seed and the flight's number.
@@ -24,3 +25,4 @@ pub mod outside;
 pub mod recipe;
 pub mod sortie;
 mod surroundings;
+pub mod world;

@@ -5,10 +5,10 @@
 
 use core::f64::consts::FRAC_PI_2;
 
+use crate::world::Touchdown;
 use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
-use world::Touchdown;
 
 /// Both sets of limits.
 #[derive(Debug, Clone, Copy, PartialEq)]

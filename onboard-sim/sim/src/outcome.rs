@@ -1,9 +1,9 @@
 //! How a flight ended, judged by the landing paper's Table 2 and by its legs: by their limits at contact, or, where they can give
 //! way, by whether the vehicle stands undamaged.
 
+use crate::world::{Rest, RestOutcome, Strain, Touchdown};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use world::{Rest, RestOutcome, Strain, Touchdown};
 
 use crate::ending::{FlightEnding, UNDER_PARACHUTE};
 

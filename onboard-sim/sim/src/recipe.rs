@@ -2,8 +2,8 @@
 
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
-use vehicles::file_error::FileError;
-use vehicles::mission::MissionError;
+use flight::vehicles::file_error::FileError;
+use flight::vehicles::mission::MissionError;
 
 use crate::dispersion::{Dispersion, DispersionError};
 use crate::fault::TimedFault;
@@ -47,7 +47,7 @@ impl Recipe {
     pub fn from_texts(mission: (&str, &str), dispersion: (&str, &str)) -> Result<Self, RecipeError> {
         let ((mission_name, mission_toml), (dispersion_name, dispersion_toml)) = (mission, dispersion);
         Ok(Self {
-            mission: vehicles::mission::from_toml(mission_toml, mission_name)?,
+            mission: flight::vehicles::mission::from_toml(mission_toml, mission_name)?,
             mission_toml: mission_toml.to_owned(),
             dispersion: Dispersion::from_toml(dispersion_toml, dispersion_name)?,
             dispersion_name: dispersion_name.to_owned(),
@@ -64,7 +64,7 @@ impl Recipe {
     /// The mission has not what that start needs.
     pub fn starting_at(self, start: StartPoint) -> Result<Self, RecipeError> {
         let mission_toml = toml_starting_at(&self.mission_toml, &self.mission.name, start)?;
-        let mission = vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
+        let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
         Ok(Self { mission, mission_toml, ..self })
     }
 
@@ -73,7 +73,7 @@ impl Recipe {
     /// # Errors
     /// One of them is not built in.
     pub fn built_in(mission: &str, dispersion: &str) -> Result<Self, RecipeError> {
-        let known = vehicles::mission::BUILTIN.iter().find(|(known, _)| *known == mission);
+        let known = flight::vehicles::mission::BUILTIN.iter().find(|(known, _)| *known == mission);
         let mission = known.ok_or_else(|| RecipeError::UnknownMission(mission.to_owned()))?;
         Self::from_texts(*mission, (dispersion, Dispersion::builtin_toml(dispersion)?))
     }

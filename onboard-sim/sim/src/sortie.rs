@@ -6,6 +6,9 @@
 
 use std::time::Duration;
 
+use crate::world::sensors::SensorParamError;
+use crate::world::whole::WorldError;
+use crate::world::{Battery, World};
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
@@ -18,9 +21,6 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
-use world::sensors::SensorParamError;
-use world::world::WorldError;
-use world::{Battery, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw};

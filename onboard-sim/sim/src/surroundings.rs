@@ -1,6 +1,8 @@
 //! Everything of a flight but its flight computer: the world and how it begins, the sensors that look at it, and the
 //! actuators that move it.
 
+use crate::world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
+use crate::world::{Actuators, Battery, World};
 use flight::computer::pilot::Sensed;
 use flight::computer::{Commands, FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
@@ -8,8 +10,6 @@ use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
-use world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
-use world::{Actuators, Battery, World};
 
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;

@@ -2,7 +2,7 @@
 
 use sim::draw::draw;
 use sim::recipe::Recipe;
-use world::truth::Truth;
+use sim::world::truth::Truth;
 
 #[test]
 fn two_igniters_halve_the_deviation_of_the_delay_and_change_no_other_draw() {

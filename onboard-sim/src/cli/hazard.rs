@@ -89,7 +89,8 @@ pub(super) fn check_winds(winds_m_s: &[f64]) -> anyhow::Result<()> {
 
 /// The mission in each wind.
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
-    let own = vehicles::mission::from_toml(&mission_text(&arguments.profile, None)?, &arguments.profile)?;
+    let own =
+        flight::vehicles::mission::from_toml(&mission_text(&arguments.profile, None)?, &arguments.profile)?;
     let start = arguments.start.or_else(|| own.launch.is_some().then_some(StartPoint::Pad));
     let recipe = recipe(&arguments.profile, start, &arguments.dispersion, arguments.seed)?;
     arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()

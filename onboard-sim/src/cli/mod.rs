@@ -35,7 +35,7 @@ fn on_threads<T: Send>(
 
 /// The text of a built-in mission or of a file, with the flights' start if one is given.
 fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<String> {
-    let text = text_of(profile, vehicles::mission::BUILTIN, "mission")?;
+    let text = text_of(profile, flight::vehicles::mission::BUILTIN, "mission")?;
     Ok(match start {
         Some(start) => recipe::toml_starting_at(&text, profile, start)?,
         None => text,

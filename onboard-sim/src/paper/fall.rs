@@ -11,8 +11,8 @@ use flight::vehicle::airframe::Airframe;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
-use world::balance::Balance;
-use world::{Actuators, Truth, World};
+use sim::world::balance::Balance;
+use sim::world::{Actuators, Truth, World};
 
 use super::PaperError;
 
@@ -54,11 +54,11 @@ impl Vehicle {
     /// # Errors
     /// A built-in file is missing: a defect of the build.
     pub(crate) fn new() -> Result<Self, PaperError> {
-        let mut airframe = vehicles::airframe::builtin("mk2-h53")?;
+        let mut airframe = flight::vehicles::airframe::builtin("mk2-h53")?;
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;
-        let motor = vehicles::motors::builtin(&airframe.motor)?;
+        let motor = flight::vehicles::motors::builtin(&airframe.motor)?;
         Ok(Self { airframe, motor })
     }
 

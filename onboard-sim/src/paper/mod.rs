@@ -19,11 +19,11 @@ mod map;
 mod objective;
 mod text;
 
+use flight::vehicles::airframe::AirframeError;
+use flight::vehicles::motors::MotorError;
 use nmpc::SolveStatus;
 use nmpc::dynamics::PlanarState;
-use vehicles::airframe::AirframeError;
-use vehicles::motors::MotorError;
-use world::world::WorldError;
+use sim::world::whole::WorldError;
 
 use campaign::figure::FigureError;
 pub(crate) use cases::{Case, Table};

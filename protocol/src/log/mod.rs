@@ -1,7 +1,7 @@
 //! Writes and reads the flight log: an MCAP file of raw frames, controller ticks, simulated truth, telemetry,
 //! operator actions and events.
 //!
-//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `log_records` and, where one fits,
+//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `crate::records` and, where one fits,
 //! Foxglove's own.
 //! [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a log's contents. Records are flushed so often that a
 //! killed process loses at most a fraction of a second ([`recorder`]).
@@ -12,7 +12,7 @@ pub mod recorder;
 pub mod tlog;
 pub mod writer;
 
-pub use log_records::{
+pub use crate::records::{
     DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1, computer_v1, flight_v1, v1,
 };
 

@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn an_airframe_stands_on_its_own_feet() {
-        let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
         let propellant_kg = mission.motor_curve.propellant_mass_kg();
         let shape = RocketShape::of_airframe(&mission.airframe, propellant_kg);
         let airframe = &mission.airframe;

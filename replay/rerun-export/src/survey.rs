@@ -134,7 +134,7 @@ impl Survey {
                 return;
             }
         };
-        match vehicles::mission::from_toml(&text, ATTACHMENT_PROFILE) {
+        match flight::vehicles::mission::from_toml(&text, ATTACHMENT_PROFILE) {
             Ok(mission) => self.mission = Some(mission),
             Err(error) => self.profile_problem = Some(error.to_string()),
         }

@@ -17,7 +17,7 @@ use flight::vehicle::airframe::{MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
-use world::wind::gusts::GustScales;
+use sim::world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
 use super::least_squares::{NoiseStep, Whitener, lowest};

@@ -226,7 +226,8 @@ mod tests {
     /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down; 10 % more impulse in twice the time.
     #[test]
     fn val_hand_a_scaled_trapezium() {
-        let curve = vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
+        let curve =
+            flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
         let burn =
             Burn { curve: &curve, impulse_scale: 1.1, burn_time_scale: 2.0, shape: [0.0; SHAPE_TERMS] };
         // From 2 to 6 s it is level: 40 N of the file, 1.1 / 2 of it.
@@ -242,7 +243,7 @@ mod tests {
     }
 
     fn curve() -> ThrustCurve {
-        vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n0.2 40\n3 36\n4 0\n").unwrap()
+        flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n0.2 40\n3 36\n4 0\n").unwrap()
     }
 
     /// The curve with 4 % more impulse in a burn that is 5 % shorter, 0.21 s after the command, with a tare of 1.5 N and a

@@ -24,8 +24,8 @@ use serde::Serialize;
 use sim::dispersion::{DEFAULT, Dispersion, DispersionError, may_be_kinder};
 use sim::draw::{Draw, draw};
 use sim::sortie::{SetUpError, Sortie};
+use sim::world::truth::Truth;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
-use world::truth::Truth;
 
 use super::lot::{Chance, Lot, Prediction, Trial, draw_next, predict};
 use super::{Basis, Fit, Pooled, Z_95, pooled};
@@ -369,7 +369,7 @@ impl Day {
         let float = |value: f64| toml::Value::Float(value);
         let set = |path: &str, value: toml::Value| Setting { path: path.to_owned(), value, at_s: None };
         let settings = [
-            set("airframe.motor", toml::Value::String(vehicles::thrust_curve::to_rasp(&curve))),
+            set("airframe.motor", toml::Value::String(flight::vehicles::thrust_curve::to_rasp(&curve))),
             set("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
             set(
                 "airframe.body.crossflow_drag_coefficient",
@@ -583,7 +583,7 @@ impl Arguments {
     /// What the fits tell of the next day; `flown` is the mission of the first log.
     pub(super) fn learn(&self, fits: &[Fit], flown: Option<String>) -> Result<Learnt> {
         let mission_toml = match (&self.mission, flown) {
-            (Some(name), _) => text_of(name, vehicles::mission::BUILTIN, "mission")?,
+            (Some(name), _) => text_of(name, flight::vehicles::mission::BUILTIN, "mission")?,
             (None, Some(flown)) => flown,
             (None, None) => bail!("--mission is missing: fits do not hold their mission"),
         };
@@ -676,7 +676,8 @@ mod tests {
 
     #[test]
     fn val_hand_a_scaled_motor() {
-        let curve = vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
+        let curve =
+            flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
         let found = scaled(&curve, 1.1, 2.0).unwrap();
         assert!(
             (found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12

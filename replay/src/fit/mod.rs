@@ -623,14 +623,14 @@ fn ends_in(file: &Path, wanted: &str) -> bool {
 }
 
 fn curve_of(motor: &str) -> Result<ThrustCurve> {
-    if vehicles::motors::names().any(|known| known == motor) {
-        return Ok(vehicles::motors::builtin(motor)?);
+    if flight::vehicles::motors::names().any(|known| known == motor) {
+        return Ok(flight::vehicles::motors::builtin(motor)?);
     }
     let text = std::fs::read_to_string(motor).with_context(|| {
-        let known = vehicles::motors::names().collect::<Vec<_>>().join(", ");
+        let known = flight::vehicles::motors::names().collect::<Vec<_>>().join(", ");
         format!("'{motor}' is neither a built-in motor ({known}) nor a readable file")
     })?;
-    vehicles::thrust_curve::from_file_text(motor, &text).with_context(|| motor.to_owned())
+    flight::vehicles::thrust_curve::from_file_text(motor, &text).with_context(|| motor.to_owned())
 }
 
 #[cfg(test)]

@@ -213,7 +213,7 @@ fn mission_of<R: std::io::Read>(log: &FlightLog<R>) -> Result<(Mission, String),
     match &log.head().profile_toml {
         None => Err(RecordingError::NoProfile { name }),
         Some(Err(error)) => Err(RecordingError::ProfileUnusable { name, reason: error.to_string() }),
-        Some(Ok(text)) => match vehicles::mission::from_toml(text, "profile.toml") {
+        Some(Ok(text)) => match flight::vehicles::mission::from_toml(text, "profile.toml") {
             Ok(mission) => Ok((mission, text.clone())),
             Err(error) => {
                 Err(RecordingError::ProfileUnusable { name, reason: explained(&error.to_string()) })

@@ -10,8 +10,8 @@ use flight::estimation::estimator::VehicleNow;
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::atmosphere::Air;
 use nalgebra::{Matrix2, Vector2, Vector3};
-use world::wind::gusts::GustScales;
-use world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
+use sim::world::wind::gusts::GustScales;
+use sim::world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
 
 use super::Parameter;
 use super::along::{Along, falling};

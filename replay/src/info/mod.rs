@@ -256,7 +256,7 @@ pub struct ProfileFacts {
 impl ProfileFacts {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
-            Ok(text) => vehicles::mission::from_toml(text, "profile.toml")
+            Ok(text) => flight::vehicles::mission::from_toml(text, "profile.toml")
                 .map(|mission| (mission.name, mission.summary))
                 .map_err(|error| explained(&error.to_string())),
             Err(error) => Err(error.to_string()),

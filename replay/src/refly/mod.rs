@@ -32,7 +32,7 @@ use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriteError};
 use serde::Serialize;
 use sim::sortie::SetUpError;
-use world::world::WorldError;
+use sim::world::whole::WorldError;
 
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};

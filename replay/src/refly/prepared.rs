@@ -13,7 +13,7 @@ use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput, C
 use protocol::log::record::Record;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
-use world::Truth;
+use sim::world::Truth;
 
 use super::rerun::{Recorded, Rerun};
 use super::{

@@ -18,7 +18,7 @@ fn fits(path: &Path, thrusts: &[f64]) {
             "name": name, "unit": "", "value": value, "sigma": 0.002, "low": value - 0.004, "high": value + 0.004,
         })
     };
-    let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let basis = serde_json::to_value(replay::fit::Basis::of(&mission)).unwrap();
     let fit = |(place, thrust): (usize, &f64)| {
         serde_json::json!({
@@ -47,8 +47,8 @@ fn five_burns_become_a_day_that_the_campaigns_readers_take() {
     assert!((thrust["mean"].as_f64().unwrap() - 6.05 / 6.0).abs() < 1e-12, "{thrust}");
     assert!(thrust["next_sigma"].as_f64() < thrust["prior_sigma"].as_f64(), "{thrust}");
     let text = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
-    let mission = vehicles::mission::from_toml(&text("mission.toml"), "day").unwrap();
-    let built_in = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let mission = flight::vehicles::mission::from_toml(&text("mission.toml"), "day").unwrap();
+    let built_in = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let impulse = |mission: &flight::vehicle::mission::Mission| mission.motor_curve.total_impulse_n_s();
     assert!((impulse(&mission) / impulse(&built_in) - 6.05 / 6.0).abs() < 1e-9);
     let set = sim::dispersion::Dispersion::from_toml(&text("dispersion.toml"), "day").unwrap();

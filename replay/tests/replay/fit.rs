@@ -82,7 +82,7 @@ fn the_mission_with_what_was_found_can_be_loaded_and_is_not_overwritten() {
     let write = ["--write-mission", patch.to_str().unwrap()];
     let (found, _) = fits(&[[log].as_slice(), &write].concat());
     let text = std::fs::read_to_string(&patch).unwrap();
-    let mission = vehicles::mission::from_toml(&text, "patch").unwrap();
+    let mission = flight::vehicles::mission::from_toml(&text, "patch").unwrap();
     let delay_s = mission.airframe.gimbal.servo.delay_s;
     assert!((delay_s - found[0].get("gimbal_delay").unwrap().value).abs() < 1e-9, "{delay_s}");
     assert!(text.starts_with("# mk2 with what was found in"), "{text}");
@@ -109,7 +109,7 @@ fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
 fn a_stands_table_needs_its_motor() {
     let directory = tempfile::tempdir().unwrap();
     let table = directory.path().join("burn.csv");
-    let curve = vehicles::motors::builtin("H45W").unwrap();
+    let curve = flight::vehicles::motors::builtin("H45W").unwrap();
     let rows = (0..3500).map(|row| f64::from(row) * 2e-3);
     let rows = rows.map(|time_s| format!("{time_s},{}\n", 0.97 * curve.thrust_at_n(time_s - 0.12)));
     std::fs::write(&table, format!("time_s,thrust_n\n{}", rows.collect::<String>())).unwrap();

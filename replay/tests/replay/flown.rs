@@ -66,7 +66,7 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
 
 /// The mission of the flight.
 pub(crate) fn mission_toml() -> &'static str {
-    vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap().1
+    flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap().1
 }
 
 /// Options of a log.

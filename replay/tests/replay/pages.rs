@@ -120,7 +120,7 @@ fn telemetry_alone_makes_a_page() {
 fn from_the_pad() -> from_apogee::Logged {
     let mut recipe = sim::recipe::Recipe::built_in("mk2", "field").unwrap();
     let toml = sim::recipe::toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
-    recipe.mission = vehicles::mission::from_toml(&toml, "mk2").unwrap();
+    recipe.mission = flight::vehicles::mission::from_toml(&toml, "mk2").unwrap();
     recipe.mission_toml = toml;
     from_apogee::fly_recipe(&recipe)
 }

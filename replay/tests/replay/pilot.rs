@@ -32,13 +32,13 @@ struct Fall {
 }
 
 fn mission_toml() -> &'static str {
-    let (_, text) = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap();
+    let (_, text) = flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == MISSION).unwrap();
     text
 }
 
 /// Two seconds of free fall with sensors that measure nothing, and a restart on the way.
 static FALL: LazyLock<Fall> = LazyLock::new(|| {
-    let mission = vehicles::mission::from_toml(mission_toml(), "test").unwrap();
+    let mission = flight::vehicles::mission::from_toml(mission_toml(), "test").unwrap();
     let believed = RigidState {
         position_m: Vector3::new(0.0, 0.0, 120.0),
         velocity_m_s: Vector3::new(2.0, 0.0, 0.0),

@@ -1,6 +1,6 @@
 """A flight computer in a process of its own (`board fly`), in lockstep over its standard input and output.
 
-The records are those of a flight's log: protocol buffers (protocol/records/proto), here put together by field numbers. On
+The records are those of a flight's log: protocol buffers (protocol/proto), here put together by field numbers. On
 the wire each is followed by its CRC-32, stuffed (COBS) and ended by a zero.
 """
 import struct

@@ -15,8 +15,8 @@ use sim::dispersion::Dispersion;
 use sim::draw::{Draw, draw};
 use sim::outcome::{Ending, Outcome, judge};
 use sim::sortie::Sortie;
-use world::sensors::believed_start;
-use world::{Rest, RestOutcome, Touchdown};
+use sim::world::sensors::believed_start;
+use sim::world::{Rest, RestOutcome, Touchdown};
 
 const FLIGHTS: u64 = 20;
 /// Flights of one run of the bridge.
@@ -41,7 +41,7 @@ fn state(state: &RigidState) -> Value {
 
 /// The flights that JSBSim is to fly, numbered from `first`.
 fn order(mission: &Mission, first: usize, draws: &[Draw]) -> Value {
-    let vehicles = file("../../onboard-sim/vehicles");
+    let vehicles = file("../../onboard-sim/flight/vehicles");
     let flights: Vec<Value> = draws
         .iter()
         .enumerate()
@@ -137,8 +137,9 @@ struct Flown {
 }
 
 fn fly(wind_m_s: f64) -> Flown {
-    let (_, mission_toml) = *vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
-    let mission = vehicles::mission::from_toml(mission_toml, "mk2").unwrap();
+    let (_, mission_toml) =
+        *flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
+    let mission = flight::vehicles::mission::from_toml(mission_toml, "mk2").unwrap();
     let dispersion = day(wind_m_s);
     let draws: Vec<Draw> = (0..FLIGHTS).map(|number| draw(&mission, &dispersion, SEED, number)).collect();
     let folder = tempfile::tempdir().unwrap();

@@ -4,11 +4,11 @@
 use clients::{ROCKETPY, file};
 use flight::vehicle::rigid::RigidState;
 use serde_json::Value;
-use world::{Actuators, AscentTruth, Truth, World};
+use sim::world::{Actuators, AscentTruth, Truth, World};
 
 /// Height and time of our apogee since the thrust began, m and s, from a rail with this lean, degrees.
 fn ours(tilt_deg: f64) -> (f64, f64) {
-    let mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let mut launch = mission.launch.unwrap();
     launch.rail.tilt_deg = tilt_deg;
     // RocketPy has no drag across the body.
@@ -32,7 +32,7 @@ fn val_rocketpy_the_stack_has_its_masses_and_its_apogee() {
     let number =
         |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found}"));
 
-    let booster = vehicles::mission::builtin("mk2").unwrap().unwrap().launch.unwrap().booster;
+    let booster = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().launch.unwrap().booster;
     for (ours, path) in [
         (booster.dry_kg, "/mass/booster_dry_with_casing/kg"),
         (booster.cg_station_m, "/mass/booster_dry_with_casing/cg_station_m"),

@@ -338,7 +338,7 @@ mod tests {
     /// The bound with perfect information encloses the height that guidance chooses (16 m, from which 977 of 1,000 land).
     #[test]
     fn the_bound_of_a_drop_is_that_of_its_own_height() {
-        let mission = vehicles::mission::builtin("vlr").unwrap().unwrap();
+        let mission = flight::vehicles::mission::builtin("vlr").unwrap().unwrap();
         let bound = certified_window(&mission).unwrap();
         assert!(bound.low_m < 18.0 && 18.0 < bound.high_m && bound.high_m < 28.0, "{bound:?}");
     }

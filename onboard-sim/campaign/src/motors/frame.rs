@@ -190,7 +190,7 @@ pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, Miss
     let mut mission: Table = mission_toml.parse()?;
     let mut airframe: Table = match mission.remove("airframe") {
         Some(Value::Table(table)) => table,
-        Some(Value::String(name)) => vehicles::airframe::builtin_toml(&name)
+        Some(Value::String(name)) => flight::vehicles::airframe::builtin_toml(&name)
             .ok_or(MissionTextError::Missing("airframe of that name"))?
             .parse()?,
         _ => return Err(MissionTextError::Missing("airframe")),
@@ -250,7 +250,7 @@ mod tests {
     }
 
     fn mission() -> Mission {
-        let mut mission = vehicles::mission::builtin("mk2").unwrap().unwrap();
+        let mut mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
         mission.airframe.mass = Mass {
             loaded_kg: 3.0,
             loaded_cg_station_m: 0.5,
@@ -278,8 +278,8 @@ mod tests {
 
     #[test]
     fn its_own_motor_gives_the_airframe_back_to_the_bit() {
-        for (name, _) in vehicles::mission::BUILTIN {
-            let mission = vehicles::mission::builtin(name).unwrap().unwrap();
+        for (name, _) in flight::vehicles::mission::BUILTIN {
+            let mission = flight::vehicles::mission::builtin(name).unwrap().unwrap();
             let frame = Frame::of(&mission).unwrap();
             let none = Ballast { mass_kg: 0.0, station_m: 0.4 };
             assert_eq!(frame.with(&mission.motor_curve, none).unwrap(), mission.airframe.mass, "{name}");
@@ -308,8 +308,8 @@ mod tests {
 
     #[test]
     fn a_text_with_the_same_values_is_the_same_mission() {
-        for (name, text) in vehicles::mission::BUILTIN {
-            let mission = vehicles::mission::from_toml(text, name).unwrap();
+        for (name, text) in flight::vehicles::mission::BUILTIN {
+            let mission = flight::vehicles::mission::from_toml(text, name).unwrap();
             let changes = Changes {
                 name: &mission.name,
                 summary: &mission.summary,
@@ -318,23 +318,23 @@ mod tests {
                 start_height_m: start_height_m(&mission),
             };
             let again = changed(text, &changes).unwrap();
-            assert_eq!(vehicles::mission::from_toml(&again, name).unwrap(), mission);
+            assert_eq!(flight::vehicles::mission::from_toml(&again, name).unwrap(), mission);
             let moved = changed(&again, &Changes { start_height_m: 77.5, ..changes }).unwrap();
-            let moved = vehicles::mission::from_toml(&moved, name).unwrap();
+            let moved = flight::vehicles::mission::from_toml(&moved, name).unwrap();
             assert!((start_height_m(&moved) - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
         }
     }
 
     #[test]
     fn the_text_of_a_motor_file_stays_in_the_mission() {
-        let (name, text) = vehicles::mission::BUILTIN[0];
-        let mission = vehicles::mission::from_toml(text, name).unwrap();
+        let (name, text) = flight::vehicles::mission::BUILTIN[0];
+        let mission = flight::vehicles::mission::from_toml(text, name).unwrap();
         let motor = "; it's \"quoted\" \\ and 'so'\nX1 29 93 4-6-8 0.04 0.08 A B\n0.5 30\n2 0\n";
         let changes =
             Changes { name: "x", summary: "y", motor, mass: mission.airframe.mass, start_height_m: 100.0 };
-        let again = vehicles::mission::from_toml(&changed(text, &changes).unwrap(), "x").unwrap();
+        let again = flight::vehicles::mission::from_toml(&changed(text, &changes).unwrap(), "x").unwrap();
         assert_eq!(again.airframe.motor, motor);
-        assert_eq!(again.motor_curve, vehicles::motors::named(motor).unwrap());
+        assert_eq!(again.motor_curve, flight::vehicles::motors::named(motor).unwrap());
         assert_eq!(name_of("mk2", "A B/3.5"), "mk2-a-b-3.5");
         assert!(changed("name = 3", &changes).unwrap_err().to_string().contains("no airframe"));
     }

@@ -1,8 +1,8 @@
 //! Ranks motors by how well an airframe lands on them, and flies the best ones.
 
+use flight::vehicles::mission::MissionError;
 use sim::recipe::Recipe;
 use sim::sortie::SetUpError;
-use vehicles::mission::MissionError;
 
 use super::choice::{Choice, Refusal, Team, choose};
 use super::frame::{Changes, Frame, MissionTextError, changed, name_of};
@@ -153,7 +153,7 @@ impl Landing {
         };
         let mission_toml = changed(&of.mission_toml, &changes)
             .map_err(|source| RankError::Text { origin: candidate.origin.clone(), source })?;
-        let mission = vehicles::mission::from_toml(&mission_toml, &candidate.origin)?;
+        let mission = flight::vehicles::mission::from_toml(&mission_toml, &candidate.origin)?;
         Ok(Recipe { mission, mission_toml, ..of.clone() })
     }
 }

@@ -6,9 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
+use flight::vehicles::thrust_curve::{ThrustCurveError, from_rasp, to_rasp};
 use serde::Deserialize;
 use serde_json::value::RawValue;
-use vehicles::thrust_curve::{ThrustCurveError, from_rasp, to_rasp};
 
 /// A motor to choose from.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +71,7 @@ const ENDINGS: [&str; 3] = ["eng", "rse", "json"];
 
 /// The motors that come with the program.
 pub fn built_in() -> Vec<Found> {
-    let found = vehicles::motors::names().map(|name| match vehicles::motors::builtin(name) {
+    let found = flight::vehicles::motors::names().map(|name| match flight::vehicles::motors::builtin(name) {
         Ok(curve) => Ok(Candidate {
             origin: "built in".to_owned(),
             motor: name.to_owned(),
@@ -131,7 +131,7 @@ fn read_file(path: &Path) -> Result<Vec<Found>, SourceError> {
 fn one(path: &Path, text: &str) -> Found {
     let origin = path.display().to_string();
     let text = text.trim_start_matches('\u{feff}');
-    let curve = vehicles::thrust_curve::from_file_text(&origin, text).map_err(|error| Unusable {
+    let curve = flight::vehicles::thrust_curve::from_file_text(&origin, text).map_err(|error| Unusable {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         origin: origin.clone(),
         reason: error.to_string(),

@@ -23,7 +23,7 @@ struct Curve {
 
 impl Curve {
     fn h45(scale: f64) -> Self {
-        let file = include_str!("../../../vehicles/motors/AeroTech_H45.eng");
+        let file = include_str!("../../../flight/vehicles/motors/AeroTech_H45.eng");
         let mut rows = file.lines().filter(|line| !line.starts_with(';')).map(|line| {
             line.split_whitespace().filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>()
         });

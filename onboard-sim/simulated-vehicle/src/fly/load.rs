@@ -43,7 +43,7 @@ impl RocketFlight {
 }
 
 pub(super) fn builtin_names() -> String {
-    vehicles::mission::BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+    flight::vehicles::mission::BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
 /// Reads a mission by built-in name or path: flight 0 of seed 1 with the default dispersions.
@@ -51,7 +51,7 @@ pub(super) fn builtin_names() -> String {
 /// # Errors
 /// No mission of that name, or an invalid one: the message names the key.
 pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
-    let builtin = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == name_or_path);
+    let builtin = flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == name_or_path);
     let toml = match builtin {
         Some((_, text)) => (*text).to_owned(),
         None if !Path::new(name_or_path).exists() => {
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn every_built_in_mission_loads_with_field_dispersions() {
-        for (name, text) in vehicles::mission::BUILTIN {
+        for (name, text) in flight::vehicles::mission::BUILTIN {
             let RocketFlight { recipe, number } = load_flight(name).unwrap();
             assert_eq!(
                 (recipe.mission.name.as_str(), recipe.mission_toml.as_str(), number),
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn the_vehicle_tells_the_same_mission_from_every_start() {
         use protocol::mission::MissionHash;
-        for (name, text) in vehicles::mission::BUILTIN {
+        for (name, text) in flight::vehicles::mission::BUILTIN {
             for start in [StartPoint::Apogee, StartPoint::Pad, StartPoint::Drone] {
                 let Ok(flight) = load_flight(name).unwrap().starting_at(Some(start)) else { continue };
                 let told = flight.vehicle().unwrap().mission().hash;

@@ -6,7 +6,7 @@ use flight::rules::phase::Phase;
 use sim::limits::Limits;
 use sim::outcome::Outcome;
 use sim::sortie::Sortie;
-use world::RestOutcome;
+use sim::world::RestOutcome;
 
 use super::{Impact, Judged, VehicleEvent};
 

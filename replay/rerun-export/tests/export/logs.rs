@@ -96,7 +96,8 @@ pub(crate) fn folder() -> (tempfile::TempDir, PathBuf, PathBuf) {
 
 /// A log of a flight from apogee: 2 s of an upright fall, a frame every 0.5 s.
 pub(crate) fn write_apogee_log(path: &Path) {
-    let (_, mission_toml) = vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
+    let (_, mission_toml) =
+        flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == "mk2").unwrap();
     let header = LogHeader {
         writer: "test".to_owned(),
         start_unix_ns: START_UNIX_NS,

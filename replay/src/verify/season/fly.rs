@@ -190,7 +190,7 @@ fn recipe(directory: &Path) -> Result<Recipe, SeasonError> {
         .map_err(|error| wrong(MANIFEST, error.to_string()))?;
     let mission_toml = text(directory.join("mission.toml"))?;
     let dispersion_toml = text(directory.join("dispersion.toml"))?;
-    let mut mission = vehicles::mission::from_toml(&mission_toml, "mission.toml")
+    let mut mission = flight::vehicles::mission::from_toml(&mission_toml, "mission.toml")
         .map_err(|error| wrong("mission.toml", error.to_string()))?;
     mission.steered = manifest.steered;
     let faults = manifest.faults.iter().map(|fault| fault.parse().map_err(|error| format!("{error}")));

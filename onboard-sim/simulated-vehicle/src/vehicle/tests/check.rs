@@ -35,7 +35,7 @@ fn rests(rocket: &Vehicle) -> bool {
 
 #[test]
 fn every_built_in_mission_passes_its_check() {
-    for (name, _) in vehicles::mission::BUILTIN {
+    for (name, _) in flight::vehicles::mission::BUILTIN {
         for dispersion in ["none", "field", "real"] {
             let mut flight = load_flight(name).unwrap();
             flight.recipe.dispersion = sim::dispersion::Dispersion::builtin(dispersion).unwrap();
@@ -68,7 +68,7 @@ fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
 #[test]
 fn a_failed_self_test_is_a_reason_to_look_closer() {
     let mut rocket = Told::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
-    rocket.vehicle.sortie.world_mut().inject(&world::Fault::FinStuck { fin: 2 });
+    rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::FinStuck { fin: 2 });
     let refused = rocket.request(Asked::Check);
     assert_eq!(refused.ending, Ending::NotNow);
     assert_eq!(refused.reason.unwrap(), "the self-test is not over");

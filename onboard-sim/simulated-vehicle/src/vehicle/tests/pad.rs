@@ -7,7 +7,7 @@ use flight::rules::outputs::{Line, Outputs};
 use flight::vehicle::mission::StartPoint;
 use sim::outside::{Outside, Unwatched};
 use sim::sortie::Sortie;
-use world::RestOutcome;
+use sim::world::RestOutcome;
 
 fn from(start: StartPoint, dispersion: &str, faults: &[&str]) -> Told {
     let mut flight = flight_of(dispersion, faults);
@@ -297,7 +297,7 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
             assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
         }
         rocket.advance();
-        rocket.vehicle.sortie.world_mut().inject(&world::Fault::AscentSelfLights);
+        rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::AscentSelfLights);
         let events = rocket.run_until(Vehicle::is_over);
         let seen = phases(&events);
         assert!(said(&events, "LIFT-OFF without a countdown"), "{asked:?}: {seen:?}");

@@ -84,7 +84,7 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
 
 #[test]
 fn every_built_in_mission_is_ready_on_its_pad() {
-    for (name, _) in vehicles::mission::BUILTIN {
+    for (name, _) in flight::vehicles::mission::BUILTIN {
         let flight = load_flight(name).unwrap();
         let mut rocket = rocket_of(&flight);
         rocket.run_until(|rocket| rocket.time_s() > 10.0);

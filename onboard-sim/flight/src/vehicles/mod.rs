@@ -1,0 +1,17 @@
+//! Reads mission, airframe and motor files into the plain types of this crate.
+//!
+//! Each module reads one kind of file and knows the built-in files by name. Its errors name the wrong key or line and
+//! the accepted values.
+//!
+//! * [`mission`]: missions, from TOML.
+//! * [`airframe`]: airframes, from TOML.
+//! * [`motors`]: the built-in motors, by name.
+//! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
+//! * [`file_error`]: why a mission cannot be used.
+
+pub mod airframe;
+pub mod file_error;
+pub mod mission;
+pub mod motors;
+mod ranges;
+pub mod thrust_curve;

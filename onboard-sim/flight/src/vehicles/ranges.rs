@@ -1,0 +1,143 @@
+//! Range checks of what a file says: one line for each key.
+
+use alloc::borrow::ToOwned as _;
+use alloc::format;
+use alloc::string::{String, ToString as _};
+use core::fmt::Display;
+
+use crate::vehicle::airframe;
+use crate::vehicle::mission::{ArmingLimits, FinalBox, GateLimits, SolverLimits, StateWeights, TouchdownBox};
+
+/// A value outside its range.
+pub(super) struct BadValue {
+    /// The key, with its section.
+    pub(super) key: String,
+    pub(super) found: String,
+    /// The accepted range, in words.
+    pub(super) required: &'static str,
+}
+
+impl From<airframe::BadValue> for BadValue {
+    fn from(bad: airframe::BadValue) -> Self {
+        Self { key: bad.key.to_owned(), found: bad.found.to_string(), required: bad.required }
+    }
+}
+
+pub(super) type Check = Result<(), BadValue>;
+
+pub(super) fn require(
+    ok: bool,
+    key: impl Into<String>,
+    found: impl Display,
+    required: &'static str,
+) -> Check {
+    if ok { Ok(()) } else { Err(BadValue { key: key.into(), found: found.to_string(), required }) }
+}
+
+pub(super) fn positive(key: impl Into<String>, value: f64) -> Check {
+    require(value.is_finite() && value > 0.0, key, value, "a finite number above 0")
+}
+
+pub(super) fn not_negative(key: impl Into<String>, value: f64) -> Check {
+    require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more")
+}
+
+pub(super) fn share(key: impl Into<String>, value: f64) -> Check {
+    require((0.0..=1.0).contains(&value), key, value, "from 0 to 1")
+}
+
+pub(super) fn angle_below_right(key: impl Into<String>, value_deg: f64) -> Check {
+    require(value_deg > 0.0 && value_deg < 90.0, key, value_deg, "above 0 and below 90")
+}
+
+pub(super) fn weights(section: &str, weights: &StateWeights) -> Check {
+    let key = |name: &str| format!("{section}.weights.{name}");
+    not_negative(key("x"), weights.x)?;
+    not_negative(key("z"), weights.z)?;
+    not_negative(key("theta"), weights.theta)?;
+    not_negative(key("u"), weights.u)?;
+    not_negative(key("w"), weights.w)?;
+    not_negative(key("q"), weights.q)?;
+    positive(key("delta"), weights.delta)
+}
+
+/// The box in which a plan ends, but for the number of its nodes.
+pub(super) fn final_box(section: &str, end: &FinalBox) -> Check {
+    let key = |name: &str| format!("{section}.final.{name}");
+    positive(key("pitch_error_deg"), end.pitch_error_deg)?;
+    require((-10.0..=10.0).contains(&end.u_max_m_s), key("u_max_m_s"), end.u_max_m_s, "from -10 to 10")?;
+    require(
+        end.u_min_m_s >= -10.0 && end.u_min_m_s < end.u_max_m_s,
+        key("u_min_m_s"),
+        end.u_min_m_s,
+        "from -10 to below u_max_m_s",
+    )?;
+    positive(key("w_m_s"), end.w_m_s)?;
+    positive(key("pitch_rate_deg_s"), end.pitch_rate_deg_s)
+}
+
+pub(super) fn solver(section: &str, solver: &SolverLimits) -> Check {
+    let key = |name: &str| format!("{section}.solver.{name}");
+    require(
+        (1..=1000).contains(&solver.max_iterations),
+        key("max_iterations"),
+        solver.max_iterations,
+        "from 1 to 1000",
+    )?;
+    require(
+        solver.max_iterations_after_miss <= solver.max_iterations,
+        key("max_iterations_after_miss"),
+        solver.max_iterations_after_miss,
+        "at most max_iterations",
+    )?;
+    positive(key("kkt_tolerance"), solver.kkt_tolerance)?;
+    positive(key("terminal_penalty"), solver.terminal_penalty)?;
+    require(
+        (1..=1000).contains(&solver.qp_max_iterations),
+        key("qp_max_iterations"),
+        solver.qp_max_iterations,
+        "from 1 to 1000",
+    )?;
+    share(key("guess_amplitude_rad"), solver.guess_amplitude_rad)?;
+    require(
+        (1..=10).contains(&solver.guess_half_waves),
+        key("guess_half_waves"),
+        solver.guess_half_waves,
+        "from 1 to 10",
+    )
+}
+
+pub(super) fn touchdown_limits(touchdown: &TouchdownBox) -> Check {
+    positive("touchdown_limits.x_m", touchdown.x_m)?;
+    require(
+        (-10.0..=10.0).contains(&touchdown.altitude_min_m),
+        "touchdown_limits.altitude_min_m",
+        touchdown.altitude_min_m,
+        "from -10 to 10",
+    )?;
+    require(
+        touchdown.altitude_max_m.is_finite() && touchdown.altitude_max_m > touchdown.altitude_min_m,
+        "touchdown_limits.altitude_max_m",
+        touchdown.altitude_max_m,
+        "finite and above touchdown_limits.altitude_min_m",
+    )?;
+    positive("touchdown_limits.pitch_error_deg", touchdown.pitch_error_deg)?;
+    positive("touchdown_limits.u_m_s", touchdown.u_m_s)?;
+    positive("touchdown_limits.w_m_s", touchdown.w_m_s)?;
+    positive("touchdown_limits.pitch_rate_deg_s", touchdown.pitch_rate_deg_s)
+}
+
+pub(super) fn arming(arming: &ArmingLimits) -> Check {
+    positive("arming.tilt_max_deg", arming.tilt_max_deg)?;
+    positive("arming.rotation_max_deg_s", arming.rotation_max_deg_s)?;
+    positive("arming.speed_max_m_s", arming.speed_max_m_s)?;
+    not_negative("arming.battery_min_v", arming.battery_min_v)
+}
+
+pub(super) fn gate(gate: &GateLimits) -> Check {
+    positive("gate.tilt_max_deg", gate.tilt_max_deg)?;
+    positive("gate.pitch_rate_max_deg_s", gate.pitch_rate_max_deg_s)?;
+    positive("gate.speed_error_max_fraction", gate.speed_error_max_fraction)?;
+    positive("gate.height_disagreement_max_m", gate.height_disagreement_max_m)?;
+    positive("gate.fence_radius_m", gate.fence_radius_m)
+}

@@ -1,0 +1,267 @@
+//! The force of the air on body, fins and parachute, each computed from the relative wind where it acts.
+//!
+//! Rotation changes the wind at those places, so the model contains damping. It contains static stability, too: in a
+//! tail-first fall the fins drag behind the centre of gravity. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
+//! (coefficients, areas, radius), with the force turned into the local wind. The body follows the paper's Eq. 8 along
+//! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3).
+
+use flight::vehicle::airframe::{Airframe, Parachute as ParachuteData};
+use flight::vehicle::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
+use nalgebra::Vector3;
+
+use crate::world::STEP_S;
+use crate::world::truth::Truth;
+
+/// Strips of the body's crossflow.
+const STRIPS: usize = 8;
+
+/// The vehicle's shape.
+#[derive(Debug, Clone)]
+pub(crate) struct Shape {
+    axial_area_m2: f64,
+    /// Crossflow drag area of one strip, m^2.
+    strip_area_m2: f64,
+    strip_stations_m: [f64; STRIPS],
+    fins: FinModel,
+    fin_station_m: f64,
+    /// Directions from the axis to the fins, in body axes.
+    fin_directions: [Vector3<f64>; 4],
+    nose_station_m: f64,
+    fin_scale: f64,
+    scale: f64,
+}
+
+/// Fractions of the drag that the exhaust leaves: of the body along its axis, and of the fins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plume {
+    pub(crate) body: f64,
+    pub(crate) fins: f64,
+}
+
+impl Plume {
+    /// The jet points upstream and pushes the air aside: wholly when its thrust exceeds the dynamic pressure on the base,
+    /// and in proportion below that. The ratio is the usual one for jets against the wind; that the effect is full at 1
+    /// is an assumption (this vehicle burns at about 15 until the tail-off).
+    pub(crate) fn new(truth: &Truth, thrust_n: f64, on_base_n: f64) -> Self {
+        if thrust_n <= 0.0 {
+            return Self { body: 1.0, fins: 1.0 };
+        }
+        let strength = if thrust_n > on_base_n { 1.0 } else { thrust_n / on_base_n };
+        Self { body: 1.0 - truth.plume_body_loss * strength, fins: 1.0 - truth.plume_fin_loss * strength }
+    }
+}
+
+/// The air and the vehicle's moving parts at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Flow {
+    /// Air density, kg/m^3.
+    pub(crate) density_kg_m3: f64,
+    /// Velocity of the centre of gravity through the air, in body axes, m/s.
+    pub(crate) velocity_m_s: Vector3<f64>,
+    /// Rotation rate in body axes, rad/s.
+    pub(crate) rate_rad_s: Vector3<f64>,
+}
+
+/// The parts of the shape that move.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Configuration {
+    /// Sines of the fins' opening angles.
+    pub(crate) fin_sines: [f64; 4],
+    /// Parachute's drag area, m^2.
+    pub(crate) parachute_area_m2: f64,
+    pub(crate) plume: Plume,
+    /// Centre of gravity: x is its station (above the nozzle), y and z its distance from the axis, m.
+    pub(crate) cg_m: Vector3<f64>,
+}
+
+/// A force and its moment about the centre of gravity, in body axes, N and N m.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Load {
+    pub(crate) force_n: Vector3<f64>,
+    pub(crate) moment_n_m: Vector3<f64>,
+}
+
+impl Load {
+    pub(crate) fn none() -> Self {
+        Self { force_n: Vector3::zeros(), moment_n_m: Vector3::zeros() }
+    }
+
+    pub(crate) fn add_at(&mut self, place_m: &Vector3<f64>, force_n: &Vector3<f64>) {
+        self.force_n += force_n;
+        self.moment_n_m += place_m.cross(force_n);
+    }
+}
+
+impl Shape {
+    /// The shape of an airframe, its forces scaled as the truth says.
+    pub(crate) fn new(airframe: &Airframe, truth: &Truth) -> Self {
+        let body = &airframe.body;
+        let strip_m = body.length_m / STRIPS as f64;
+        Self {
+            axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient * truth.body_drag_scale,
+            strip_area_m2: body.crossflow_drag_coefficient
+                * body.diameter_m
+                * strip_m
+                * truth.crossflow_scale,
+            strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
+            fins: airframe.fin_model(),
+            fin_station_m: airframe.fins.station_m,
+            fin_directions: core::array::from_fn(|i| Vector3::new(0.0, -YAW[i] * COS_30, PITCH[i] * SIN_30)),
+            nose_station_m: body.length_m,
+            fin_scale: truth.fin_drag_scale,
+            scale: truth.drag_scale,
+        }
+    }
+
+    /// Drag areas of a vehicle whose equally open fins have this sine: along the body, of the fins, and across the body,
+    /// m^2.
+    pub(crate) fn drag_areas_m2(&self, fin_sine: f64) -> [f64; 3] {
+        let fins_m2 = 4.0 * self.fins.reference_area_m2 * self.fins.drag_coefficient * fin_sine;
+        [
+            self.scale * self.axial_area_m2,
+            self.scale * self.fin_scale * fins_m2,
+            self.scale * STRIPS as f64 * self.strip_area_m2,
+        ]
+    }
+
+    /// The total force and moment of the air.
+    pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
+        let half_density = 0.5 * self.scale * flow.density_kg_m3;
+        let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;
+        let mut load = Load::none();
+        let Plume { body, fins } = configuration.plume;
+        self.add_body(&mut load, flow, half_density, body, &axis_m);
+        self.add_fins(&mut load, flow, half_density * self.fin_scale * fins, configuration);
+        if configuration.parachute_area_m2 > 0.0 {
+            let place_m = axis_m(self.nose_station_m);
+            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
+            let drag_n = local * (-half_density * configuration.parachute_area_m2 * length(&local));
+            load.add_at(&place_m, &drag_n);
+        }
+        load
+    }
+
+    fn add_body(
+        &self,
+        load: &mut Load,
+        flow: &Flow,
+        half_density: f64,
+        axial_share: f64,
+        axis_m: &impl Fn(f64) -> Vector3<f64>,
+    ) {
+        let velocity = &flow.velocity_m_s;
+        let axial_n = -half_density * axial_share * self.axial_area_m2 * length(velocity) * velocity.x;
+        load.add_at(&axis_m(0.0), &Vector3::new(axial_n, 0.0, 0.0));
+        for station_m in self.strip_stations_m {
+            let place_m = axis_m(station_m);
+            let mut across = velocity + flow.rate_rad_s.cross(&place_m);
+            across.x = 0.0;
+            load.add_at(&place_m, &(across * (-half_density * self.strip_area_m2 * length(&across))));
+        }
+    }
+
+    fn add_fins(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
+        let drag = half_density * self.fins.reference_area_m2 * self.fins.drag_coefficient;
+        let lift = half_density * self.fins.reference_area_m2 * self.fins.lift_coefficient;
+        for ((outward, sine), turn) in self.fin_directions.iter().zip(configuration.fin_sines).zip(ROLL) {
+            let mut place_m = outward * self.fins.radius_m(sine) - configuration.cg_m;
+            place_m.x += self.fin_station_m;
+            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
+            let airspeed = length(&local);
+            // Drag along the local wind; lift across both the wind and the fin's own direction from the axis.
+            let force_n =
+                local * (-drag * sine * airspeed) - local.cross(outward) * (lift * sine * airspeed * turn);
+            load.add_at(&place_m, &force_n);
+        }
+    }
+}
+
+fn length(vector: &Vector3<f64>) -> f64 {
+    vector.norm_squared().sqrt()
+}
+
+// The parachute: it is ejected by command, its lines are taut after a delay, and then it fills with the distance
+// fallen through the air.
+
+#[derive(Debug, Clone)]
+pub(crate) struct Parachute {
+    data: ParachuteData,
+    commanded_s: Option<f64>,
+    travelled_m: f64,
+    fails: bool,
+}
+
+impl Parachute {
+    pub(crate) fn new(data: &ParachuteData) -> Self {
+        Self { data: *data, commanded_s: None, travelled_m: 0.0, fails: false }
+    }
+
+    /// Ejects the parachute; only the first command counts.
+    pub(crate) fn eject(&mut self, time_s: f64) {
+        if !self.fails {
+            self.commanded_s.get_or_insert(time_s);
+        }
+    }
+
+    /// From now on no command ejects it.
+    pub(crate) fn break_down(&mut self) {
+        self.fails = true;
+    }
+
+    pub(crate) fn ejected(&self) -> bool {
+        self.commanded_s.is_some()
+    }
+
+    pub(crate) fn ejected_s(&self) -> Option<f64> {
+        self.commanded_s
+    }
+
+    /// One step at an airspeed, m/s.
+    pub(crate) fn step(&mut self, time_s: f64, airspeed_m_s: f64) {
+        if self.commanded_s.is_some_and(|commanded_s| time_s - commanded_s >= self.data.ejection_delay_s) {
+            self.travelled_m += airspeed_m_s * STEP_S;
+        }
+    }
+
+    /// Fraction of the canopy that is open, 0 to 1. The area grows with the square of the distance, because the
+    /// diameter of the canopy grows linearly with it.
+    pub(crate) fn open_share(&self) -> f64 {
+        let filled = (self.travelled_m / self.data.inflation_distance_m).min(1.0);
+        filled * filled
+    }
+
+    pub(crate) fn drag_area_m2(&self) -> f64 {
+        self.data.area_m2 * self.data.drag_coefficient * self.open_share()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_canopy_opens_after_delay_and_distance() {
+        let data = ParachuteData {
+            area_m2: 2.0,
+            drag_coefficient: 0.8,
+            ejection_delay_s: 1.0,
+            inflation_distance_m: 10.0,
+        };
+        let mut parachute = Parachute::new(&data);
+        parachute.step(100.0, 50.0);
+        assert!(parachute.drag_area_m2().abs() < 1e-15 && !parachute.ejected());
+        parachute.eject(0.0);
+        for (step, expected) in [(1000, 0.0), (1250, 0.25), (1500, 1.0), (3000, 1.0)] {
+            let mut parachute = parachute.clone();
+            for now in 0..step {
+                parachute.step(f64::from(now) * STEP_S, 20.0);
+            }
+            assert!((parachute.open_share() - expected).abs() < 1e-9, "{step}: {}", parachute.open_share());
+        }
+        let mut broken = Parachute::new(&data);
+        broken.break_down();
+        broken.eject(0.0);
+        broken.step(100.0, 50.0);
+        assert!(broken.drag_area_m2().abs() < 1e-15 && !broken.ejected());
+    }
+}

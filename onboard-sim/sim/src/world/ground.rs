@@ -1,0 +1,261 @@
+//! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
+//! vehicle is broken if any other part touches the ground.
+//!
+//! A leg may have a block that crushes in series with its spring and damper. Its foot then moves along the body's axis and
+//! stays where it was pushed. The force that crushes it is taken along the ground's normal: at 10 degrees it is 1.5 % more along
+//! the axis. A foot has no mass of its own: the body carries it, and the block stops a little more than it has to.
+
+use flight::vehicle::airframe::{Airframe, Crush};
+use flight::vehicle::rigid::RigidState;
+use nalgebra::{Rotation3, Vector3};
+
+use crate::world::aero::Load;
+
+/// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no direction.
+const SLIDING_M_S: f64 = 0.05;
+/// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
+const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
+/// A vehicle with three feet on the ground that is slower than this, m/s and rad/s, for this time, s, is at rest.
+const STILL_M_S: f64 = 0.03;
+const STILL_RAD_S: f64 = 0.05;
+const STILL_S: f64 = 0.3;
+
+/// The first contact with the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touchdown {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// The last state before contact, at most a quarter of a millisecond earlier.
+    pub state: RigidState,
+    /// Vertical velocity of the centre of gravity, up, m/s.
+    pub vertical_m_s: f64,
+    /// Horizontal speed of the centre of gravity, m/s.
+    pub lateral_m_s: f64,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+    /// Size of the rotation rate, roll included, rad/s.
+    pub rate_rad_s: f64,
+    /// Size of the rotation rate across the axis (pitch and yaw), rad/s.
+    pub cross_rate_rad_s: f64,
+    pub thrust_n: f64,
+    pub weight_n: f64,
+}
+
+/// How a vehicle came to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Whether it stands, tipped over or struck the ground.
+    pub outcome: RestOutcome,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+    /// What its legs have borne, if they can give way.
+    pub strain: Option<Strain>,
+}
+
+/// What legs that can give way have borne since the first contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strain {
+    /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
+    pub stroke_used: f64,
+    /// Largest force at a foot over the leg's strength.
+    pub strength_used: f64,
+    /// Smallest distance of nozzle and body from the ground, m; 0 where they struck it.
+    pub clearance_m: f64,
+    /// Largest angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+}
+
+impl Strain {
+    const NONE: Self =
+        Self { stroke_used: 0.0, strength_used: 0.0, clearance_m: f64::INFINITY, tilt_rad: 0.0 };
+}
+
+/// How a vehicle comes to rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RestOutcome {
+    /// Standing on its legs.
+    Upright,
+    /// Tilted beyond 45 degrees after contact.
+    TippedOver,
+    /// Nozzle, fuselage or nose hit the ground.
+    BodyStrike,
+}
+
+/// Positions of a vehicle's legs and hull relative to its centre of gravity, in body axes.
+#[derive(Debug, Clone)]
+pub(crate) struct Ground {
+    stiffness_n_m: f64,
+    damping_n_s_m: f64,
+    friction: f64,
+    crush: Option<Crush>,
+    /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher foot.
+    feet_m: [Vector3<f64>; 4],
+    /// How far each leg has given way, m.
+    given_m: [f64; 4],
+    strain: Strain,
+    /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
+    hull_m: [Vector3<f64>; 8],
+    /// Rise of the ground along world x and y, metre per metre.
+    rise: [f64; 2],
+    still_s: f64,
+}
+
+/// What touches the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Contact {
+    pub(crate) feet: usize,
+    pub(crate) hull: bool,
+}
+
+impl Contact {
+    pub(crate) fn any(self) -> bool {
+        self.feet > 0 || self.hull
+    }
+}
+
+impl Ground {
+    pub(crate) fn new(airframe: &Airframe, rise: [f64; 2]) -> Self {
+        let (legs, body) = (&airframe.legs, &airframe.body);
+        let around = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)];
+        let ring = |station_m: f64, radius_m: f64| {
+            around.map(|(y, z)| Vector3::new(station_m, radius_m * y, radius_m * z))
+        };
+        let (tail, nose) = (ring(0.0, 0.5 * body.diameter_m), ring(body.length_m, 0.5 * body.diameter_m));
+        Self {
+            stiffness_n_m: legs.stiffness_n_m,
+            damping_n_s_m: legs.damping_n_s_m,
+            friction: legs.friction_coefficient,
+            crush: legs.crush,
+            feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
+            given_m: [0.0; 4],
+            strain: Strain::NONE,
+            hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
+            rise,
+            still_s: 0.0,
+        }
+    }
+
+    /// A vector whose product with a place in the world is the place's height above the ground.
+    fn upwards(&self) -> Vector3<f64> {
+        Vector3::new(-self.rise[0], -self.rise[1], 1.0)
+    }
+
+    /// Height of the vehicle's lowest point above the ground, m.
+    pub(crate) fn clearance_m(&self, state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
+        self.lowest_m(&self.feet_m, state, cg_m).min(self.lowest_m(&self.hull_m, state, cg_m))
+    }
+
+    /// Height of the lowest of some places of the vehicle above the ground, m.
+    fn lowest_m(&self, places_m: &[Vector3<f64>], state: &RigidState, cg_m: &Vector3<f64>) -> f64 {
+        let up_in_body = state.world_from_body.inverse_transform_vector(&self.upwards());
+        let below_cg =
+            places_m.iter().fold(f64::INFINITY, |low, place| low.min((place - cg_m).dot(&up_in_body)));
+        state.position_m.dot(&self.upwards()) + below_cg
+    }
+
+    /// What touches the ground.
+    pub(crate) fn contact(&self, state: &RigidState, cg_m: &Vector3<f64>) -> Contact {
+        let upwards = self.upwards();
+        let up_in_body = state.world_from_body.inverse_transform_vector(&upwards);
+        let cg_height_m = state.position_m.dot(&upwards);
+        let below = |place: &&Vector3<f64>| cg_height_m + (**place - cg_m).dot(&up_in_body) <= 0.0;
+        Contact {
+            feet: self.feet_m.iter().filter(below).count(),
+            hull: self.hull_m.iter().any(|place| below(&place)),
+        }
+    }
+
+    /// Adds the forces of the ground on the feet.
+    pub(crate) fn add_load(
+        &self,
+        load: &mut Load,
+        state: &RigidState,
+        world_from_body: &Rotation3<f64>,
+        cg_m: &Vector3<f64>,
+    ) {
+        for foot in 0..self.feet_m.len() {
+            if let Some((_, force_n)) = self.on_foot(foot, state, world_from_body, cg_m) {
+                let place_m = self.feet_m[foot] - cg_m;
+                load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
+            }
+        }
+    }
+
+    /// How far the ground has pushed a foot in, m, and the force on it in the world, N; `None` in the air.
+    fn on_foot(
+        &self,
+        foot: usize,
+        state: &RigidState,
+        world_from_body: &Rotation3<f64>,
+        cg_m: &Vector3<f64>,
+    ) -> Option<(f64, Vector3<f64>)> {
+        let upwards = self.upwards();
+        let length = upwards.norm();
+        let normal = upwards / length;
+        let place_m = self.feet_m[foot] - cg_m;
+        let depth_m = -(state.position_m + world_from_body * place_m).dot(&upwards) / length;
+        if depth_m <= 0.0 {
+            return None;
+        }
+        let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
+        let rising_m_s = sliding.dot(&normal);
+        let mut normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
+        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
+            normal_n = normal_n.min(crush.force_n);
+        }
+        sliding -= normal * rising_m_s;
+        let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
+        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n))
+    }
+
+    /// Legs that are pushed in further than their springs reach at the force that crushes them give way.
+    pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
+        let Some(crush) = self.crush else { return };
+        let world_from_body = state.world_from_body.to_rotation_matrix();
+        for foot in 0..self.feet_m.len() {
+            let Some((depth_m, force_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
+                continue;
+            };
+            let beyond_m = depth_m - crush.force_n / self.stiffness_n_m;
+            let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
+            self.given_m[foot] += gives_m;
+            self.feet_m[foot].x += gives_m;
+            let strain = &mut self.strain;
+            strain.stroke_used = strain.stroke_used.max(self.given_m[foot] / crush.stroke_m);
+            strain.strength_used = strain.strength_used.max(force_n.norm() / crush.strength_n);
+        }
+        let hull_m = self.lowest_m(&self.hull_m, state, cg_m);
+        self.strain.clearance_m = self.strain.clearance_m.min(hull_m.max(0.0));
+        self.strain.tilt_rad = self.strain.tilt_rad.max(state.tilt_rad());
+    }
+
+    /// What the legs have borne so far, if they can give way and have met the ground.
+    pub(crate) fn strain(&self) -> Option<Strain> {
+        self.strain.clearance_m.is_finite().then_some(self.strain)
+    }
+
+    /// Takes a further time on the ground, s, and returns how the vehicle came to rest, if it has. It is not at rest
+    /// while the thrust still carries half the weight.
+    pub(crate) fn outcome(
+        &mut self,
+        state: &RigidState,
+        contact: Contact,
+        thrust_over_weight: f64,
+        passed_s: f64,
+    ) -> Option<RestOutcome> {
+        if contact.hull {
+            return Some(RestOutcome::BodyStrike);
+        }
+        if state.tilt_rad() > TIPPED_RAD {
+            return Some(RestOutcome::TippedOver);
+        }
+        let still = contact.feet >= 3
+            && state.velocity_m_s.norm_squared() < STILL_M_S * STILL_M_S
+            && state.rate_rad_s.norm_squared() < STILL_RAD_S * STILL_RAD_S
+            && thrust_over_weight < 0.5;
+        self.still_s = if still { self.still_s + passed_s } else { 0.0 };
+        (self.still_s >= STILL_S).then_some(RestOutcome::Upright)
+    }
+}

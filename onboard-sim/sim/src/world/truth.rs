@@ -1,0 +1,199 @@
+//! How the true vehicle and the weather of one flight differ from the nominal data, and what can break. A campaign
+//! draws these values for each flight.
+
+use serde::{Deserialize, Serialize};
+
+/// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Truth {
+    /// True impulse over the motor file's.
+    pub impulse_scale: f64,
+    /// True burn time over the motor file's.
+    pub burn_time_scale: f64,
+    /// Time from the ignition command to the first thrust, s.
+    pub ignition_delay_s: f64,
+    /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
+    pub chuff_s: [f64; 2],
+    /// Time in which the thrust rises to the curve's, s.
+    pub thrust_rise_s: f64,
+    /// Thrust direction with the gimbal at its centre, as gimbal angles (pitch, yaw), rad.
+    pub thrust_misalignment_rad: [f64; 2],
+    /// Offset of the thrust from the axis, along body (y, z), m.
+    pub thrust_offset_m: [f64; 2],
+    /// True mass and inertia over the data's.
+    pub mass_scale: f64,
+    /// True aerodynamic force over the model's.
+    pub drag_scale: f64,
+    /// Offset of the true from the nominal centre of gravity, in body axes (x towards the nose), m.
+    pub cg_offset_m: [f64; 3],
+    /// Mean wind 10 m above the ground, m/s.
+    pub wind_m_s: f64,
+    /// Direction that the wind blows to, from world x towards world y, rad.
+    pub wind_towards_rad: f64,
+    /// Gust intensity over that of the military standard; 0 is none.
+    pub gust_scale: f64,
+    /// Exponent of the mean wind's power law over height.
+    pub wind_exponent: f64,
+    /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
+    pub wind_veer_rad_m: f64,
+    /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
+    /// where `s` is the fraction of the impulse already given. The impulse stays the same.
+    pub thrust_shape: [f64; SHAPE_TERMS],
+    /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
+    pub plume_body_loss: f64,
+    pub plume_fin_loss: f64,
+    /// Factors on the drag along the body, on the fins and on the drag across the body, each beside `drag_scale`.
+    pub body_drag_scale: f64,
+    pub fin_drag_scale: f64,
+    pub crossflow_scale: f64,
+    /// True moments of inertia over those of the data, beside `mass_scale`.
+    pub inertia_scale: f64,
+    /// Lean of the principal axis of inertia against the body's axis, about body y and z, rad.
+    pub principal_axis_rad: [f64; 2],
+    /// Turn of the nozzle over the turn of its servo.
+    pub gimbal_gain: f64,
+    /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
+    pub gimbal_slop_rad: f64,
+    /// Misalignment of each fin against its servo, rad.
+    pub fin_offset_rad: [f64; 4],
+    /// Play between the fins' servos and the fins that the data do not know, rad.
+    pub fin_slop_rad: f64,
+    /// Rise of the ground, metre per metre along world x and y; its height at the pad is 0.
+    pub ground_rise: [f64; 2],
+}
+
+/// How the true ascent of one flight differs from its nominal data.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AscentTruth {
+    /// True impulse of the ascent motor over the motor file's.
+    pub impulse_scale: f64,
+    /// True burn time over the motor file's.
+    pub burn_time_scale: f64,
+    /// Time from the ignition command to the first thrust, s.
+    pub ignition_delay_s: f64,
+    /// Factor on the axial drag of the stack.
+    pub drag_scale: f64,
+    /// Lean of the rail beside its nominal one, about world x and y, rad.
+    pub rail_lean_rad: [f64; 2],
+    /// Cant of the booster's fins, rad.
+    pub fin_cant_rad: f64,
+    /// Rotation rates (pitch, yaw) that the separation gives the vehicle, rad/s.
+    pub tip_off_rad_s: [f64; 2],
+}
+
+impl Default for AscentTruth {
+    fn default() -> Self {
+        Self {
+            impulse_scale: 1.0,
+            burn_time_scale: 1.0,
+            ignition_delay_s: 0.15,
+            drag_scale: 1.0,
+            rail_lean_rad: [0.0; 2],
+            fin_cant_rad: 0.0,
+            tip_off_rad_s: [0.0; 2],
+        }
+    }
+}
+
+/// Terms in the shape of a thrust curve.
+pub const SHAPE_TERMS: usize = 5;
+
+/// Largest size of a term: the sum of all stays below 1, so that no thrust falls below zero.
+pub const SHAPE_MOST: f64 = 0.19;
+
+impl Truth {
+    /// Height of the ground below a place, m.
+    pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
+        self.ground_rise[0] * x_m + self.ground_rise[1] * y_m
+    }
+}
+
+impl Default for Truth {
+    fn default() -> Self {
+        Self {
+            impulse_scale: 1.0,
+            burn_time_scale: 1.0,
+            ignition_delay_s: 0.15,
+            chuff_s: [0.0; 2],
+            thrust_rise_s: 0.0,
+            thrust_misalignment_rad: [0.0; 2],
+            thrust_offset_m: [0.0; 2],
+            mass_scale: 1.0,
+            drag_scale: 1.0,
+            cg_offset_m: [0.0; 3],
+            wind_m_s: 0.0,
+            wind_towards_rad: 0.0,
+            gust_scale: 1.0,
+            wind_exponent: crate::world::wind::EXPONENT,
+            wind_veer_rad_m: 0.0,
+            thrust_shape: [0.0; SHAPE_TERMS],
+            plume_body_loss: 0.0,
+            plume_fin_loss: 0.0,
+            body_drag_scale: 1.0,
+            fin_drag_scale: 1.0,
+            crossflow_scale: 1.0,
+            inertia_scale: 1.0,
+            principal_axis_rad: [0.0; 2],
+            gimbal_gain: 1.0,
+            gimbal_slop_rad: 0.0,
+            fin_offset_rad: [0.0; 4],
+            fin_slop_rad: 0.0,
+            ground_rise: [0.0; 2],
+        }
+    }
+}
+
+// The faults that can occur in flight. A fault acts from the step after its injection and never ends.
+
+/// A fault of motor or actuators.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Fault {
+    /// The motor never lights.
+    NoLight,
+    /// The motor lights late.
+    LateLight {
+        /// Added to the ignition delay, s.
+        delay_s: f64,
+    },
+    /// The motor has less impulse, in the same time.
+    WeakMotor {
+        /// Thrust, as a fraction of the thrust without the fault.
+        scale: f64,
+    },
+    /// The motor goes out.
+    EarlyBurnout {
+        /// Time since the first thrust, s.
+        after_s: f64,
+    },
+    /// The ascent motor never lights.
+    AscentNoLight,
+    /// The ascent motor lights without a command.
+    AscentSelfLights,
+    /// The ascent motor has less impulse, in the same time.
+    AscentWeak {
+        /// Thrust, as a fraction of the thrust without the fault.
+        scale: f64,
+    },
+    /// The booster stays on the vehicle.
+    SeparationFails,
+    /// The charge of the parachute does not burn: the parachute stays in.
+    ParachuteFails,
+    /// Both gimbal axes are stuck.
+    GimbalStuck,
+    /// The servo of the pitch axis runs to an angle and stays there.
+    GimbalJams {
+        /// The angle, degrees; beyond the stop it is the stop.
+        deg: f64,
+    },
+    /// The gimbal servos turn slowly.
+    GimbalSlow {
+        /// Rate, as a fraction of the rate without the fault.
+        scale: f64,
+    },
+    FinStuck {
+        /// The fin, 0 to 3; another number has no effect.
+        fin: usize,
+    },
+}

@@ -1,0 +1,500 @@
+//! All parts together, one millisecond at a time.
+//!
+//! In the air a step is one Runge-Kutta step; near the ground it is several. Within a step wind, servo angles and
+//! masses are constant (masses at mid-step), while thrust and air density follow time and height. The centre of gravity
+//! moves through the body while propellant burns; that relative motion (some mm/s) is neglected in the velocities. The
+//! exhaust takes angular momentum with it (jet damping: W. T. Thomson, Introduction to Space Dynamics, section 7.7).
+
+mod build;
+mod riding;
+
+use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
+use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::rigid::RigidState;
+use nalgebra::{Rotation3, Vector3};
+
+pub use self::build::WorldError;
+use self::riding::Stack;
+use crate::world::aero::{Configuration, Flow, Load, Parachute, Plume, Shape};
+use crate::world::body::{Inertia, Loads};
+use crate::world::ground::{Ground, Rest, RestOutcome, Touchdown};
+use crate::world::hanging::Hanging;
+use crate::world::motor::Motor;
+use crate::world::servo::{Linkage, Servo};
+use crate::world::truth::{Fault, Truth};
+use crate::world::wind::Wind;
+use crate::world::{STEP_S, body};
+
+/// Below this clearance steps are divided, m. It is more than one step of fall at 40 m/s.
+const NEAR_M: f64 = 0.1;
+/// Number of parts of a step near the ground, where the friction of the feet is stiff.
+const PARTS: usize = 4;
+/// The same while legs give way: their feet are pressed five times as hard, and turn a slim body's roll that much faster.
+const PARTS_GIVING_WAY: usize = 16;
+
+/// The commands of the flight computer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Actuators {
+    /// Gimbal angles (pitch, yaw), rad.
+    pub gimbal_rad: [f64; 2],
+    /// Opening angles of the four fins, rad.
+    pub fins_rad: [f64; 4],
+    /// Current through the igniter. What is switched off before it has lit does not light.
+    pub ignite: bool,
+    /// Ejects the parachute; only the first time counts.
+    pub parachute: bool,
+    /// Current through the igniter of the ascent motor.
+    pub ignite_booster: bool,
+    /// Fires the charge that separates the booster; only the first time counts.
+    pub separate: bool,
+}
+
+impl Actuators {
+    /// Everything at zero and nothing fired.
+    pub const NONE: Self = Self {
+        gimbal_rad: [0.0; 2],
+        fins_rad: [0.0; 4],
+        ignite: false,
+        parachute: false,
+        ignite_booster: false,
+        separate: false,
+    };
+}
+
+/// One vehicle, its air and its ground.
+#[derive(Debug, Clone)]
+pub struct World {
+    airframe: Airframe,
+    truth: Truth,
+    shape: Shape,
+    mass_model: MassModel,
+    motor: Motor,
+    gimbal: [Servo; 2],
+    fins: [Servo; 4],
+    gimbal_links: [Linkage; 2],
+    fin_links: [Linkage; 4],
+    parachute: Parachute,
+    wind: Wind,
+    ground: Ground,
+    steps: u64,
+    state: RigidState,
+    mass: MassProperties,
+    specific_force_m_s2: Vector3<f64>,
+    angular_acceleration_rad_s2: Vector3<f64>,
+    touchdown: Option<Touchdown>,
+    rest: Option<Rest>,
+    /// The booster with all that belongs to it, until it is separated.
+    stack: Option<Box<Stack>>,
+    separated_s: Option<f64>,
+    /// How it hangs, until it is let go.
+    hanging: Option<Hanging>,
+}
+
+/// Everything that acts within one part of a step.
+struct Acting<'a> {
+    shape: &'a Shape,
+    configuration: Configuration,
+    wind_m_s: Vector3<f64>,
+    density_kg_m3: f64,
+    density_gradient_kg_m4: f64,
+    density_height_m: f64,
+    /// Thrust at the start, middle and end, N.
+    thrust_n: [f64; 3],
+    thrust_direction: Vector3<f64>,
+    thrust_place_m: Vector3<f64>,
+    /// Damping of the cross rates per newton of thrust, m s/rad.
+    jet_damping_m_s: f64,
+    ground: Option<&'a Ground>,
+}
+
+impl Loads for Acting<'_> {
+    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
+        let above_m = state.position_m.z - self.density_height_m;
+        let flow = Flow {
+            density_kg_m3: self.density_kg_m3 + self.density_gradient_kg_m4 * above_m,
+            velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
+            rate_rad_s: state.rate_rad_s,
+        };
+        let mut load = self.shape.load(&flow, &self.configuration);
+        let thrust_n = self.thrust_n[(2.0 * share) as usize];
+        if thrust_n > 0.0 {
+            load.add_at(&self.thrust_place_m, &(self.thrust_direction * thrust_n));
+            let damping_n_m_s = thrust_n * self.jet_damping_m_s;
+            load.moment_n_m.y -= damping_n_m_s * state.rate_rad_s.y;
+            load.moment_n_m.z -= damping_n_m_s * state.rate_rad_s.z;
+        }
+        if let Some(ground) = self.ground {
+            ground.add_load(&mut load, state, world_from_body, &self.configuration.cg_m);
+        }
+        load
+    }
+}
+
+impl World {
+    /// One step of a millisecond.
+    pub fn step(&mut self, actuators: &Actuators) {
+        let time_s = self.time_s();
+        self.command(actuators, time_s);
+        self.steps += 1;
+        if self.rest.is_some() {
+            return;
+        }
+        if let Some(hanging) = &self.hanging {
+            (self.state, self.specific_force_m_s2) = hanging.at(time_s + STEP_S);
+            self.angular_acceleration_rad_s2 = Vector3::zeros();
+            return;
+        }
+        let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
+        self.parachute.step(time_s, airspeed_m_s);
+        self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S);
+        self.mass = self.mass_model.at(self.motor.burnt_kg(time_s + 0.5 * STEP_S) * self.truth.mass_scale);
+        if let Some(stack) = self.stack.take() {
+            self.ride(*stack, time_s);
+            return;
+        }
+        let cg_m = self.cg_m();
+        if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
+            self.move_near_ground(time_s);
+        } else {
+            self.move_by(time_s, STEP_S, false);
+        }
+    }
+
+    /// Advances by several steps with the same commands.
+    pub fn advance(&mut self, actuators: &Actuators, steps: usize) {
+        for _ in 0..steps {
+            self.step(actuators);
+        }
+    }
+
+    /// Injects a fault.
+    pub fn inject(&mut self, fault: &Fault) {
+        self.motor.break_down(fault);
+        match *fault {
+            Fault::GimbalStuck => self.gimbal.iter_mut().for_each(Servo::stick),
+            Fault::GimbalJams { deg } => self.gimbal[0].jam(deg.to_radians()),
+            Fault::GimbalSlow { scale } => self.gimbal.iter_mut().for_each(|servo| servo.slow(scale)),
+            Fault::FinStuck { fin } => {
+                if let Some(servo) = self.fins.get_mut(fin) {
+                    servo.stick();
+                }
+            }
+            Fault::AscentNoLight
+            | Fault::AscentSelfLights
+            | Fault::AscentWeak { .. }
+            | Fault::SeparationFails => {
+                if let Some(stack) = &mut self.stack {
+                    stack.break_down(fault);
+                }
+            }
+            Fault::ParachuteFails => self.parachute.break_down(),
+            Fault::NoLight
+            | Fault::LateLight { .. }
+            | Fault::WeakMotor { .. }
+            | Fault::EarlyBurnout { .. } => {}
+        }
+    }
+
+    fn command(&mut self, actuators: &Actuators, time_s: f64) {
+        for ((servo, link), command_rad) in
+            self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(actuators.gimbal_rad)
+        {
+            servo.step(command_rad);
+            link.step(servo.load_rad());
+        }
+        for ((servo, link), command_rad) in
+            self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad)
+        {
+            servo.step(command_rad);
+            link.step(servo.load_rad());
+        }
+        self.motor.current(actuators.ignite, time_s);
+        if actuators.parachute {
+            self.parachute.eject(time_s);
+        }
+        if let Some(stack) = &mut self.stack {
+            stack.command(actuators.ignite_booster, actuators.separate, time_s);
+        }
+    }
+
+    /// Centre of gravity: x its station, y and z its distance from the axis, m.
+    fn cg_m(&self) -> Vector3<f64> {
+        Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + Vector3::from(self.truth.cg_offset_m)
+    }
+
+    /// The exhaust's effect on the drag.
+    fn plume(&self, thrust_n: f64, density_kg_m3: f64) -> Plume {
+        let pressure_pa = 0.5 * density_kg_m3 * self.air_velocity_m_s().norm_squared();
+        Plume::new(&self.truth, thrust_n, pressure_pa * self.airframe.body.reference_area_m2)
+    }
+
+    fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
+        let cg_m = self.cg_m();
+        let air = Air::at_height_m(self.state.position_m.z);
+        let [pitch_rad, yaw_rad] = [0, 1]
+            .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
+        let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
+        let arm_m = cg_m.x;
+        let thrust_n = [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s));
+        let acting = Acting {
+            shape: &self.shape,
+            configuration: Configuration {
+                fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
+                parachute_area_m2: self.parachute.drag_area_m2(),
+                plume: self.plume(thrust_n[1], air.density_kg_m3),
+                cg_m,
+            },
+            wind_m_s: self.wind.now_m_s(),
+            density_kg_m3: air.density_kg_m3,
+            density_gradient_kg_m4: air.density_gradient_kg_m4(),
+            density_height_m: self.state.position_m.z,
+            thrust_n,
+            thrust_direction: Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw),
+            thrust_place_m: Vector3::new(0.0, self.truth.thrust_offset_m[0], self.truth.thrust_offset_m[1])
+                - cg_m,
+            jet_damping_m_s: self.motor.flow_kg_n_s() * (arm_m * arm_m + self.mass.pitch_inertia_slope_m2),
+            ground: near_ground.then_some(&self.ground),
+        };
+        let inertia = Inertia {
+            mass_kg: self.mass.mass_kg,
+            pitch_kg_m2: self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale,
+            roll_kg_m2: self.mass.roll_inertia_kg_m2 * self.truth.inertia_scale,
+            principal_rad: self.truth.principal_axis_rad,
+        };
+        let (state, specific_force_m_s2) =
+            body::rk4_step(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s);
+        self.angular_acceleration_rad_s2 = (state.rate_rad_s - self.state.rate_rad_s) / step_s;
+        self.specific_force_m_s2 = specific_force_m_s2;
+        self.state = state;
+    }
+
+    fn move_near_ground(&mut self, from_s: f64) {
+        let giving_way = self.touchdown.is_some() && self.airframe.legs.crush.is_some();
+        let parts = if giving_way { PARTS_GIVING_WAY } else { PARTS };
+        let part_s = STEP_S / parts as f64;
+        let (mut specific_force, mut angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
+        for part in 0..parts {
+            let time_s = from_s + part_s * part as f64;
+            let before = self.state;
+            self.move_by(time_s, part_s, true);
+            specific_force += self.specific_force_m_s2;
+            angular_acceleration += self.angular_acceleration_rad_s2;
+            let contact = self.ground.contact(&self.state, &self.cg_m());
+            if self.touchdown.is_none() && contact.any() {
+                // The last state before contact: within this part the feet have already pushed.
+                self.touchdown = Some(self.touchdown_at(time_s, &before));
+            }
+            if self.touchdown.is_some() {
+                self.ground.give_way(&self.state, &self.cg_m());
+                let thrust_over_weight = self.motor.thrust_n(time_s) / self.weight_n();
+                let outcome = self.ground.outcome(&self.state, contact, thrust_over_weight, part_s);
+                if let Some(outcome) = outcome {
+                    self.come_to_rest(time_s + part_s, outcome);
+                    return;
+                }
+            }
+        }
+        self.specific_force_m_s2 = specific_force / parts as f64;
+        self.angular_acceleration_rad_s2 = angular_acceleration / parts as f64;
+    }
+
+    fn touchdown_at(&self, time_s: f64, state: &RigidState) -> Touchdown {
+        let (velocity, rate) = (&state.velocity_m_s, &state.rate_rad_s);
+        Touchdown {
+            time_s,
+            state: *state,
+            vertical_m_s: velocity.z,
+            lateral_m_s: libm::hypot(velocity.x, velocity.y),
+            tilt_rad: state.tilt_rad(),
+            rate_rad_s: rate.norm_squared().sqrt(),
+            cross_rate_rad_s: libm::hypot(rate.y, rate.z),
+            thrust_n: self.motor.thrust_n(time_s),
+            weight_n: self.weight_n(),
+        }
+    }
+
+    /// The vehicle does not move from now on.
+    fn come_to_rest(&mut self, time_s: f64, outcome: RestOutcome) {
+        let (tilt_rad, strain) = (self.state.tilt_rad(), self.ground.strain());
+        self.rest = Some(Rest { time_s, outcome, tilt_rad, strain });
+        self.state.velocity_m_s = Vector3::zeros();
+        self.state.rate_rad_s = Vector3::zeros();
+        self.angular_acceleration_rad_s2 = Vector3::zeros();
+        self.specific_force_m_s2 = self.state.world_from_body.inverse_transform_vector(&Vector3::new(
+            0.0,
+            0.0,
+            STANDARD_GRAVITY_M_S2,
+        ));
+    }
+}
+
+// Read access to the world.
+
+impl World {
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        self.steps as f64 * STEP_S
+    }
+
+    /// Steps since the start.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// The vehicle's state; its position is that of the centre of gravity.
+    pub fn state(&self) -> &RigidState {
+        &self.state
+    }
+
+    /// Height of the feet above the ground as if the vehicle were upright, m; zero at touchdown.
+    pub fn height_m(&self) -> f64 {
+        let place_m = &self.state.position_m;
+        place_m.z - self.truth.ground_m(place_m.x, place_m.y) - self.cg_above_feet_m()
+    }
+
+    /// Distance from the feet up to the centre of gravity, along the axis, m.
+    pub fn cg_above_feet_m(&self) -> f64 {
+        self.airframe.above_feet_m(self.cg_m().x)
+    }
+
+    /// Mean specific force over the last step in body axes, m/s^2, which is what an ideal accelerometer at the centre
+    /// of gravity measures.
+    pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
+        &self.specific_force_m_s2
+    }
+
+    /// Mean angular acceleration over the last step in body axes, rad/s^2.
+    pub fn angular_acceleration_rad_s2(&self) -> &Vector3<f64> {
+        &self.angular_acceleration_rad_s2
+    }
+
+    /// Mass, centre of gravity and inertia now.
+    pub fn mass(&self) -> &MassProperties {
+        &self.mass
+    }
+
+    /// Weight now, N.
+    pub fn weight_n(&self) -> f64 {
+        self.mass.mass_kg * STANDARD_GRAVITY_M_S2
+    }
+
+    /// Thrust now, N.
+    pub fn thrust_n(&self) -> f64 {
+        self.motor.thrust_n(self.time_s())
+    }
+
+    /// When the thrust begins or began, s; `None` without current before it has lit, and for a motor that does not light.
+    pub fn thrust_begins_s(&self) -> Option<f64> {
+        self.motor.thrust_begins_s()
+    }
+
+    /// Gimbal angles of the nozzle (pitch, yaw) without the thrust's misalignment, rad.
+    pub fn gimbal_rad(&self) -> [f64; 2] {
+        [0, 1].map(|axis: usize| self.gimbal_links[axis].rad())
+    }
+
+    /// Gimbal angles (pitch, yaw) as the servos' feedback tells them, rad.
+    pub fn gimbal_feedback_rad(&self) -> [f64; 2] {
+        [0, 1].map(|axis: usize| self.gimbal[axis].load_rad())
+    }
+
+    /// Opening angles of the fins, rad.
+    pub fn fins_rad(&self) -> [f64; 4] {
+        [0, 1, 2, 3].map(|fin: usize| self.fin_links[fin].rad())
+    }
+
+    /// Opening angles of the fins as the servos' feedback tells them, rad.
+    pub fn fins_feedback_rad(&self) -> [f64; 4] {
+        [0, 1, 2, 3].map(|fin: usize| self.fins[fin].load_rad())
+    }
+
+    /// Wind at the vehicle, gusts included, in the world, m/s.
+    pub fn wind_m_s(&self) -> Vector3<f64> {
+        self.wind.now_m_s()
+    }
+
+    /// Velocity of the centre of gravity through the air, in the world, m/s.
+    pub fn air_velocity_m_s(&self) -> Vector3<f64> {
+        self.state.velocity_m_s - self.wind.now_m_s()
+    }
+
+    /// The air at the vehicle.
+    pub fn air(&self) -> Air {
+        Air::at_height_m(self.state.position_m.z)
+    }
+
+    /// Whether the parachute was ejected.
+    pub fn parachute_ejected(&self) -> bool {
+        self.parachute.ejected()
+    }
+
+    /// Whether the wire between booster and vehicle is whole.
+    pub fn booster_attached(&self) -> bool {
+        self.stack.is_some()
+    }
+
+    /// Thrust of the ascent motor now, N.
+    pub fn booster_thrust_n(&self) -> f64 {
+        self.stack.as_ref().map_or(0.0, |stack| stack.thrust_n(self.time_s()))
+    }
+
+    /// The ascent motor burns or has burnt, or will light if the current stays on.
+    pub fn ascent_motor_lights(&self) -> bool {
+        self.stack.as_ref().is_some_and(|stack| stack.lights())
+    }
+
+    /// When the separation charge was fired, s.
+    pub fn charge_fired_s(&self) -> Option<f64> {
+        self.stack.as_ref().map_or(self.separated_s, |stack| stack.charge_fired_s())
+    }
+
+    /// The vehicle hangs below its drone.
+    pub fn hangs(&self) -> bool {
+        self.hanging.is_some()
+    }
+
+    /// The drone lets the vehicle go.
+    pub fn let_go(&mut self) {
+        self.hanging = None;
+    }
+
+    /// When the parachute was ejected, s.
+    pub fn parachute_ejected_s(&self) -> Option<f64> {
+        self.parachute.ejected_s()
+    }
+
+    /// Height of the ground where a beam backwards along the axis meets it, m; the slope is taken as small.
+    pub fn ground_under_beam_m(&self) -> f64 {
+        let (place_m, nose) = (&self.state.position_m, self.state.nose_in_world());
+        let per_m = place_m.z / nose.z.max(0.1);
+        self.truth.ground_m(place_m.x - nose.x * per_m, place_m.y - nose.y * per_m)
+    }
+
+    /// Fraction of the parachute that is open, 0 to 1.
+    pub fn parachute_open_share(&self) -> f64 {
+        self.parachute.open_share()
+    }
+
+    /// The first contact with the ground, if there was one.
+    pub fn touchdown(&self) -> Option<&Touchdown> {
+        self.touchdown.as_ref()
+    }
+
+    /// How the vehicle came to rest, if it has. From then on only time changes.
+    pub fn rest(&self) -> Option<&Rest> {
+        self.rest.as_ref()
+    }
+
+    /// The vehicle's data.
+    pub fn airframe(&self) -> &Airframe {
+        &self.airframe
+    }
+
+    /// How the true vehicle and the weather differ from the nominal data.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+}
+
+#[cfg(test)]
+mod tests;

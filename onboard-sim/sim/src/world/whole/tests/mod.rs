@@ -1,0 +1,232 @@
+mod ascent;
+mod invariants;
+mod landing;
+mod legs;
+mod mismatch;
+
+use core::f64::consts::FRAC_PI_2;
+
+use flight::vehicle::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
+use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
+use flight::vehicles::motors;
+use nalgebra::UnitQuaternion;
+
+use super::*;
+
+const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ..Actuators::NONE };
+
+fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
+    let airframe = flight::vehicles::airframe::builtin(name).unwrap();
+    let motor = motors::builtin(&airframe.motor).unwrap();
+    World::new(&airframe, &motor, truth, initial, 1).unwrap()
+}
+
+/// Falls from rest, tail first, with the centre of gravity 300 m above the ground. Returns time and speed when the
+/// centre of gravity would reach the ground.
+fn drop(airframe: &Airframe, opening_rad: f64) -> (f64, f64) {
+    let motor = motors::builtin(&airframe.motor).unwrap();
+    let mut world = World::new(airframe, &motor, &Truth::default(), &RigidState::upright(300.0), 1)
+        .unwrap()
+        .with_fins_at(opening_rad);
+    let actuators = Actuators { fins_rad: [opening_rad; 4], ..Actuators::default() };
+    loop {
+        let before = *world.state();
+        let time_s = world.time_s();
+        world.step(&actuators);
+        let after = world.state();
+        if after.position_m.z <= 0.0 {
+            let share = before.position_m.z / (before.position_m.z - after.position_m.z);
+            return (time_s + share * STEP_S, -before.velocity_m_s.z);
+        }
+    }
+}
+
+/// 3 kg from 300 m at rest to sea level by drag area: `RocketPy` and an independent integration.
+#[test]
+fn val_rocketpy_drop_times() {
+    for (drag_area_m2, time_s, speed_m_s) in [
+        (0.0043, 8.164, 67.70),
+        (0.007_51, 8.423, 62.14),
+        (0.030_96, 10.338, 39.05),
+        (0.037_28, 10.839, 35.80),
+    ] {
+        let mut airframe = flight::vehicles::airframe::builtin("mk2-h53").unwrap();
+        airframe.body.axial_drag_coefficient = drag_area_m2 / airframe.body.reference_area_m2;
+        // Legs and hull are out of the way, so the centre of gravity itself falls to sea level.
+        airframe.legs.foot_station_m = -1e-9;
+        airframe.mass.loaded_cg_station_m = 1e-6;
+        airframe.mass.propellant_station_m = 0.0;
+        let (found_s, found_m_s) = drop(&airframe, 0.0);
+        assert!((found_s - time_s).abs() < 0.02, "{drag_area_m2} m^2: {found_s} s, expected {time_s}");
+        assert!((found_m_s - speed_m_s).abs() < 0.02, "{drag_area_m2} m^2: {found_m_s} m/s, {speed_m_s}");
+    }
+}
+
+/// The same fall with the drag of the fins: open, they and the body have 0.03096 m^2.
+#[test]
+fn val_rocketpy_drop_time_with_open_fins() {
+    let mut airframe = flight::vehicles::airframe::builtin("mk2-h53").unwrap();
+    airframe.legs.foot_station_m = -1e-9;
+    airframe.mass.loaded_cg_station_m = 1e-6;
+    airframe.mass.propellant_station_m = 0.0;
+    let (found_s, found_m_s) = drop(&airframe, FRAC_PI_2);
+    assert!((found_s - 10.338).abs() < 0.02 && (found_m_s - 39.05).abs() < 0.02, "{found_s} {found_m_s}");
+}
+
+/// An upright state leaning by pitch (about world y) and yaw (about world x), rad.
+fn leaning(height_m: f64, pitch_rad: f64, yaw_rad: f64) -> RigidState {
+    let mut state = RigidState::upright(height_m);
+    state.world_from_body = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch_rad)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), yaw_rad)
+        * state.world_from_body;
+    state
+}
+
+/// Fig. 5 of the landing paper: fins open, 2 degrees of pitch and 1 degree of yaw. The attitude settles, and the speed
+/// at sea level is 39.4 m/s.
+#[test]
+fn val_landing_paper_fig_5() {
+    let (pitch_rad, yaw_rad) = (2.0_f64.to_radians(), 1.0_f64.to_radians());
+    let mut world =
+        world("mk2-h53", &Truth::default(), &leaning(1000.0, pitch_rad, yaw_rad)).with_fins_at(FRAC_PI_2);
+    // The largest tilt in each 200 m of the fall.
+    let mut worst_deg = [0.0_f64; 5];
+    let mut felt_before_contact = Vector3::zeros();
+    while world.touchdown().is_none() {
+        felt_before_contact = *world.specific_force_m_s2();
+        world.step(&OPEN);
+        let band = (world.state().position_m.z / 200.0).clamp(0.0, 4.0) as usize;
+        worst_deg[band] = worst_deg[band].max(world.state().tilt_rad().to_degrees());
+    }
+    assert!(worst_deg.is_sorted_by(|lower, upper| lower < upper), "{worst_deg:?}");
+    assert!(worst_deg[4] < 2.25 && worst_deg[0] < 0.25 * worst_deg[4], "{worst_deg:?}");
+    // The air gets denser on the way down, so the speed lags a little behind the terminal speed, at which the drag
+    // equals the weight.
+    let felt_m_s2 = felt_before_contact.norm();
+    let speed_m_s = -world.touchdown().unwrap().vertical_m_s;
+    let terminal_m_s = speed_m_s * (STANDARD_GRAVITY_M_S2 / felt_m_s2).sqrt();
+    assert!((terminal_m_s - 39.4).abs() < 0.05, "{terminal_m_s} m/s");
+    assert!((speed_m_s - terminal_m_s).abs() < 0.2, "{speed_m_s} m/s, terminal {terminal_m_s}");
+}
+
+/// Without air and thrust the mechanical energy and the angular momentum are constant.
+#[test]
+fn energy_is_conserved_without_air() {
+    let truth = Truth { drag_scale: 0.0, ..Truth::default() };
+    let mut initial = leaning(400.0, 0.7, -0.4);
+    initial.velocity_m_s = Vector3::new(3.0, -2.0, 20.0);
+    initial.rate_rad_s = Vector3::new(5.0, 2.0, -3.0);
+    let mut world = world("mk2", &truth, &initial);
+    let energy_j = |world: &World| {
+        let (state, mass) = (world.state(), world.mass());
+        let rate = state.rate_rad_s;
+        let turning = mass.roll_inertia_kg_m2 * rate.x * rate.x
+            + mass.pitch_inertia_kg_m2 * (rate.y * rate.y + rate.z * rate.z);
+        let moving = mass.mass_kg * state.velocity_m_s.norm_squared();
+        0.5 * (turning + moving) + world.weight_n() * state.position_m.z
+    };
+    let before_j = energy_j(&world);
+    world.advance(&Actuators::default(), 5000);
+    let after_j = energy_j(&world);
+    assert!((after_j / before_j - 1.0).abs() < 1e-10, "{before_j} {after_j}");
+    assert!(world.specific_force_m_s2().norm() < 1e-12, "an accelerometer in free fall measures nothing");
+}
+
+/// A burn in vacuum, straight up, against the rocket equation with the file's own impulse and propellant.
+#[test]
+fn val_tsiolkovsky_vertical_burn() {
+    let truth = Truth { drag_scale: 0.0, ignition_delay_s: 0.0, ..Truth::default() };
+    let mut world = world("mk2", &truth, &RigidState::upright(1000.0));
+    let motor = motors::builtin("H45W").unwrap();
+    let (full_kg, burnt_kg) = (world.mass().mass_kg, motor.propellant_mass_kg());
+    let ignite = Actuators { ignite: true, ..Actuators::default() };
+    world.advance(&ignite, 8000);
+    let exhaust_m_s = motor.total_impulse_n_s() / burnt_kg;
+    let expected = exhaust_m_s * libm::log(full_kg / (full_kg - burnt_kg)) - STANDARD_GRAVITY_M_S2 * 8.0;
+    let found = world.state().velocity_m_s.z;
+    assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+    assert!((world.mass().mass_kg - (full_kg - burnt_kg)).abs() < 1e-12);
+    assert!(world.state().tilt_rad() < 1e-12);
+}
+
+/// A gimbal angle turns the vehicle as [`flight::vehicle::rigid`] says: `q' = -T sin p (X_CG - X_THR) / I`.
+#[test]
+fn val_gimbal_signs_and_arm() {
+    for axis in 0..2 {
+        let truth = Truth { drag_scale: 0.0, ignition_delay_s: 0.0, ..Truth::default() };
+        let mut world = world("mk2", &truth, &RigidState::upright(1000.0));
+        let mut actuators = Actuators { ignite: true, ..Actuators::default() };
+        actuators.gimbal_rad[axis] = 0.1;
+        world.advance(&actuators, 500);
+        let expected = -world.thrust_n() * libm::sin(world.gimbal_rad()[axis]) * world.mass().cg_station_m
+            / world.mass().pitch_inertia_kg_m2;
+        let rate = world.state().rate_rad_s;
+        // The most that jet damping takes.
+        let slack = 0.02 * rate.norm();
+        let found = world.angular_acceleration_rad_s2()[axis + 1];
+        assert!((found - expected).abs() < 0.01 * expected.abs() + slack, "axis {axis}: {found} {expected}");
+        assert!(world.angular_acceleration_rad_s2()[2 - axis].abs() < 1e-9);
+    }
+}
+
+/// 5 m/s of crosswind push the bare body by 1/2 1.224 25 x 1.2 x 0.0518 m^2 = 0.95 N.
+#[test]
+fn val_hand_crosswind_on_the_bare_body() {
+    let truth = Truth { wind_m_s: 5.0, gust_scale: 0.0, ..Truth::default() };
+    let mut world = world("mk2", &truth, &RigidState::upright(10.0));
+    world.step(&Actuators::default());
+    let in_world = world.state().world_from_body * world.specific_force_m_s2();
+    let push_n = world.mass().mass_kg * in_world.x;
+    assert!((push_n - 0.951).abs() < 0.002 && in_world.y.abs() < 1e-12, "{push_n} N");
+}
+
+// The controller's planar equations are the world's motion in its x-z plane.
+
+/// A motor of constant thrust with almost no propellant, an ideal gimbal, no crossflow, fins closed, near sea level.
+#[test]
+fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
+    let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    airframe.body.crossflow_drag_coefficient = 0.0;
+    airframe.gimbal.servo.rate_deg_s = 1e6;
+    airframe.gimbal.servo.delay_s = 0.0;
+    airframe.gimbal.servo.slop_deg = 0.0;
+    // No motor file may have so little propellant: it is not read from one.
+    let motor = ThrustCurve::new(MotorData {
+        name: "C".to_owned(),
+        manufacturer: "M".to_owned(),
+        diameter_m: 0.038,
+        length_m: 0.194,
+        propellant_mass_kg: 1e-9,
+        total_mass_kg: 0.1,
+        points: [0.0, 5.0].map(|time_s| ThrustPoint { time_s, thrust_n: 33.3 }).to_vec(),
+    })
+    .unwrap();
+    let truth = Truth { ignition_delay_s: 0.0, ..Truth::default() };
+    let planar = PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.45, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: -0.2 };
+    let mut world = World::new(&airframe, &motor, &truth, &RigidState::from(planar), 1).unwrap();
+    let model = PlanarModel {
+        params: PlanarParams {
+            mass_kg: airframe.mass.loaded_kg,
+            pitch_inertia_kg_m2: airframe.mass.loaded_pitch_inertia_kg_m2,
+            thrust_arm_m: airframe.mass.loaded_cg_station_m,
+            drag_per_m: 0.5 * Air::at_height_m(16.0).density_kg_m3 * airframe.drag_area_m2(0.0)
+                / airframe.mass.loaded_kg,
+            lateral_drag_per_m: 0.0,
+            crossflow_per_m: 0.0,
+            gravity_m_s2: STANDARD_GRAVITY_M_S2,
+        },
+        kind: ModelKind::Consistent,
+    };
+    let mut expected = planar;
+    for step in 0_u32..1500 {
+        let gimbal_rad = if step % 400 < 200 { 0.05 } else { -0.06 };
+        world.step(&Actuators { gimbal_rad: [gimbal_rad, 0.0], ignite: true, ..Actuators::default() });
+        expected = model.rk4_step(&expected, gimbal_rad, 33.3, STEP_S);
+    }
+    let (found, expected) = (world.state(), RigidState::from(expected));
+    // The remaining difference comes from the density, which is constant in the planar equations.
+    assert!((found.position_m - expected.position_m).norm() < 2e-4, "{found:?}\n{expected:?}");
+    assert!((found.velocity_m_s - expected.velocity_m_s).norm() < 2e-4, "{found:?}\n{expected:?}");
+    assert!((found.rate_rad_s - expected.rate_rad_s).norm() < 1e-6, "{found:?}\n{expected:?}");
+    assert!(found.world_from_body.angle_to(&expected.world_from_body) < 1e-6);
+}
