@@ -178,6 +178,12 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
     let chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
     let thrust_rise_s = chance.between(sigma.thrust_rise_s);
     Truth {
+        chuff_s,
+        thrust_rise_s,
+        thrust_offset_m,
+        cg_offset_m,
+        wind_exponent,
+        wind_veer_rad_m,
         thrust_shape,
         plume_body_loss,
         plume_fin_loss,
@@ -185,18 +191,12 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
         fin_drag_scale,
         crossflow_scale,
         inertia_scale,
-        gimbal_gain,
-        cg_offset_m,
-        thrust_offset_m,
-        gimbal_slop_rad,
-        fin_slop_rad,
-        fin_offset_rad,
-        wind_exponent,
-        wind_veer_rad_m,
-        ground_rise,
         principal_axis_rad,
-        chuff_s,
-        thrust_rise_s,
+        gimbal_gain,
+        gimbal_slop_rad,
+        fin_offset_rad,
+        fin_slop_rad,
+        ground_rise,
         ..*truth
     }
 }
