@@ -108,10 +108,9 @@ enum Command {
     /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
     /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
     ///
-    /// With --vary flights are flown with many settings, which are ranked by the worst flight's margin. With --flip the
-    /// smallest change of one setting is looked for that turns landed into not landed, or back.
+    /// With --vary flights are flown with many settings, which are ranked by the worst flight's margin.
     #[command(
-        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7\n  replay refly a.mcap --flip truth.impulse_scale --of-plant --lowest 0.9 --highest 1.1"
+        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7"
     )]
     Refly(refly::Args),
     /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.

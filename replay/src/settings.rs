@@ -136,14 +136,6 @@ fn listed(settings: &[Setting]) -> String {
     settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
-fn value_in(table: toml::Table, path: &str) -> Option<toml::Value> {
-    let mut value = toml::Value::Table(table);
-    for key in path.split('.') {
-        value = value.as_table_mut()?.remove(key)?;
-    }
-    Some(value)
-}
-
 fn parsed_table(text: &str, origin: &str) -> Result<toml::Table, SettingError> {
     text.parse::<toml::Table>()
         .map_err(|error| SettingError::Toml { origin: origin.to_owned(), reason: error.to_string() })
@@ -187,22 +179,6 @@ pub fn known_mission_paths() -> BTreeSet<String> {
 /// The keys that a mission and its airframe may have.
 fn names() -> Names {
     Names::of::<Mission>("").and(Names::of::<Airframe>(AIRFRAME))
-}
-
-/// Whether a key of a mission, of its airframe or of the truth takes whole numbers only.
-///
-/// # Errors
-/// The name is unknown, or the text is not TOML.
-pub fn is_whole_in_mission(mission_toml: &str, path: &str) -> Result<bool, SettingError> {
-    let names = if path.starts_with(TRUTH) {
-        Names::of::<Truth>("truth")
-    } else {
-        let mut table = parsed_table(mission_toml, "profile.toml")?;
-        expand_airframe(&mut table)?;
-        names().with_those_in(&table)
-    };
-    names.check(path)?;
-    Ok(names.is_whole(path))
 }
 
 /// The mission of this text with other settings; their times are ignored.
@@ -251,18 +227,6 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
         insert(&mut table, key, as_number(&setting.value));
     }
     table.try_into().map_err(|error: toml::de::Error| wrong(error.to_string()))
-}
-
-/// The value of a key of a mission's text, of its airframe or of the truth, if there is one.
-pub fn mission_value_of(mission_toml: &str, truth: &Truth, path: &str) -> Option<toml::Value> {
-    if let Some(key) = path.strip_prefix(TRUTH) {
-        return value_in(toml::Table::try_from(truth).ok()?, key);
-    }
-    let mut table = mission_toml.parse::<toml::Table>().ok()?;
-    if path.starts_with("airframe.") {
-        expand_airframe(&mut table).ok()?;
-    }
-    value_in(table, path)
 }
 
 /// Replaces the name of a built-in airframe by its text.
@@ -691,9 +655,6 @@ mod tests {
         assert_eq!(with(&["powered.solver.max_iterations=12.0"]).unwrap().powered.solver.max_iterations, 12);
         let refusal = with(&["powered.solver.max_iterations=12.5"]).unwrap_err().to_string();
         assert_eq!(refusal, "setting `powered.solver.max_iterations=12.5`: must be a whole number");
-        assert!(is_whole_in_mission(toml(), "powered.solver.max_iterations").unwrap());
-        assert!(!is_whole_in_mission(toml(), "powered.weights.theta").unwrap());
-        assert!(is_whole_in_mission(toml(), "powered.solver.max_iteration").is_err());
     }
 
     #[test]
@@ -704,9 +665,5 @@ mod tests {
         assert_eq!(set("powered.gimbal_deg=4").unwrap(), Truth::default());
         assert!(set("truth.wind=4").unwrap_err().to_string().contains("`truth.wind_m_s`"));
         assert!(set("truth.wind_m_s=much").unwrap_err().to_string().contains("truth.wind_m_s"));
-        let value = |path| mission_value_of(toml(), &expected, path).and_then(|value| value.as_float());
-        assert_eq!(value("truth.wind_m_s"), Some(4.0));
-        assert_eq!(value("powered.gimbal_deg"), Some(5.0));
-        assert!(value("airframe.mass.loaded_kg").is_some() && value("airframe.nothing").is_none());
     }
 }

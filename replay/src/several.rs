@@ -1,38 +1,43 @@
 //! Work on many items, several at a time.
 
 use std::num::NonZeroUsize;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::sync_channel;
+use std::sync::{Mutex, PoisonError};
 
-/// Capacity of the queue of results.
-const QUEUE: usize = 256;
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 
-/// Works on every item, `jobs` at a time, until `stop` is set. Results are taken as they come, with their item's place.
-pub(crate) fn several<T: Sync, R: Send>(
-    items: &[T],
+/// Results of `work` for each item, `jobs` at a time, in the order of the items.
+pub(crate) fn several<'a, T: Sync, R: Send>(
+    items: &'a [T],
     jobs: NonZeroUsize,
-    stop: &AtomicBool,
-    work: impl Fn(&T) -> R + Sync,
-    mut take: impl FnMut(usize, R),
-) {
-    let next = AtomicUsize::new(0);
-    std::thread::scope(|scope| {
-        let (results, inbox) = sync_channel(QUEUE);
-        for _ in 0..jobs.get().min(items.len()) {
-            let (results, next, work) = (results.clone(), &next, &work);
-            scope.spawn(move || {
-                while !stop.load(Ordering::Relaxed) {
-                    let place = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(item) = items.get(place) else { return };
-                    if results.send((place, work(item))).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(results);
-        while let Ok((place, result)) = inbox.recv() {
-            take(place, result);
-        }
-    });
+    work: impl Fn(&'a T) -> R + Sync,
+) -> Vec<R> {
+    // Each item is long enough to be stolen alone.
+    let all = || items.par_iter().with_max_len(1).map(&work).collect();
+    match ThreadPoolBuilder::new().num_threads(jobs.get()).build() {
+        Ok(pool) => pool.install(all),
+        // Without threads of its own the work is the same, only slower.
+        Err(_) => items.iter().map(&work).collect(),
+    }
+}
+
+/// Counts finished items for someone who watches.
+pub(crate) struct Finished<'a> {
+    state: Mutex<(usize, &'a mut (dyn FnMut(usize, usize) + Send))>,
+    all: usize,
+}
+
+impl<'a> Finished<'a> {
+    pub(crate) fn new(done: usize, all: usize, progress: &'a mut (dyn FnMut(usize, usize) + Send)) -> Self {
+        progress(done, all);
+        Self { state: Mutex::new((done, progress)), all }
+    }
+
+    pub(crate) fn one_more(&self) {
+        // Only `progress` can panic with the lock held, and then the count is still valid.
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.0 += 1;
+        let done = state.0;
+        (state.1)(done, self.all);
+    }
 }

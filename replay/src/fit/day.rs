@@ -11,7 +11,6 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
@@ -323,21 +322,10 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw, law.clone())?.run().legs)
     };
-    let stop = AtomicBool::new(false);
-    let (mut landed, mut failed) = (vec![false; motors.len()], None);
-    several(&motors, ask.jobs, &stop, one, |number, legs| match legs {
-        Ok(legs) => landed[number] = legs,
-        Err(error) => {
-            stop.store(true, Ordering::Relaxed);
-            failed = Some(error);
-        }
-    });
-    match failed {
-        Some(error) => Err(error.into()),
-        None => {
-            Ok(motors.into_iter().zip(landed).map(|((_, drawn), landed)| Trial { drawn, landed }).collect())
-        }
-    }
+    let landed = several(&motors, ask.jobs, one);
+    let trials =
+        motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
+    trials.collect()
 }
 
 /// The files of the day.

@@ -13,7 +13,6 @@
 //! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
 //! computer only. The crew's abort comes at its recorded frame.
 
-pub mod flip;
 mod jobs;
 pub(crate) mod prepared;
 mod rerun;
@@ -492,25 +491,23 @@ pub(crate) struct Args {
     #[command(flatten)]
     how: FlownHow,
     /// Begin at this frame instead of the landing's first.
-    #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase", "flip", "vary", "vary_plant"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase", "vary", "vary_plant"])]
     tick: Option<u64>,
     /// Begin at this time in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8
     /// (since power-up), log:19.7 (since the first record).
-    #[arg(long, value_name = "TIME", conflicts_with_all = ["phase", "flip", "vary", "vary_plant"])]
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["phase", "vary", "vary_plant"])]
     at: Option<ClockTime>,
     /// Begin with this phase, as in POWERED.
-    #[arg(long, value_name = "PHASE", value_parser = phase_named, conflicts_with_all = ["flip", "vary", "vary_plant"])]
+    #[arg(long, value_name = "PHASE", value_parser = phase_named, conflicts_with_all = ["vary", "vary_plant"])]
     phase: Option<Phase>,
     /// Write the flight as a new log.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["flip", "vary", "vary_plant"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["vary", "vary_plant"])]
     log: Option<PathBuf>,
     /// Replace an existing file, but never the log that is flown again.
     #[arg(long, requires = "log")]
     force: bool,
     #[command(flatten)]
     vary: vary::Arguments,
-    #[command(flatten)]
-    flip: flip::Arguments,
     /// Answer in JSON; with --vary, every point.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
@@ -565,9 +562,6 @@ impl Args {
         let [file] = self.files.as_slice() else {
             bail!("several flights need --vary, as in --vary powered.weights.theta=50:110:7")
         };
-        if self.flip.is_asked() {
-            return self.flip.run(file, &self.how, self.json);
-        }
         let recording = Recording::open(file)?;
         let start = match (self.tick, self.at, self.phase) {
             (Some(tick), ..) => StartAt::Tick(tick),

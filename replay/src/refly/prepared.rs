@@ -23,7 +23,7 @@ use super::{
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT};
 use crate::info::VerdictFacts;
 use crate::log::Recording;
-use crate::settings::{Setting, is_whole_in_mission, mission_value_of, mission_with, truth_with};
+use crate::settings::{Setting, mission_with, truth_with};
 
 /// Number and time of a record that is kept.
 type Kept = Vec<(f64, Record)>;
@@ -142,22 +142,6 @@ impl<'a> Prepared<'a> {
         let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
         let report = self.fly(&unchanged)?;
         Ok(report.commands_identical == report.commands_recorded)
-    }
-
-    /// Whether a setting takes whole numbers only.
-    ///
-    /// # Errors
-    /// The flight has no setting of this name.
-    pub fn is_whole(&self, path: &str) -> Result<bool, ReflyError> {
-        let toml = self.recording.profile_toml()?;
-        Ok(is_whole_in_mission(toml, path)?)
-    }
-
-    /// The number that a setting has in the recorded flight.
-    pub fn number_of(&self, path: &str) -> Option<f64> {
-        let toml = self.recording.profile_toml().ok()?;
-        let value = mission_value_of(toml, &self.truth, path)?;
-        value.as_float().or_else(|| value.as_integer().map(|number| number as f64))
     }
 
     /// Continues the flight to its end; keeps the frames if a place for them is given.
@@ -337,7 +321,7 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
     let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
     if let Some(setting) = options.settings.iter().find(of_truth) {
-        let belongs = "the random draw belongs to the plant alone (--plant, --vary-plant, --of-plant)";
+        let belongs = "the random draw belongs to the plant alone (--plant, --vary-plant)";
         return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
     }
     if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {

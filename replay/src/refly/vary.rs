@@ -1,42 +1,32 @@
 //! Flies many settings over many flights in closed loop and ranks them by the worst flight's margin.
 //!
 //! A point is one choice of every varied setting; a job is one point on one flight. Jobs are independent and their
-//! results are put in the order of the points, so the answer does not depend on how many run at the same time. With a
-//! state file every finished job is kept, and a sweep that was stopped can be continued.
+//! results are put in the order of the points, so the answer does not depend on how many run at the same time.
 
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::Args;
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha12Rng;
 use serde::Serialize;
 
-pub use super::jobs::{State, StateError, sweep};
+pub use super::jobs::sweep;
 use super::{FlownHow, ReflyError, StartAt, can_be_flown};
 use crate::cli::{Outcome, answer, jobs, say, show_progress, warn_of_what_is_missing};
-use crate::digest::{START, digest};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
 use crate::settings::Setting;
 
-/// Why a sweep could not be finished.
+/// A flight cannot be flown again at some point.
 #[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    /// A flight cannot be flown again at some point.
-    #[error("{settings}")]
-    Refly {
-        /// The settings of the point.
-        settings: String,
-        /// What is wrong.
-        source: Box<ReflyError>,
-    },
-    /// The state file cannot be used.
-    #[error(transparent)]
-    State(#[from] StateError),
+#[error("{settings}")]
+pub struct SweepError {
+    /// The settings of the point.
+    pub(super) settings: String,
+    /// What is wrong.
+    pub(super) source: Box<ReflyError>,
 }
 
 /// The outcome of one flight at one point.
@@ -106,13 +96,13 @@ pub struct Vary {
 pub enum Values {
     /// A list of values.
     Listed(Vec<toml::Value>),
-    /// A range: evenly spaced values for a grid, or random values inside it.
+    /// Evenly spaced values.
     Range {
         /// The first.
         from: f64,
         /// The last.
         to: f64,
-        /// Number of values; ignored for random points.
+        /// Number of values.
         count: usize,
     },
 }
@@ -121,19 +111,11 @@ pub enum Values {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum VaryError {
     /// The text cannot be parsed.
-    #[error(
-        "`{given}`: must be PATH=FROM:TO:COUNT, PATH=FROM:TO or PATH=A,B,C, as in powered.weights.theta=50:110:7"
-    )]
+    #[error("`{given}`: must be PATH=FROM:TO:COUNT or PATH=A,B,C, as in powered.weights.theta=50:110:7")]
     Form { given: String },
     /// Too many points.
     #[error("{points} points; at most {POINTS_MAX} are allowed in one sweep")]
     TooMany { points: usize },
-    /// Random points need a range, not a list.
-    #[error("{path}: random points need a range PATH=FROM:TO, not a list")]
-    NoRange {
-        /// The setting.
-        path: String,
-    },
 }
 
 /// The settings of one point.
@@ -143,6 +125,12 @@ pub struct Choice {
     pub settings: Vec<Setting>,
     /// Settings of the plant only.
     pub plant_settings: Vec<Setting>,
+}
+
+impl Choice {
+    pub(super) fn words(&self) -> Vec<String> {
+        self.settings.iter().chain(&self.plant_settings).map(ToString::to_string).collect()
+    }
 }
 
 impl FromStr for Vary {
@@ -168,11 +156,6 @@ impl FromStr for Vary {
                         .ok_or_else(form)?,
                 )
             }
-            [from, to] => Values::Range {
-                from: number(from).ok_or_else(form)?,
-                to: number(to).ok_or_else(form)?,
-                count: 2,
-            },
             [from, to, count] => Values::Range {
                 from: number(from).ok_or_else(form)?,
                 to: number(to).ok_or_else(form)?,
@@ -227,33 +210,6 @@ pub fn grid(vary: &[Vary], plant: &[Vary]) -> Result<Vec<Choice>, VaryError> {
         Choice { settings, plant_settings }
     };
     Ok((0..points).map(choice).collect())
-}
-
-/// Uniformly random points in the ranges; the same seed gives the same points.
-///
-/// # Errors
-/// There are too many points, or a setting has a list instead of a range.
-pub fn random(vary: &[Vary], plant: &[Vary], points: usize, seed: u64) -> Result<Vec<Choice>, VaryError> {
-    if points > POINTS_MAX {
-        return Err(VaryError::TooMany { points });
-    }
-    let mut numbers = ChaCha12Rng::seed_from_u64(seed);
-    let mut draw = |vary: &Vary| match vary.values {
-        Values::Listed(_) => Err(VaryError::NoRange { path: vary.path.clone() }),
-        Values::Range { from, to, .. } => {
-            // 53 random bits.
-            let share = (numbers.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-            let value = toml::Value::Float(from + share * (to - from));
-            Ok(Setting { path: vary.path.clone(), value, at_s: None })
-        }
-    };
-    (0..points)
-        .map(|_| {
-            let settings = vary.iter().map(&mut draw).collect::<Result<Vec<_>, _>>()?;
-            let plant_settings = plant.iter().map(&mut draw).collect::<Result<Vec<_>, _>>()?;
-            Ok(Choice { settings, plant_settings })
-        })
-        .collect()
 }
 
 /// Writes the best points of a sweep as text.
@@ -316,11 +272,11 @@ pub fn print_sweep_csv(report: &SweepReport, output: &mut impl Write) -> io::Res
     Ok(())
 }
 
-pub(super) fn not_reproduced(name: &str, output: &mut impl Write) -> io::Result<()> {
+fn not_reproduced(name: &str, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "{}: with nothing changed this build does not fly it as recorded", shown(name))
 }
 
-pub(super) fn margin_words(margin: Option<f64>) -> String {
+fn margin_words(margin: Option<f64>) -> String {
     margin.map_or_else(|| "not down".to_owned(), |margin| format!("{margin:.4}"))
 }
 
@@ -332,25 +288,16 @@ fn quoted(text: &str) -> String {
 #[derive(Debug, Args)]
 #[group(id = "varied")]
 pub(super) struct Arguments {
-    /// A setting of controller and plant to vary: PATH=FROM:TO:COUNT, PATH=A,B,C, or PATH=FROM:TO with --random. May be
-    /// given more than once; every combination is flown.
-    #[arg(long, value_name = "PATH=VALUES", conflicts_with = "flip")]
+    /// A setting of controller and plant to vary: PATH=FROM:TO:COUNT or PATH=A,B,C. May be given more than once; every
+    /// combination is flown.
+    #[arg(long, value_name = "PATH=VALUES")]
     vary: Vec<Vary>,
     /// A setting of the plant alone to vary, in the same form.
-    #[arg(long, value_name = "PATH=VALUES", conflicts_with = "flip")]
+    #[arg(long, value_name = "PATH=VALUES")]
     vary_plant: Vec<Vary>,
-    /// Use this many random points in the ranges instead of a grid.
-    #[arg(long, value_name = "POINTS")]
-    random: Option<usize>,
-    /// Seed of the random points.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    random_seed: u64,
     /// Flights flown at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Keep every finished flight in this file, and continue from it if it exists.
-    #[arg(long, value_name = "FILE")]
-    state: Option<PathBuf>,
     /// Points to show.
     #[arg(long, value_name = "N", default_value_t = 20)]
     top: usize,
@@ -361,10 +308,7 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn is_asked(&self) -> bool {
-        !(self.vary.is_empty() && self.vary_plant.is_empty())
-            || self.random.is_some()
-            || self.csv
-            || self.state.is_some()
+        !(self.vary.is_empty() && self.vary_plant.is_empty()) || self.csv
     }
 
     pub(super) fn run(&self, files: &[PathBuf], how: &FlownHow, json: bool) -> Result<Outcome> {
@@ -372,10 +316,7 @@ impl Arguments {
             !(self.vary.is_empty() && self.vary_plant.is_empty()),
             "nothing to vary; give --vary powered.weights.theta=50:110:7 or the like"
         );
-        let points = match self.random {
-            Some(count) => random(&self.vary, &self.vary_plant, count, self.random_seed)?,
-            None => grid(&self.vary, &self.vary_plant)?,
-        };
+        let points = grid(&self.vary, &self.vary_plant)?;
         let options = how.options(StartAt::Landing)?;
         let mut flights = Vec::new();
         for file in files {
@@ -390,33 +331,17 @@ impl Arguments {
             }
         }
         ensure!(!flights.is_empty(), "none of the {} logs can be flown again", files.len());
-        let all_jobs = points.len() * flights.len();
-        let mut state = match &self.state {
-            None => State::in_memory(all_jobs),
-            Some(path) => State::open(path, &Self::identity(files, how, &points)?, all_jobs)?,
-        };
-        let report = sweep(&flights, &points, &options, jobs(self.jobs), &mut state, &mut show_progress)?;
-        answer(|output| match () {
-            () if json => print_json(&report, output),
-            () if self.csv => print_sweep_csv(&report, output),
-            () => print_sweep(&report, self.top, output),
+        let report = sweep(&flights, &points, &options, jobs(self.jobs), &mut show_progress)?;
+        answer(|output| {
+            if json {
+                print_json(&report, output)
+            } else if self.csv {
+                print_sweep_csv(&report, output)
+            } else {
+                print_sweep(&report, self.top, output)
+            }
         })?;
         Ok(Outcome::Given)
-    }
-
-    /// Identifies the sweep: content of the flights, points, options, and the build.
-    fn identity(files: &[PathBuf], how: &FlownHow, points: &[Choice]) -> Result<String> {
-        let mut facts = format!("{how:?} {points:?} {:?}", protocol::log::build::build_info());
-        for path in how.settings.settings.iter().chain(files) {
-            let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-            facts = format!("{facts} {} {:016x}", path.display(), digest(START, &bytes));
-        }
-        Ok(format!(
-            "replay sweep {:016x}, {} points on {} flights",
-            digest(START, facts.as_bytes()),
-            points.len(),
-            files.len()
-        ))
     }
 }
 
@@ -425,11 +350,7 @@ mod tests {
     use super::*;
 
     fn shown(choices: &[Choice]) -> Vec<String> {
-        let words = |choice: &Choice| {
-            let all = choice.settings.iter().chain(&choice.plant_settings);
-            all.map(ToString::to_string).collect::<Vec<_>>().join(" ")
-        };
-        choices.iter().map(words).collect()
+        choices.iter().map(|choice| choice.words().join(" ")).collect()
     }
 
     #[test]
@@ -451,18 +372,8 @@ mod tests {
     }
 
     #[test]
-    fn random_points_lie_in_their_range_and_repeat() {
-        let vary: [Vary; 1] = ["a=2:3".parse().unwrap()];
-        let points = random(&vary, &[], 50, 7).unwrap();
-        assert_eq!(points, random(&vary, &[], 50, 7).unwrap());
-        assert_ne!(points, random(&vary, &[], 50, 8).unwrap());
-        assert!(points.iter().all(|p| (2.0..3.0).contains(&p.settings[0].value.as_float().unwrap())));
-        assert!(random(&["a=1,2".parse().unwrap()], &[], 1, 7).is_err());
-    }
-
-    #[test]
     fn a_malformed_range_is_refused() {
-        for bad in ["a", "a=", "=1:2", "a=1:2:0", "a=1:x", "a=1:2:3:4", "a=1:inf"] {
+        for bad in ["a", "a=", "=1:2:2", "a=1:2", "a=1:2:0", "a=1:x", "a=1:2:3:4", "a=1:inf"] {
             assert!(bad.parse::<Vary>().is_err(), "{bad}");
         }
     }

@@ -1,19 +1,15 @@
 //! Tests logs that this build would not produce: every command says so, so that nobody blames the settings for it.
 
 use std::num::NonZeroUsize;
-use std::sync::atomic::AtomicBool;
 
 use replay::evaluate::evaluate;
 use replay::evaluate::print_evaluate;
 use replay::log::Recording;
 use replay::refly::ReflyOptions;
-use replay::refly::flip::print_bisect;
-use replay::refly::flip::{BisectOptions, bisect};
 use replay::refly::vary::print_sweep;
-use replay::refly::vary::{State, SweepReport, grid, sweep};
+use replay::refly::vary::{SweepReport, grid, sweep};
 
 use crate::asked::settings;
-use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
 /// A report as text.
@@ -52,8 +48,7 @@ fn an_evaluation_counts_differences_caused_by_the_build() {
 
 fn swept(flights: &[Recording]) -> SweepReport {
     let points = grid(&["powered.weights.theta=110".parse().unwrap()], &[]).unwrap();
-    let mut state = State::in_memory(flights.len());
-    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut state, &mut |_, _| {}).unwrap()
+    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut |_, _| {}).unwrap()
 }
 
 #[test]
@@ -66,30 +61,4 @@ fn a_sweep_names_the_flights_that_are_not_reproduced() {
         text.contains("other.mcap: with nothing changed this build does not fly it as recorded"),
         "{text}"
     );
-}
-
-#[test]
-fn a_bisection_says_when_the_flight_is_not_reproduced() {
-    let options = BisectOptions {
-        path: "truth.impulse_scale".to_owned(),
-        plant_alone: true,
-        value: None,
-        from: 0.8,
-        to: 1.2,
-        steps: 1,
-        refly: ReflyOptions::default(),
-    };
-    for (flight, is_own) in [(MK2.recording(), true), (forged(), false)] {
-        let report = bisect(&flight, &options, &AtomicBool::new(false)).unwrap();
-        assert_eq!(report.reproduced, is_own);
-        let text = words(|output| print_bisect(&report, output));
-        assert_eq!(text.contains("does not fly it as recorded"), !is_own, "{text}");
-    }
-    // A changed frame before the start shows it, and so does one after the start.
-    let whole = Recording::open(&LANDED.log).unwrap();
-    for place in [99, whole.frames.len() - 300] {
-        let mut flight = whole.clone();
-        flight.frames[place].output.gimbal_rad[0] += 0.01;
-        assert!(!bisect(&flight, &options, &AtomicBool::new(false)).unwrap().reproduced, "{place}");
-    }
 }

@@ -1,7 +1,6 @@
 //! Tests every what-if question on a whole flight from apogee, as logged by a campaign.
 
 use std::num::NonZeroUsize;
-use std::sync::atomic::AtomicBool;
 
 use flight::rules::phase::Phase;
 use proptest::prelude::*;
@@ -10,9 +9,8 @@ use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
-use replay::refly::flip::{BisectOptions, bisect};
-use replay::refly::vary::{State, grid, sweep};
-use replay::refly::{Law, Prepared, ReflyOptions, StartAt, refly, refly_flight, write_log};
+use replay::refly::vary::{grid, sweep};
+use replay::refly::{Law, ReflyOptions, StartAt, refly, refly_flight, write_log};
 use replay::verify::explain::tick;
 use replay::verify::{Verification, verify};
 
@@ -235,8 +233,7 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs() {
     let points = grid(&[], &["truth.impulse_scale=0.8:1.0:3".parse().unwrap()]).unwrap();
     let fly = |flights: &[Recording], count: usize| {
         let jobs = NonZeroUsize::new(count).unwrap();
-        let mut state = State::in_memory(points.len() * flights.len());
-        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut state, &mut |_, _| {})
+        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut |_, _| {})
     };
     let one = fly(&flights[..1], 1).unwrap();
     assert_eq!(one, fly(&flights[..1], 3).unwrap());
@@ -246,34 +243,6 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs() {
     flights[1].head.run.remove("flight");
     let refusal = anyhow::Error::from(fly(&flights, 2).unwrap_err());
     assert!(format!("{refusal:#}").contains("`flight`"), "{refusal:#}");
-}
-
-/// The verdicts on the two sides of the value found really differ.
-#[test]
-fn a_bisection_begins_with_the_drawn_value_and_brackets_the_change() {
-    let recording = recording();
-    let options = BisectOptions {
-        path: "truth.impulse_scale".to_owned(),
-        plant_alone: true,
-        value: None,
-        from: 0.6,
-        to: 1.2,
-        steps: 4,
-        refly: ReflyOptions::default(),
-    };
-    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
-    let drawn = refly(&recording, &ReflyOptions::default()).unwrap().thrust_scale;
-    assert_eq!((report.value.to_bits(), report.outcome.landed), (drawn.to_bits(), true));
-    let misnamed = BisectOptions { path: "truth.impulse_scales".to_owned(), ..options.clone() };
-    let refusal = bisect(&recording, &misnamed, &AtomicBool::new(false)).unwrap_err().to_string();
-    assert!(refusal.contains("did you mean `truth.impulse_scale`?"), "{refusal}");
-    let flip = report.below.unwrap();
-    let prepared = Prepared::new(&recording, &ReflyOptions::default()).unwrap();
-    let landed = |scale: f64| {
-        let options = with_plant(&[&format!("truth.impulse_scale={scale:?}")]);
-        prepared.fly(&options).unwrap().reflown.unwrap().landed
-    };
-    assert!(landed(flip.same_at) && !landed(flip.other_at), "{flip:?}");
 }
 
 #[test]

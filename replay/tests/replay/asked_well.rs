@@ -2,11 +2,8 @@
 
 use std::io::Write as _;
 use std::process::Stdio;
-use std::sync::atomic::AtomicBool;
 
 use replay::log::Recording;
-use replay::refly::ReflyOptions;
-use replay::refly::flip::{BisectOptions, bisect};
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
@@ -36,30 +33,6 @@ fn a_setting_after_the_end_of_the_flight_is_refused() {
         assert!(stderr.contains("takes effect after the end of"), "{stderr}");
         assert!(stderr.contains("whose last tick is at T+"), "{stderr}");
     }
-}
-
-/// 61 m/s of wind cannot be flown; the search goes on without the values that cannot.
-#[test]
-fn a_bisection_passes_over_values_that_cannot_be_flown() {
-    let recording = Recording::open(&LANDED.log).unwrap();
-    let options = BisectOptions {
-        path: "truth.wind_m_s".to_owned(),
-        plant_alone: true,
-        value: Some(3.0),
-        from: 0.0,
-        to: 63.0,
-        steps: 2,
-        refly: ReflyOptions::default(),
-    };
-    let report = bisect(&recording, &options, &AtomicBool::new(false)).unwrap();
-    let refused: Vec<f64> = report.refused.iter().map(|refused| refused.value).collect();
-    assert!(report.above.is_some() || refused == [63.0], "{report:?}");
-    // Stopped before it began: what is known is said.
-    let report = bisect(&recording, &options, &AtomicBool::new(true)).unwrap();
-    assert!(report.interrupted && report.flown == 1 && report.above.is_none() && report.outcome.landed);
-    let mut text = Vec::new();
-    replay::refly::flip::print_bisect(&report, &mut text).unwrap();
-    assert!(String::from_utf8(text).unwrap().contains("INTERRUPTED after 1 flight"));
 }
 
 #[test]

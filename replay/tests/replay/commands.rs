@@ -150,27 +150,6 @@ fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     assert!(code == 2 && stderr.contains("no tick 300000"), "{stderr}");
 }
 
-#[test]
-fn a_bisection_is_shown() {
-    let arguments = [
-        "--flip",
-        "truth.impulse_scale",
-        "--of-plant",
-        "--lowest",
-        "0.6",
-        "--highest",
-        "1.3",
-        "--steps",
-        "4",
-    ];
-    let (code, stdout, _) = run(replay("refly", &MK2.log).args(arguments));
-    assert_eq!(code, 0);
-    assert!(stdout.contains("the smallest change that changes the verdict: -"), "{stdout}");
-    let (code, _, stderr) =
-        run(replay("refly", &MK2.log).args(["--flip", "a.b", "--lowest", "2", "--highest", "1"]));
-    assert!(code == 2 && stderr.contains("must be below"), "{stderr}");
-}
-
 /// Exports to every format and imports again.
 #[test]
 fn the_command_exports_and_imports_logs() {
@@ -236,7 +215,6 @@ fn every_command_refuses_a_file_that_is_not_a_log() {
             &["refly"],
             &["verify", "--explain", "1"],
             &["refly", "--vary", "powered.weights.theta=1:2:2"],
-            &["refly", "--flip", "powered.weights.theta", "--lowest", "1", "--highest", "2"],
             &["report", "--output", "-"],
             &["export", "--to", "csv", "--output", output],
             &["compare"],

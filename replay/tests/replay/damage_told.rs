@@ -100,14 +100,13 @@ fn no_command_is_silent_about_damage() {
     let at = |name: &str| directory.path().join(name).display().to_string();
     let (html, csv, tlog, whole, again) =
         (at("p.html"), at("csv"), at("f.tlog"), at("whole.mcap"), at("again.mcap"));
-    let questions: [&[&str]; 11] = [
+    let questions: [&[&str]; 10] = [
         &["info"],
         &["verify"],
         &["evaluate"],
         &["refly", "--log", &again],
         &["verify", "--explain", "20"],
         &["refly", "--vary", "powered.weights.theta=75,80"],
-        &["refly", "--flip", "powered.weights.theta", "--lowest", "70", "--highest", "80"],
         &["report", "--output", &html],
         &["export", "--to", "csv", "--output", &csv],
         &["export", "--to", "tlog", "--output", &tlog],

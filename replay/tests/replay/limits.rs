@@ -11,7 +11,7 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Align, Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
 use replay::log::Recording;
-use replay::refly::vary::{State, grid, sweep};
+use replay::refly::vary::{grid, sweep};
 use replay::refly::{ReflyOptions, StartAt, refly};
 use replay::report::report;
 use replay::verify::explain::tick;
@@ -333,9 +333,8 @@ proptest! {
         let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
         let points = grid(&["powered.weights.theta=50:90:2".parse().unwrap()], &[]).unwrap();
-        let mut state = State::in_memory(2);
         let options = ReflyOptions { start: StartAt::Tick(12), ..ReflyOptions::default() };
-        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut state, &mut |_, _| {}) {
+        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut |_, _| {}) {
             prop_assert_eq!(swept.points.len(), 2);
         }
     }

@@ -36,7 +36,6 @@ mod plain_answers;
 mod planned_paths;
 mod recovery;
 mod reflown_logs;
-mod resumed_sweep;
 mod season;
 mod simulated;
 mod solve_times;

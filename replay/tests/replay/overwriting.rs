@@ -193,19 +193,3 @@ fn half_an_output_replaces_nothing() {
     let (code, _, stderr) = run(replay("report", &log).args(["--output", "/dev/full"]));
     assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
 }
-
-/// The state of another sweep, or any other file, is never continued.
-#[test]
-fn a_sweep_state_never_replaces_other_files() {
-    let (directory, log) = copied(&MK2.log);
-    for state in [log.clone(), directory.path().join("notes.txt")] {
-        if state != log {
-            std::fs::write(&state, OTHERS).unwrap();
-        }
-        let before = std::fs::read(&state).unwrap();
-        let (code, _, stderr) =
-            run(replay("refly", &log).args(["--vary", "powered.weights.theta=75,80", "--state"]).arg(&state));
-        assert_eq!(code, 2, "{stderr}");
-        assert_eq!(std::fs::read(&state).unwrap(), before);
-    }
-}

@@ -49,9 +49,7 @@ fn telemetry_alone_is_refused_because_it_has_no_ticks() {
     tick.args(["--explain", "3"]);
     let mut sweep = replay("refly", &log);
     sweep.args(["--vary", "powered.weights.theta=1,2"]);
-    let mut bisect = replay("refly", &log);
-    bisect.args(["--flip", "powered.weights.theta", "--lowest", "1", "--highest", "2"]);
-    for mut command in [replay("evaluate", &log), replay("refly", &log), tick, sweep, bisect] {
+    for mut command in [replay("evaluate", &log), replay("refly", &log), tick, sweep] {
         let (code, stdout, stderr) = run(&mut command);
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
         assert!(stderr.contains("has no frames of a flight computer"), "{stderr}");

@@ -7,6 +7,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use flight_log::sortie;
 use protocol::log::build::build_info;
@@ -20,7 +21,7 @@ use crate::digest::{START, digest, digest_of_file};
 use crate::info::VerdictFacts;
 use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
-use crate::several::several;
+use crate::several::{Finished, several};
 use crate::verify::{Obstacle, Verification, verify};
 
 /// This many of the first records of the flight computer name a flight: its power-up and half a second.
@@ -230,7 +231,7 @@ pub fn fly_all(
     jobs: NonZeroUsize,
     state: &mut SeasonState,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(usize, usize),
+    progress: &mut (dyn FnMut(usize, usize) + Send),
 ) -> io::Result<BTreeMap<String, FlightResult>> {
     let mut outcomes = BTreeMap::new();
     let mut missing = Vec::new();
@@ -243,27 +244,25 @@ pub fn fly_all(
             None => missing.push((found, key)),
         }
     }
-    progress(outcomes.len(), flights.len());
-    let mut noted = Ok(());
-    several(
-        &missing,
-        jobs,
-        stop,
-        |(found, _)| fly(found),
-        |place, outcome| {
-            let Some((found, key)) = missing.get(place) else { return };
-            // A file that cannot be read now may be readable the next time.
-            if let Some(key) = key.clone().filter(|_| outcome.checked != Checked::Unverified)
-                && let Err(error) = state.note(key, outcome.clone())
-            {
-                stop.store(true, Ordering::Relaxed);
-                noted = Err(error);
-            }
-            outcomes.insert(found.name.clone(), outcome);
-            progress(outcomes.len(), flights.len());
-        },
-    );
-    noted.map(|()| outcomes)
+    let finished = Finished::new(outcomes.len(), flights.len(), progress);
+    let state = Mutex::new(state);
+    let results = several(&missing, jobs, |(found, key)| -> io::Result<_> {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let outcome = fly(found);
+        // A file that cannot be read now may be readable the next time.
+        if let Some(key) = key.clone().filter(|_| outcome.checked != Checked::Unverified) {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            state.note(key, outcome.clone()).inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
+        }
+        finished.one_more();
+        Ok(Some((found.name.clone(), outcome)))
+    });
+    for result in results {
+        outcomes.extend(result?);
+    }
+    Ok(outcomes)
 }
 
 /// The outcomes known so far, by what was flown and by which build.
