@@ -21,14 +21,17 @@ pub(crate) fn several<'a, T: Sync, R: Send>(
     }
 }
 
+/// Is told how many items are finished, of how many.
+pub(crate) type Progress<'a> = &'a mut (dyn FnMut(usize, usize) + Send);
+
 /// Counts finished items for someone who watches.
 pub(crate) struct Finished<'a> {
-    state: Mutex<(usize, &'a mut (dyn FnMut(usize, usize) + Send))>,
+    state: Mutex<(usize, Progress<'a>)>,
     all: usize,
 }
 
 impl<'a> Finished<'a> {
-    pub(crate) fn new(done: usize, all: usize, progress: &'a mut (dyn FnMut(usize, usize) + Send)) -> Self {
+    pub(crate) fn new(done: usize, all: usize, progress: Progress<'a>) -> Self {
         progress(done, all);
         Self { state: Mutex::new((done, progress)), all }
     }

@@ -14,7 +14,7 @@ use flight_log::estimate::estimate_from_log;
 use flight_log::frame::{commands_from_log, input_from_log, phase_of};
 use protocol::log::computer_v1::ComputerFrame;
 
-use crate::digest::{START, digest};
+use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, RecordingError};
 use crate::settings::explained;
 
@@ -157,10 +157,10 @@ impl Trace {
         let mut trace: Option<Self> = None;
         let mut waiting = None;
         let (mut telemetry, mut flights) = (false, 0_usize);
-        let (mut landed, mut content, mut named) = (None, START, 0);
+        let (mut landed, mut naming) = (None, Vec::new());
         while let Some(stamped) = log.next_entry()? {
-            if named < NAMING_FRAMES && matches!(stamped.entry, Entry::ComputerFrame(_)) {
-                (content, named) = (digest(content, &stamped.data), named + 1);
+            if naming.len() < NAMING_FRAMES && matches!(stamped.entry, Entry::ComputerFrame(_)) {
+                naming.push(stamped.data);
             }
             match stamped.entry {
                 Entry::Verdict(verdict) => landed = Some(verdict.landed),
@@ -202,7 +202,7 @@ impl Trace {
             None => Err(TraceError::NoFrames { name, found }),
             Some(trace) => {
                 let damage = log.damage().map(ToString::to_string);
-                Ok(Self { damage, landed, content: Some(content), ..trace })
+                Ok(Self { damage, landed, content: Some(digest(naming.iter().map(Vec::as_slice))), ..trace })
             }
         }
     }

@@ -17,7 +17,7 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 use super::{Checked, FlightResult, Flown, Found, SeasonError};
-use crate::digest::{START, digest, digest_of_file};
+use crate::digest::digest;
 use crate::info::VerdictFacts;
 use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
@@ -327,23 +327,20 @@ impl SeasonState {
 
 /// Identifies a flight, its content and this build.
 pub(super) fn key(found: &Found) -> io::Result<String> {
-    let mut digest_so_far = START;
-    let files: &[&str] = if found.number.is_some() {
-        &["manifest.json", "mission.toml", "dispersion.toml", "flights.csv"]
-    } else {
-        &[""]
+    let files = match found.number {
+        None => vec![std::fs::read(&found.path)?],
+        Some(_) => ["manifest.json", "mission.toml", "dispersion.toml", "flights.csv"]
+            .iter()
+            .map(|name| std::fs::read(found.path.join(name)))
+            .collect::<io::Result<_>>()?,
     };
-    for name in files {
-        let path = if name.is_empty() { found.path.clone() } else { found.path.join(name) };
-        digest_so_far = digest_of_file(digest_so_far, &mut File::open(path)?)?;
-    }
-    let build = build_info()
-        .into_iter()
-        .fold(START, |hash, (fact, value)| digest(digest(hash, fact.as_bytes()), value.as_bytes()));
-    Ok(format!("{} {digest_so_far:016x} {build:016x}", found.name))
+    let content = digest(files.iter().map(Vec::as_slice));
+    let build = build_info();
+    let build = digest(build.iter().flat_map(|(fact, value)| [fact.as_bytes(), value.as_bytes()]));
+    Ok(format!("{} {content:016x} {build:016x}", found.name))
 }
 
 /// Names a flight by its content.
 pub(super) fn name_of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> String {
-    format!("{:016x}", parts.into_iter().fold(START, digest))
+    format!("{:016x}", digest(parts))
 }
