@@ -1,7 +1,8 @@
 //! Solves one recorded tick again.
 //!
 //! The controller first runs every earlier tick, so that it has the warm start it had in flight. Then the same landing
-//! problem is solved again with a cold start, and the two solutions are compared.
+//! problem is solved again with a cold start, and the two solutions are compared. The third is the judge's:
+//! [`reference_solver`] shares only the equations of motion with the solver that flies.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -75,6 +76,21 @@ pub struct Solved {
     pub gimbal_rad: f64,
 }
 
+/// The flown plan beside the reference solver's of the same problem.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    /// What the reference solver finds from its own guesses; it may settle on another branch.
+    pub reference: Solved,
+    /// How much more the flown plan costs, as a fraction, with what it misses of its conditions; negative if it is better.
+    pub flown_dearer: f64,
+    /// How far the first inputs are apart, rad.
+    pub first_input_rad: f64,
+    /// How far the touchdowns are apart, m.
+    pub touchdown_m: f64,
+    /// How far the velocities there are apart, m/s.
+    pub touchdown_m_s: f64,
+}
+
 /// A limit or condition that the plan touches.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActiveConstraint {
@@ -109,6 +125,8 @@ pub struct TickReport {
     pub warm: Option<Solved>,
     /// The same problem with a cold start.
     pub cold: Option<Solved>,
+    /// What an independent solver says about the plan.
+    pub judged: Option<Judged>,
     /// The nearest tick that solves a landing: this tick if it does, `None` if no tick does.
     pub nearest_solved: Option<u64>,
     /// Limits and conditions that the warm plan touches.
@@ -187,6 +205,7 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
         identical: again.encode_to_vec() == recorded.encode_to_vec(),
         warm: warm.map(solved_facts),
         cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
+        judged: solved.as_ref().map(|solved| judged(&solved.problem, &solved.warm.solution)),
         nearest_solved: nearest(
             number,
             frames.iter().filter(|tick| plans(tick)).map(|tick| tick.input.frame),
@@ -212,6 +231,21 @@ fn solved_facts(solution: &Solution) -> Solved {
         kkt_feasibility: solution.kkt_feasibility,
         condition_miss: solution.condition_miss,
         gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(f64::NAN),
+    }
+}
+
+fn judged(problem: &Problem, flown: &Solution) -> Judged {
+    let reference = reference_solver::solve(problem, None);
+    let merit = |plan: &Solution| plan.cost + problem.solver.terminal_penalty * plan.condition_miss;
+    let first_rad = |plan: &Solution| plan.inputs_rad.first().copied().unwrap_or(f64::NAN);
+    let end = |plan: &Solution| plan.states.last().copied().unwrap_or_default();
+    let (ours, theirs) = (end(flown), end(&reference));
+    Judged {
+        flown_dearer: merit(flown) / merit(&reference) - 1.0,
+        first_input_rad: (first_rad(flown) - first_rad(&reference)).abs(),
+        touchdown_m: libm::hypot(ours.x_m - theirs.x_m, ours.z_m - theirs.z_m),
+        touchdown_m_s: libm::hypot(ours.u_m_s - theirs.u_m_s, ours.w_m_s - theirs.w_m_s),
+        reference: solved_facts(&reference),
     }
 }
 
@@ -332,6 +366,18 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
             cold.iterations.cast_signed() - warm.iterations.cast_signed(),
             (warm.cost - cold.cost).abs(),
             (warm.gimbal_rad - cold.gimbal_rad).abs()
+        )?;
+    }
+    if let Some(judged) = &report.judged {
+        print_solved("clarabel", &judged.reference, output)?;
+        let word = if judged.flown_dearer > 0.0 { "dearer" } else { "cheaper" };
+        writeln!(
+            output,
+            "         the flown plan is {:.1e} % {word}; first inputs are {:.1e} rad apart, touchdowns {:.1e} m and {:.1e} m/s",
+            100.0 * judged.flown_dearer.abs(),
+            judged.first_input_rad,
+            judged.touchdown_m,
+            judged.touchdown_m_s
         )?;
     }
     for (place, constraint) in report.active.iter().enumerate() {

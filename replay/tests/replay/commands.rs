@@ -138,6 +138,7 @@ fn a_tick_is_shown_and_a_missing_tick_exits_2() {
         "identical bit for bit",
         "warm     converged",
         "cold     converged",
+        "clarabel converged",
         "active   z_m = 0",
         "path     +0.0 s",
     ] {
@@ -148,6 +149,27 @@ fn a_tick_is_shown_and_a_missing_tick_exits_2() {
     assert_eq!((code, report["tick"].as_u64()), (0, planning.parse().ok()));
     let (code, _, stderr) = run(replay("verify", &MK2.log).args(["--explain", "300000"]));
     assert!(code == 2 && stderr.contains("no tick 300000"), "{stderr}");
+}
+
+/// The reference solver and its Clarabel share only the equations of motion with the solver that flies. They find the plan
+/// that flew, or settle on a dearer branch.
+#[test]
+fn val_clarabel_finds_no_better_plan_than_the_one_that_flew() {
+    let recording = MK2.recording();
+    let (_, frames) = recording.replayable_frames().unwrap();
+    let in_burn = |tick: &&ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
+    let planning = frames.iter().filter(in_burn).map(|tick| tick.input.frame).filter(|tick| tick % 10 == 0);
+    let mut same = 0;
+    for tick in planning.skip(2).step_by(10).take(5) {
+        let judged = replay::verify::explain::tick(&recording, tick).unwrap().judged.unwrap();
+        assert!(judged.flown_dearer < 1e-6, "{tick}: {judged:?}");
+        if judged.flown_dearer > -1e-6 {
+            same += 1;
+            assert!(judged.first_input_rad < 1e-4, "{tick}: {judged:?}");
+            assert!(judged.touchdown_m < 1e-3 && judged.touchdown_m_s < 1e-3, "{tick}: {judged:?}");
+        }
+    }
+    assert!(same >= 3, "{same} of 5 plans are the reference's");
 }
 
 /// Exports to every format and imports again.
