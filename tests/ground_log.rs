@@ -39,14 +39,6 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     for info in [&own, &heard] {
         assert!(fact(info, "verdict").contains("LANDED"), "{}", info.output);
     }
-    for row in ["vertical speed", "lateral speed", "tilt"] {
-        // Name, value and unit; the times before them are of two clocks.
-        let said = |info: &Ended| {
-            let line = fact(info, row).split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-            line[..=row.split(' ').count()].to_vec()
-        };
-        assert_eq!(said(&own), said(&heard), "{row}\n{}\n{}", own.output, heard.output);
-    }
     for phase in ["POWERED", "TOUCHDOWN"] {
         assert!(heard.output.contains(phase), "{phase}: {}", heard.output);
     }

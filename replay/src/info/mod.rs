@@ -424,17 +424,27 @@ fn seconds(ns: u64) -> f64 {
     ns as f64 / 1e9
 }
 
-/// Writes a description of a log as text.
+/// Most phases that are shown; a flight has about ten.
+const PHASES_SHOWN: usize = 14;
+
+/// Writes a description of a log as text: one screen. JSON has the rest.
 ///
 /// # Errors
 /// The output failed.
 pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
     writeln!(output, "{}{size}", shown(&info.file))?;
+    print_verdict(info, output)?;
+    if let Some(timeline) = info.phases.first() {
+        row(output, "phases", &phases(timeline))?;
+    }
     row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
     row(output, "complete", &completeness(info))?;
     if info.completeness.flights > 1 {
         row(output, "flights", &format!("{}; `replay verify` reports on each", info.completeness.flights))?;
+    }
+    if let Some(frames) = &info.frames {
+        print_frames(frames, output)?;
     }
     print_origin(info, output)?;
     let schema = &info.schema;
@@ -446,19 +456,8 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
         let (first, last) = (utc(span.first_ns), utc(span.last_ns));
         row(output, "time", &format!("{first} to {last}, {:.3} s", span.duration_s))?;
     }
-    if let Some(timeline) = info.phases.first() {
-        print_phases(timeline, output)?;
-    }
-    print_verdict(info, output)?;
-    if let Some(frames) = &info.frames {
-        print_frames(frames, output)?;
-    }
-    print_channels(&info.channels, output)?;
-    let attached: Vec<String> = info
-        .attachments
-        .iter()
-        .map(|attachment| format!("{} ({})", shown(&attachment.name), size_text(attachment.bytes as u64)))
-        .collect();
+    row(output, "channels", &channels(&info.channels))?;
+    let attached: Vec<String> = info.attachments.iter().map(|attachment| shown(&attachment.name)).collect();
     row(output, "attached", &or_none(attached.join(", ")))?;
     if let Some(reason) = &info.unreadable {
         row(output, "unreadable", &shown(reason))?;
@@ -509,13 +508,13 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
     } else if comparison.differences.is_empty() {
         row(output, "build", &format!("this one: {}", listed(&info.build)))?;
     } else {
-        row(output, "build", "differs from this build:")?;
-        for difference in &comparison.differences {
-            let value =
-                |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
+        let value = |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
+        let differences = comparison.differences.iter().map(|difference| {
             let (recorded, this) = (value(&difference.recorded), value(&difference.this_build));
-            row(output, "", &format!("{}: {recorded} (this one: {this})", shown(&difference.fact)))?;
-        }
+            format!("{} {recorded} (this one: {this})", shown(&difference.fact))
+        });
+        let differences: Vec<String> = differences.collect();
+        row(output, "build", &format!("differs from this build: {}", differences.join(", ")))?;
     }
     let profile = match &info.profile {
         None => "not attached".to_owned(),
@@ -527,24 +526,18 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
     row(output, "profile", &profile)
 }
 
-fn print_phases(timeline: &PhaseTimeline, output: &mut impl Write) -> io::Result<()> {
-    for (index, span) in timeline.spans.iter().enumerate() {
-        let clock = match timeline.source {
-            PhaseSource::Vehicle => "T+",
-            PhaseSource::Telemetry => "the station's clock",
-        };
-        let from = if index == 0 {
-            format!("   ({clock}, from the {})", timeline.source.name())
-        } else {
-            String::new()
-        };
-        let name = if index == 0 { "phases" } else { "" };
-        row(output, name, &format!("{:>9.3} to {:>9.3} s  {}{from}", span.from_s, span.until_s, span.phase))?;
-    }
-    if timeline.further_changes > 0 {
-        row(output, "", &format!("and {} more", counted(timeline.further_changes, "change")))?;
-    }
-    Ok(())
+/// When each phase began.
+fn phases(timeline: &PhaseTimeline) -> String {
+    let clock = match timeline.source {
+        PhaseSource::Vehicle => "T+",
+        PhaseSource::Telemetry => "the station's clock",
+    };
+    let spans = &timeline.spans;
+    let began = spans.iter().take(PHASES_SHOWN).map(|span| format!("{} {:.2}", span.phase, span.from_s));
+    let began = began.collect::<Vec<_>>().join(", ");
+    let more = spans.len().saturating_sub(PHASES_SHOWN) as u64 + timeline.further_changes;
+    let more = if more > 0 { format!(" and {}", counted(more, "more change")) } else { String::new() };
+    format!("{began}{more} ({clock} in s, from the {})", timeline.source.name())
 }
 
 fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
@@ -554,23 +547,12 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
     let Some(verdict) = &info.verdict else {
         return Ok(());
     };
-    let contact = info.clocks.words(verdict.contact());
-    row(output, "", &format!("touchdown at {contact}"))?;
-    let by = if verdict.table_2.is_empty() { "" } else { "by what its legs bear:" };
-    for (title, limits) in [(by, &verdict.limits), ("by the landing paper's Table 2:", &verdict.table_2)] {
-        if !title.is_empty() && !limits.is_empty() {
-            row(output, "", title)?;
-        }
-        for limit in limits {
-            let passed = if limit.passed { "inside" } else { "OUTSIDE" };
-            let text = format!(
-                "{:<14} {:>9.4} {:<6} {passed} {} to {}",
-                shown(&limit.name),
-                limit.value,
-                shown(&limit.unit),
-                rounded(limit.minimum),
-                rounded(limit.maximum)
-            );
+    row(output, "", &format!("touchdown at {}", info.clocks.words(verdict.contact())))?;
+    for (whose, limits) in [("", &verdict.limits), ("Table 2: ", &verdict.table_2)] {
+        for limit in limits.iter().filter(|limit| !limit.passed) {
+            let (name, unit) = (shown(&limit.name), shown(&limit.unit));
+            let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
+            let text = format!("{whose}{name} {:.4} {unit} is OUTSIDE {minimum} to {maximum}", limit.value);
             row(output, "", &text)?;
         }
     }
@@ -607,25 +589,17 @@ fn solve_time_text(times: &SolveTimes) -> String {
     )
 }
 
-fn print_channels(channels: &[ChannelFacts], output: &mut impl Write) -> io::Result<()> {
-    for (index, channel) in channels.iter().enumerate() {
-        let ChannelFacts { topic, schema, messages, lost, unreadable, metadata, .. } = channel;
-        let mut remarks: Vec<String> = ["endpoint", "link"]
-            .iter()
-            .filter_map(|key| metadata.get(*key))
-            .map(|value| shown(value))
-            .collect();
-        if *lost > 0 {
-            remarks.push(format!("{lost} LOST"));
-        }
-        if *unreadable > 0 {
-            remarks.push(format!("{unreadable} UNREADABLE"));
-        }
-        let text =
-            format!("{:<16} {messages:>8}  {:<31} {}", shown(topic), shown(schema), remarks.join(", "));
-        row(output, if index == 0 { "channels" } else { "" }, &text)?;
+/// How many there are, and which of them lack something.
+fn channels(channels: &[ChannelFacts]) -> String {
+    let messages = channels.iter().map(|channel| channel.messages).sum();
+    let number = counted(channels.len() as u64, "channel");
+    let mut words = vec![format!("{number} with {}", counted(messages, "message"))];
+    for ChannelFacts { topic, lost, unreadable, .. } in channels {
+        let faults =
+            [(lost, "LOST"), (unreadable, "UNREADABLE")].into_iter().filter(|(count, _)| **count > 0);
+        words.extend(faults.map(|(count, what)| format!("{} {count} {what}", shown(topic))));
     }
-    Ok(())
+    words.join(", ")
 }
 
 /// Only the beginning of a hash; JSON has all of it.

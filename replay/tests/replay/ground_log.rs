@@ -82,7 +82,7 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
     let (code, stdout, _) = run(&mut replay("info", &GROUND));
     assert!(code == 0 && stdout.contains("verdict     LANDED"), "{stdout}");
     // Table 2 is not sent; the legs' verdict does not stand for it.
-    assert!(stdout.contains("Table 2 is not known") && stdout.contains("vertical speed"), "{stdout}");
+    assert!(stdout.contains("Table 2 is not known"), "{stdout}");
 }
 
 #[test]
