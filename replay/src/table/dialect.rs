@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 
 use protocol::dialect::XML_FILES;
 use protocol::frame::Frame;
-use quick_xml::Reader;
-use quick_xml::events::{BytesStart, Event};
+use roxmltree::{Document, Node};
 
 use super::Cell;
 use super::{Column, Kind, Meaning, TableShape};
@@ -123,81 +122,49 @@ impl Wire {
     }
 }
 
-/// Adds the messages and enums of a file.
+/// Adds the messages and enums of a file. The files come with the program: that each can be read is tested.
 fn parse(xml: &str, dialect: &mut Dialect) {
-    let mut reader = Reader::from_str(xml);
-    let (mut id, mut message, mut extensions) = (None, Message::default(), false);
-    let (mut words_of, mut in_field) = (None::<String>, false);
-    loop {
-        match reader.read_event() {
-            Ok(Event::Start(start)) if start.name().as_ref() == b"message" => {
-                id = attribute(&start, "id").and_then(|id| id.parse::<u32>().ok());
-                message = Message { name: attribute(&start, "name").unwrap_or_default(), fields: Vec::new() };
-                extensions = false;
-            }
-            Ok(Event::Empty(start)) if start.name().as_ref() == b"extensions" => extensions = true,
-            Ok(Event::Start(start)) if start.name().as_ref() == b"field" => {
-                let found = field(&start, extensions);
-                in_field = found.is_some();
-                message.fields.extend(found);
-            }
-            Ok(Event::Empty(start)) if start.name().as_ref() == b"field" => {
-                message.fields.extend(field(&start, extensions));
-            }
-            Ok(Event::Text(text)) if in_field => {
-                if let (Some(field), Ok(text)) = (message.fields.last_mut(), text.decode()) {
-                    field.meaning.words += &text;
+    let document = Document::parse(xml);
+    for node in document.iter().flat_map(Document::descendants) {
+        let name = node.attribute("name").unwrap_or_default().to_owned();
+        match node.tag_name().name() {
+            "message" => {
+                let Some(id) = node.attribute("id").and_then(|id| id.parse().ok()) else { continue };
+                let mut extension = false;
+                let mut fields = Vec::new();
+                for child in node.children() {
+                    extension |= child.has_tag_name("extensions");
+                    fields.extend(field(child, extension));
                 }
+                place(&mut fields);
+                dialect.messages.insert(id, Message { name, fields });
             }
-            Ok(Event::End(end)) if end.name().as_ref() == b"field" => {
-                in_field = false;
-                // A meaning is one line, however the file breaks it.
-                if let Some(Field { meaning, .. }) = message.fields.last_mut() {
-                    meaning.words = meaning.words.split_whitespace().collect::<Vec<_>>().join(" ");
-                }
+            "enum" => {
+                let words = dialect.enums.entry(name).or_default();
+                // A number that is written otherwise than in decimal digits is left out.
+                words.extend(node.children().filter_map(|entry| {
+                    Some((entry.attribute("value")?.parse().ok()?, entry.attribute("name")?.to_owned()))
+                }));
             }
-            Ok(Event::End(end)) if end.name().as_ref() == b"message" => {
-                if let Some(id) = id.take() {
-                    place(&mut message.fields);
-                    dialect.messages.insert(id, std::mem::take(&mut message));
-                }
-            }
-            Ok(Event::Start(start)) if start.name().as_ref() == b"enum" => {
-                words_of = attribute(&start, "name");
-            }
-            Ok(Event::Start(start) | Event::Empty(start)) if start.name().as_ref() == b"entry" => {
-                if let (Some(name), Some(word)) = (&words_of, entry(&start)) {
-                    dialect.enums.entry(name.clone()).or_default().push(word);
-                }
-            }
-            Ok(Event::Eof) | Err(_) => return,
-            Ok(_) => {}
+            _ => {}
         }
     }
 }
 
-/// The number and the name of an enum's entry; a number that is written otherwise than in decimal digits is left out.
-fn entry(start: &BytesStart<'_>) -> Option<(i64, String)> {
-    Some((attribute(start, "value")?.parse().ok()?, attribute(start, "name")?))
-}
-
-fn field(start: &BytesStart<'_>, extension: bool) -> Option<Field> {
-    let (name, given) = (attribute(start, "name")?, attribute(start, "type")?);
+fn field(node: Node<'_, '_>, extension: bool) -> Option<Field> {
+    let given = node.attribute("type").filter(|_| node.has_tag_name("field"))?;
     let (wire, count) = match given.split_once('[') {
-        None => (given.as_str(), None),
+        None => (given, None),
         Some((wire, rest)) => (wire, Some(rest.trim_end_matches(']').parse().ok()?)),
     };
     let meaning = Meaning {
-        unit: attribute(start, "units").unwrap_or_default(),
-        words: String::new(),
-        values_of: attribute(start, "enum"),
+        unit: node.attribute("units").unwrap_or_default().to_owned(),
+        // A meaning is one line, however the file breaks it.
+        words: node.text().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" "),
+        values_of: node.attribute("enum").map(str::to_owned),
     };
+    let name = node.attribute("name")?.to_owned();
     Some(Field { name, wire: Wire::named(wire)?, count, extension, at: 0, meaning })
-}
-
-fn attribute(start: &BytesStart<'_>, name: &str) -> Option<String> {
-    let found = start.try_get_attribute(name).ok()??;
-    Some(String::from_utf8_lossy(&found.value).into_owned())
 }
 
 /// On the wire the largest types come first, and extensions last, in their own order.
@@ -276,6 +243,7 @@ mod tests {
     /// The generated code and the XML agree on the name of every message, and no payload is longer than a frame's.
     #[test]
     fn every_message_of_the_dialect_has_its_fields() {
+        assert!(XML_FILES.iter().all(|xml| Document::parse(xml).is_ok()));
         assert!(DIALECT.messages.len() > 200, "{}", DIALECT.messages.len());
         for (id, message) in &DIALECT.messages {
             let Some(name) = protocol::dialect::message_name(*id) else { continue };

@@ -20,23 +20,13 @@ fn flipped(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
 
 /// Every element of the XML with its attributes, and that it is well-formed.
 fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String>)> {
-    let mut reader = quick_xml::Reader::from_str(xml);
-    let mut found = Vec::new();
-    loop {
-        match reader.read_event().unwrap() {
-            quick_xml::events::Event::Eof => return found,
-            quick_xml::events::Event::Start(start) | quick_xml::events::Event::Empty(start) => {
-                let attributes = start.attributes().map(|attribute| {
-                    let attribute = attribute.unwrap();
-                    let value = String::from_utf8(attribute.value.to_vec()).unwrap();
-                    (String::from_utf8(attribute.key.as_ref().to_vec()).unwrap(), value)
-                });
-                let name = String::from_utf8(start.name().as_ref().to_vec()).unwrap();
-                found.push((name, attributes.collect()));
-            }
-            _ => {}
-        }
-    }
+    let document = roxmltree::Document::parse(xml).unwrap();
+    let elements = document.descendants().filter(roxmltree::Node::is_element).map(|element| {
+        let attributes =
+            element.attributes().map(|found| (found.name().to_owned(), found.value().to_owned()));
+        (element.tag_name().name().to_owned(), attributes.collect())
+    });
+    elements.collect()
 }
 
 #[test]

@@ -58,19 +58,9 @@ fn foxglove_paths(text: &str) -> Vec<String> {
 
 /// Every curve of a PlotJuggler layout.
 fn plotjuggler_curves(text: &str) -> Vec<String> {
-    use quick_xml::events::Event;
-    let mut reader = quick_xml::Reader::from_str(text);
-    let mut curves = Vec::new();
-    loop {
-        match reader.read_event().unwrap() {
-            Event::Empty(element) if element.name().as_ref() == b"curve" => {
-                let name = element.try_get_attribute("name").unwrap().unwrap();
-                curves.push(String::from_utf8(name.value.into_owned()).unwrap());
-            }
-            Event::Eof => return curves,
-            _ => {}
-        }
-    }
+    let document = roxmltree::Document::parse(text).unwrap();
+    let curves = document.descendants().filter(|node| node.has_tag_name("curve"));
+    curves.map(|curve| curve.attribute("name").unwrap().to_owned()).collect()
 }
 
 #[test]

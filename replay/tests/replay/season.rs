@@ -6,7 +6,6 @@ use std::process::Command;
 use campaign::store::{Order, Shard, Store};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
-use quick_xml::events::Event as Xml;
 use serde_json::Value;
 use sim::recipe::Recipe;
 use tempfile::TempDir;
@@ -159,19 +158,9 @@ fn an_option_of_the_gate_without_a_baseline_is_an_error() {
 
 /// Counts the cases and the failures of a JUnit file.
 fn elements(xml: &str) -> [(&'static str, usize); 2] {
-    let mut counts = [("testcase", 0), ("failure", 0)];
-    let mut reader = quick_xml::Reader::from_str(xml);
-    loop {
-        match reader.read_event().unwrap() {
-            Xml::Start(start) | Xml::Empty(start) => {
-                for (name, count) in &mut counts {
-                    *count += usize::from(start.name().as_ref() == name.as_bytes());
-                }
-            }
-            Xml::Eof => return counts,
-            _ => {}
-        }
-    }
+    let document = roxmltree::Document::parse(xml).unwrap();
+    ["testcase", "failure"]
+        .map(|name| (name, document.descendants().filter(|node| node.has_tag_name(name)).count()))
 }
 
 #[test]
