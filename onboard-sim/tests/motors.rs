@@ -49,8 +49,6 @@ fn motors_of_a_folder_are_ranked_into_files_that_are_not_overwritten() {
         "1",
         "--csv",
         "motors.csv",
-        "--picture",
-        "motors.svg",
     ];
     let ranked = run(directory.path(), &arguments);
     assert_eq!(ranked.status.code(), Some(0), "{}", stderr(&ranked));
@@ -60,7 +58,7 @@ fn motors_of_a_folder_are_ranked_into_files_that_are_not_overwritten() {
     assert!(stderr(&ranked).contains("2 of 2 motors") && stderr(&ranked).contains("1 of 1 flights"));
     let csv = fs::read_to_string(directory.path().join("motors.csv")).unwrap();
     assert_eq!(csv.lines().count(), 3, "{csv}");
-    assert_eq!(names(directory.path()), ["motors", "motors.csv", "motors.svg"], "nothing unfinished is left");
+    assert_eq!(names(directory.path()), ["motors", "motors.csv"], "nothing unfinished is left");
     let again = run(directory.path(), &arguments);
     assert_eq!(again.status.code(), Some(1));
     assert!(stderr(&again).contains("motors.csv exists already; --force replaces it"), "{}", stderr(&again));

@@ -217,18 +217,8 @@ fn a_ranking_is_the_same_for_any_number_of_threads_and_loses_no_motor() {
     table::write_csv(&ranked, &mut csv).unwrap();
     let csv = String::from_utf8(csv).unwrap();
     assert_eq!(csv.lines().count(), of + 1);
+    assert!(csv.lines().next().unwrap().starts_with("rank,manufacturer,motor,"), "{csv}");
     assert!(csv.lines().nth(1).unwrap().starts_with("1,"), "{csv}");
-    let svg = table::svg(&ranked, "mini <f10>").unwrap();
-    let document = roxmltree::Document::parse(&svg).unwrap();
-    let texts = document.descendants().filter(roxmltree::Node::is_text).filter_map(|node| node.text());
-    let texts: Vec<&str> = texts.collect();
-    for name in lands {
-        assert_eq!(
-            texts.iter().filter(|text| text.contains(&format!("{name}, "))).count(),
-            1,
-            "{name} in {texts:?}"
-        );
-    }
 }
 
 /// The flights of a ranking are those of a campaign on the mission that it would write.

@@ -45,9 +45,6 @@ pub(crate) struct MotorsArguments {
     /// Write every motor as CSV, those that cannot be landed on with their reason.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the best motors as a picture (SVG).
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
     /// Replace existing files.
     #[arg(long)]
     force: bool,
@@ -60,7 +57,7 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
         "--flights {}: must be 0 to {FLIGHTS_MAX}",
         arguments.flights
     );
-    for path in [&arguments.csv, &arguments.picture].into_iter().flatten() {
+    if let Some(path) = &arguments.csv {
         refuse_loss(path, arguments.force)?;
     }
     let team = choices.team()?;
@@ -71,10 +68,6 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     std::io::stdout().lock().write_all(table::text(&ranking, arguments.all).as_bytes())?;
     if let Some(path) = &arguments.csv {
         write_file(path, arguments.force, |out| table::write_csv(&ranking, out))?;
-    }
-    if let Some(path) = &arguments.picture {
-        let svg = table::svg(&ranking, &mission.name)?;
-        write_file(path, arguments.force, |out| out.write_all(svg.as_bytes()))?;
     }
     let lands = ranking.iter().any(|ranked| matches!(ranked, Ranked::Lands(_)));
     anyhow::ensure!(lands, "{} lands on none of these motors", mission.name);

@@ -1,10 +1,12 @@
-//! The ranking as a table for a screen, as CSV with every motor, and the best motors as a picture.
+//! The ranking as a table for a screen, and as CSV with every motor.
 
 use core::fmt::{self, Write};
 
+use serde::Serialize;
+
 use super::choice::Obstacle;
 use super::ranking::{Flown, Landing, Ranked};
-use crate::figure::{Bar, FigureError, bars_svg};
+use super::source::Candidate;
 
 /// Up to this many motors without a landing are listed one by one if not all are asked for.
 const FEW: usize = 20;
@@ -133,35 +135,94 @@ fn kind_of(ranked: &Ranked) -> Option<&'static str> {
     Some(KINDS[place])
 }
 
-/// The columns of the CSV.
-const COLUMNS: [&str; 26] = [
-    "rank",
-    "manufacturer",
-    "motor",
-    "origin",
-    "in_production",
-    "diameter_mm",
-    "impulse_n_s",
-    "lands",
-    "reason",
-    "loaded_kg",
-    "ballast_kg",
-    "loaded_cg_station_m",
-    "landing_from_kg",
-    "landing_to_kg",
-    "start_height_m",
-    "onset_height_m",
-    "onset_low_m",
-    "onset_high_m",
-    "impulse_scale_low",
-    "impulse_scale_high",
-    "scatter",
-    "flights",
-    "landed_legs",
-    "legs_low",
-    "legs_high",
-    "flown_in_set",
-];
+/// A row of the CSV; what a motor does not have is empty.
+#[derive(Debug, Default, Serialize)]
+struct CsvRow<'a> {
+    rank: Option<usize>,
+    manufacturer: &'a str,
+    motor: &'a str,
+    origin: &'a str,
+    in_production: Option<bool>,
+    diameter_mm: Option<f64>,
+    impulse_n_s: Option<f64>,
+    lands: bool,
+    reason: String,
+    loaded_kg: Option<f64>,
+    ballast_kg: Option<f64>,
+    loaded_cg_station_m: Option<f64>,
+    landing_from_kg: Option<f64>,
+    landing_to_kg: Option<f64>,
+    start_height_m: Option<f64>,
+    onset_height_m: Option<f64>,
+    onset_low_m: Option<f64>,
+    onset_high_m: Option<f64>,
+    impulse_scale_low: Option<f64>,
+    impulse_scale_high: Option<f64>,
+    scatter: Option<f64>,
+    flights: Option<u64>,
+    landed_legs: Option<u64>,
+    legs_low: Option<f64>,
+    legs_high: Option<f64>,
+    flown_in_set: Option<&'a str>,
+}
+
+impl<'a> CsvRow<'a> {
+    fn of(place: usize, ranked: &'a Ranked) -> Self {
+        match ranked {
+            Ranked::Unusable(unusable) => Self {
+                motor: &unusable.name,
+                origin: &unusable.origin,
+                reason: unusable.reason.clone(),
+                ..Self::default()
+            },
+            Ranked::Refused(candidate, refusal) => Self {
+                reason: refusal.to_string(),
+                landing_from_kg: refusal.landing_kg.map(|kg| kg[0]),
+                landing_to_kg: refusal.landing_kg.map(|kg| kg[1]),
+                ..Self::of_motor(candidate)
+            },
+            Ranked::Lands(Landing { candidate, choice, flown }) => {
+                let window = &choice.window;
+                let legs = flown.as_deref().map(|flown| flown.legs);
+                Self {
+                    rank: Some(place + 1),
+                    lands: true,
+                    loaded_kg: Some(choice.mass.loaded_kg),
+                    ballast_kg: Some(choice.ballast.mass_kg),
+                    loaded_cg_station_m: Some(choice.mass.loaded_cg_station_m),
+                    landing_from_kg: Some(choice.landing_kg[0]),
+                    landing_to_kg: Some(choice.landing_kg[1]),
+                    start_height_m: Some(choice.start_height_m),
+                    onset_height_m: Some(window.onset_m),
+                    onset_low_m: Some(window.heights.low_m),
+                    onset_high_m: Some(window.heights.high_m),
+                    impulse_scale_low: Some(window.impulse_scales[0]),
+                    impulse_scale_high: Some(window.impulse_scales[1]),
+                    scatter: Some(window.scatter),
+                    flights: legs.map(|legs| legs.of),
+                    landed_legs: legs.map(|legs| legs.count),
+                    legs_low: legs.map(|legs| legs.low),
+                    legs_high: legs.map(|legs| legs.high),
+                    flown_in_set: flown.as_deref().map(|flown| flown.set.as_str()),
+                    ..Self::of_motor(candidate)
+                }
+            }
+        }
+    }
+
+    fn of_motor(candidate: &'a Candidate) -> Self {
+        let Candidate { origin, curve, in_production, .. } = candidate;
+        Self {
+            manufacturer: curve.manufacturer(),
+            motor: curve.name(),
+            origin,
+            in_production: *in_production,
+            diameter_mm: Some(1e3 * curve.diameter_m()),
+            impulse_n_s: Some(curve.total_impulse_n_s()),
+            ..Self::default()
+        }
+    }
+}
 
 /// Every motor as CSV.
 ///
@@ -169,97 +230,8 @@ const COLUMNS: [&str; 26] = [
 /// The output cannot be written.
 pub fn write_csv(ranking: &[Ranked], out: &mut impl std::io::Write) -> std::io::Result<()> {
     let mut table = csv::Writer::from_writer(out);
-    table.write_record(COLUMNS)?;
-    for (index, ranked) in ranking.iter().enumerate() {
-        table.write_record(record(index + 1, ranked))?;
+    for (place, ranked) in ranking.iter().enumerate() {
+        table.serialize(CsvRow::of(place, ranked))?;
     }
     table.flush()
-}
-
-fn record(rank: usize, ranked: &Ranked) -> [String; 26] {
-    let number = |value: f64| format!("{value}");
-    let (candidate, reason) = match ranked {
-        Ranked::Lands(landing) => (Some(&landing.candidate), String::new()),
-        Ranked::Refused(candidate, refusal) => (Some(candidate), refusal.to_string()),
-        Ranked::Unusable(unusable) => (None, unusable.reason.clone()),
-    };
-    let mut cells: [String; 26] = Default::default();
-    if let Some(candidate) = candidate {
-        let curve = &candidate.curve;
-        curve.manufacturer().clone_into(&mut cells[1]);
-        curve.name().clone_into(&mut cells[2]);
-        cells[3].clone_from(&candidate.origin);
-        cells[4] = candidate.in_production.map_or_else(String::new, |made| made.to_string());
-        cells[5] = format!("{:.1}", 1e3 * curve.diameter_m());
-        cells[6] = format!("{:.2}", curve.total_impulse_n_s());
-    }
-    if let Ranked::Unusable(unusable) = ranked {
-        cells[2].clone_from(&unusable.name);
-        cells[3].clone_from(&unusable.origin);
-    }
-    cells[7] = matches!(ranked, Ranked::Lands(_)).to_string();
-    cells[8] = reason;
-    if let Ranked::Refused(_, refusal) = ranked {
-        [cells[12], cells[13]] =
-            refusal.landing_kg.map_or_else(Default::default, |kg| kg.map(|kg| format!("{kg:.4}")));
-    }
-    let Ranked::Lands(Landing { choice, flown, .. }) = ranked else { return cells };
-    let window = &choice.window;
-    cells[0] = rank.to_string();
-    let numbers = [
-        choice.mass.loaded_kg,
-        choice.ballast.mass_kg,
-        choice.mass.loaded_cg_station_m,
-        choice.landing_kg[0],
-        choice.landing_kg[1],
-        choice.start_height_m,
-        window.onset_m,
-        window.heights.low_m,
-        window.heights.high_m,
-        window.impulse_scales[0],
-        window.impulse_scales[1],
-        window.scatter,
-    ];
-    for (cell, value) in cells[9..].iter_mut().zip(numbers) {
-        *cell = format!("{value:.4}");
-    }
-    if let Some(Flown { set, legs, .. }) = flown.as_deref() {
-        cells[21] = legs.of.to_string();
-        cells[22] = legs.count.to_string();
-        [cells[23], cells[24]] = [number(legs.low), number(legs.high)];
-        cells[25].clone_from(set);
-    }
-    cells
-}
-
-/// Motors in the picture.
-const MOST: usize = 12;
-
-/// The first motors of a ranking, as SVG: how far the thrust of each may be from the certified one. A bar spans the
-/// impulses, over the certified one, that land from one ignition height.
-///
-/// # Errors
-/// A bar is not finite.
-pub fn svg(ranking: &[Ranked], mission: &str) -> Result<String, FigureError> {
-    let bar = |(index, landing): (usize, &Landing)| {
-        let Landing { candidate, choice, flown } = landing;
-        let rate = flown.as_ref().map_or_else(String::new, |flown| {
-            format!(", {} of {} land in {}", flown.legs.count, flown.legs.of, flown.set)
-        });
-        let (name, mass_kg) = (candidate.name(), choice.mass.loaded_kg);
-        Bar {
-            x: choice.window.impulse_scales,
-            y: [-(index as f64) - 0.85, -(index as f64) - 0.15],
-            kind: usize::from(flown.is_none()),
-            text: format!("{} {name}, {mass_kg:.2} kg from {:.0} m{rate}", index + 1, choice.start_height_m),
-        }
-    };
-    let bars: Vec<Bar> = landings(ranking).take(MOST).enumerate().map(bar).collect();
-    let title = if bars.is_empty() {
-        format!("{mission} lands on no motor")
-    } else {
-        format!("Motors that {mission} lands on")
-    };
-    let labels = ["impulse over the certified impulse that still lands", ""];
-    bars_svg(&title, labels, &["flown", "not flown"], &bars, Some(("certified", 1.0)))
 }
