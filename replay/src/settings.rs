@@ -171,12 +171,7 @@ const AIRFRAME: &str = "airframe";
 /// The section of the random draw.
 const TRUTH: &str = "truth.";
 
-/// Every key that a mission may have, as in `powered.weights.theta` and `airframe.mass.loaded_kg`.
-pub fn known_mission_paths() -> BTreeSet<String> {
-    names().paths
-}
-
-/// The keys that a mission and its airframe may have.
+/// The keys that a mission and its airframe may have, as in `powered.weights.theta` and `airframe.mass.loaded_kg`.
 fn names() -> Names {
     Names::of::<Mission>("").and(Names::of::<Airframe>(AIRFRAME))
 }
@@ -250,16 +245,16 @@ const NAME_OR_TABLE: &str = "mk2";
 
 /// The keys that a type may have.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Names {
+struct Names {
     /// All keys.
-    pub(super) paths: BTreeSet<String>,
+    paths: BTreeSet<String>,
     /// Keys that take whole numbers.
     whole: BTreeSet<String>,
 }
 
 impl Names {
     /// The keys that a type may have, after a prefix.
-    pub(super) fn of<'de, T: Deserialize<'de>>(prefix: &str) -> Self {
+    fn of<'de, T: Deserialize<'de>>(prefix: &str) -> Self {
         let names = RefCell::default();
         // Placeholders may not be valid for every type; the keys noted so far are kept.
         let _ = T::deserialize(Walker { path: prefix.to_owned(), names: &names });
@@ -267,14 +262,14 @@ impl Names {
     }
 
     /// Adds the keys of another type.
-    pub(super) fn and(mut self, other: Self) -> Self {
+    fn and(mut self, other: Self) -> Self {
         self.paths.extend(other.paths);
         self.whole.extend(other.whole);
         self
     }
 
     /// Adds the keys that a table has already.
-    pub(super) fn with_those_in(mut self, table: &toml::Table) -> Self {
+    fn with_those_in(mut self, table: &toml::Table) -> Self {
         collect_leaves("", table, &mut |path, _| {
             self.paths.insert(path);
         });
@@ -282,17 +277,17 @@ impl Names {
     }
 
     /// Refuses an unknown name and suggests the most similar one.
-    pub(super) fn check(&self, given: &str) -> Result<(), SettingError> {
+    fn check(&self, given: &str) -> Result<(), SettingError> {
         check(given, &self.paths)
     }
 
     /// Whether a key takes whole numbers.
-    pub(super) fn is_whole(&self, path: &str) -> bool {
+    fn is_whole(&self, path: &str) -> bool {
         self.whole.contains(path)
     }
 
     /// Converts a value to the type of its key: `10.0` from a range means `10` for a key that takes whole numbers.
-    pub(super) fn value_of(&self, setting: &Setting) -> Result<toml::Value, SettingError> {
+    fn value_of(&self, setting: &Setting) -> Result<toml::Value, SettingError> {
         match setting.value {
             toml::Value::Float(number) if self.is_whole(&setting.path) => {
                 let whole = libm::trunc(number) as i64;
@@ -368,11 +363,11 @@ impl<'de> Deserializer<'de> for Walker<'_> {
         deserialize_bool visit_bool false,
         deserialize_f32 visit_f32 0.0,
         deserialize_f64 visit_f64 0.0,
-        deserialize_char visit_char ' ',
-        deserialize_str visit_str "",
-        deserialize_string visit_str "",
-        deserialize_bytes visit_bytes &[],
-        deserialize_byte_buf visit_bytes &[],
+    }
+
+    // Settings are numbers, text, lists and structs of them.
+    serde::forward_to_deserialize_any! {
+        char str string bytes byte_buf unit unit_struct tuple_struct map identifier ignored_any
     }
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
@@ -382,18 +377,6 @@ impl<'de> Deserializer<'de> for Walker<'_> {
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         visitor.visit_some(self)
-    }
-
-    fn deserialize_unit<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        visitor.visit_unit()
-    }
-
-    fn deserialize_unit_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        visitor: V,
-    ) -> Result<V::Value, Error> {
-        visitor.visit_unit()
     }
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(
@@ -412,19 +395,6 @@ impl<'de> Deserializer<'de> for Walker<'_> {
     fn deserialize_tuple<V: Visitor<'de>>(self, len: usize, visitor: V) -> Result<V::Value, Error> {
         self.note();
         visitor.visit_seq(serde::de::value::SeqDeserializer::new(std::iter::repeat_n(0.0_f64, len)))
-    }
-
-    fn deserialize_tuple_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        len: usize,
-        visitor: V,
-    ) -> Result<V::Value, Error> {
-        self.deserialize_tuple(len, visitor)
-    }
-
-    fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        visitor.visit_map(Fields { names: [].iter(), next: None, walker: self })
     }
 
     fn deserialize_struct<V: Visitor<'de>>(
@@ -446,14 +416,6 @@ impl<'de> Deserializer<'de> for Walker<'_> {
         let first: StrDeserializer<'_, Error> =
             variants.first().copied().unwrap_or_default().into_deserializer();
         visitor.visit_enum(first)
-    }
-
-    fn deserialize_identifier<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        visitor.visit_str("")
-    }
-
-    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        visitor.visit_unit()
     }
 }
 
@@ -632,7 +594,7 @@ mod tests {
 
     #[test]
     fn every_key_of_the_built_in_missions_is_known_and_others_are_refused_with_the_nearest() {
-        let known = known_mission_paths();
+        let known = names().paths;
         for (name, text) in flight::vehicles::mission::BUILTIN {
             let mut table = text.parse::<toml::Table>().unwrap();
             expand_airframe(&mut table).unwrap();
