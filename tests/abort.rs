@@ -72,7 +72,7 @@ fn an_abort_in_the_countdown_prevents_the_release() {
 fn an_abort_under_thrust_lands_on_the_ground_below_and_reports_that_no_cut_off_exists() {
     let mut flight = fly_to(TdPhase::TD_PHASE_POWERED);
     let before = flight.ground.wait_for_phase(TdPhase::TD_PHASE_POWERED);
-    assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE);
+    assert_eq!(before.abort_effect, TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE);
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
     flight.ground.wait_for_phase(TdPhase::TD_PHASE_TOUCHDOWN);
     // It is judged at rest.

@@ -19,7 +19,7 @@ const MAX_SOURCES: usize = 16;
 
 /// A frame at its first arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Seen {
+struct LastCopy {
     at: Duration,
     /// How many frames of its source arrived before it.
     nth: u64,
@@ -42,7 +42,7 @@ pub struct Duplicates {
 /// The last frame of each sequence number of a source, and how many frames arrived from it.
 #[derive(Debug)]
 struct SourceHistory {
-    ring: Vec<Option<Seen>>,
+    ring: Vec<Option<LastCopy>>,
     heard: u64,
 }
 
@@ -61,8 +61,14 @@ impl Duplicates {
         let of =
             self.sources.entry(source).or_insert_with(|| SourceHistory { ring: vec![None; 256], heard: 0 });
         let place = &mut of.ring[usize::from(frame.sequence())];
-        let heard =
-            Seen { at: now, nth: of.heard, link, operator, message_id: frame.message_id(), crc: frame.crc() };
+        let heard = LastCopy {
+            at: now,
+            nth: of.heard,
+            link,
+            operator,
+            message_id: frame.message_id(),
+            crc: frame.crc(),
+        };
         let is_copy = place.is_some_and(|seen| {
             seen.link != link
                 && now.saturating_sub(seen.at) <= MAX_DELAY

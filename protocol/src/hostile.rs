@@ -14,7 +14,7 @@ use crate::ftp::download::Download;
 use crate::ftp::part::Part;
 use crate::ftp::server::{NoFiles, Server};
 use crate::ftp::{FileRequest, Packet};
-use crate::hub::{Hub, News, Received};
+use crate::hub::{Hub, LinkEvent, Received};
 use crate::identity::{Address, GROUND};
 use crate::link_stats::LinkStats;
 use crate::log::reader::LogReader;
@@ -133,7 +133,7 @@ pub fn hub(data: &[u8]) {
         };
         for (keyed, hub) in hubs.iter_mut().enumerate() {
             for news in hub.take(link, received.clone(), now, 1_000) {
-                if let (1, News::Frame(frame) | News::Copy(frame)) = (keyed, news) {
+                if let (1, LinkEvent::Frame(frame) | LinkEvent::Copy(frame)) = (keyed, news) {
                     // A radio's report about itself is the only message that may be unsigned.
                     assert_eq!(frame.message_id(), 109, "a frame was accepted without a signature");
                 }

@@ -34,7 +34,7 @@
 //! use protocol::command::{CommandAnswer, CommandRequest};
 //! use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
 //! use protocol::frame::Encoder;
-//! use protocol::hub::{Hub, News, Received};
+//! use protocol::hub::{Hub, LinkEvent, Received};
 //! use protocol::identity::{GROUND, VEHICLE};
 //!
 //! let mut hub = Hub::new(1, None);
@@ -47,7 +47,7 @@
 //! # let uart_in = Encoder::new(GROUND).encode(&asked).as_bytes().to_vec();
 //! let since_boot = Duration::from_millis(20);
 //! for news in hub.take(0, Received::Stream(0, uart_in), since_boot, 0) {
-//!     let News::Frame(frame) = news else { continue };
+//!     let LinkEvent::Frame(frame) = news else { continue };
 //!     let Some(request) = CommandRequest::from_frame(&frame) else { continue };
 //!     if VEHICLE.accepts(request.target) {
 //!         let answer = CommandAnswer::to(&request, MavResult::MAV_RESULT_UNSUPPORTED);

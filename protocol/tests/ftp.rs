@@ -7,7 +7,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame, Framer};
-use protocol::ftp::download::{Download, Failure, News};
+use protocol::ftp::download::{Download, DownloadEvent, Failure};
 use protocol::ftp::part::Part;
 use protocol::ftp::server::{InMemory, Server};
 use protocol::ftp::{DATA_LEN, FileRequest, Packet, crc};
@@ -168,17 +168,17 @@ impl World {
         }
     }
 
-    fn write(&mut self, news: Option<News>) {
+    fn write(&mut self, news: Option<DownloadEvent>) {
         match news {
-            Some(News::Begins { fresh: true }) => {
+            Some(DownloadEvent::Begins { fresh: true }) => {
                 self.begun_fresh += 1;
                 self.written = vec![0; self.file.len()];
             }
-            Some(News::Piece { offset, data }) => {
+            Some(DownloadEvent::Piece { offset, data }) => {
                 self.pieces += 1;
                 self.written[offset as usize..offset as usize + data.len()].copy_from_slice(&data);
             }
-            Some(News::Begins { fresh: false }) | None => {}
+            Some(DownloadEvent::Begins { fresh: false }) | None => {}
         }
     }
 

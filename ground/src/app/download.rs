@@ -15,7 +15,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::dialect::MavMessage;
 use protocol::frame::Frame;
-use protocol::ftp::download::{Download, News, Progress};
+use protocol::ftp::download::{Download, DownloadEvent, Progress};
 use protocol::ftp::part::Part;
 use protocol::ftp::{Packet, crc};
 use protocol::identity::Address;
@@ -176,12 +176,14 @@ impl Downloading {
         Ok(())
     }
 
-    fn write(&self, news: Option<News>) -> anyhow::Result<()> {
+    fn write(&self, news: Option<DownloadEvent>) -> anyhow::Result<()> {
         let Some(keeper) = &self.keeper else { return Ok(()) };
         match news {
-            Some(News::Begins { fresh: true }) => keeper.order(Order::BeginAgain)?,
-            Some(News::Piece { offset, data }) => keeper.order(Order::Write { offset, piece: data })?,
-            Some(News::Begins { fresh: false }) | None => {}
+            Some(DownloadEvent::Begins { fresh: true }) => keeper.order(Order::BeginAgain)?,
+            Some(DownloadEvent::Piece { offset, data }) => {
+                keeper.order(Order::Write { offset, piece: data })?;
+            }
+            Some(DownloadEvent::Begins { fresh: false }) | None => {}
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::dialect::{MavCmd, MavMessage};
 use protocol::frame::{Encoder, Frame, FramerCounters};
-use protocol::hub::{Hub, HubLink, News, Origin, Received};
+use protocol::hub::{Hub, HubLink, LinkEvent, Origin, Received};
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::{Direction, RawFrame, Record};
@@ -205,7 +205,7 @@ impl Wire {
         let (now, stamp) = (self.clock.now(), self.unix_stamp());
         for news in self.hub.take(number, received, now, stamp) {
             match news {
-                News::Frame(frame) => {
+                LinkEvent::Frame(frame) => {
                     self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
@@ -219,24 +219,24 @@ impl Wire {
                     }
                     msgs.push(Msg::Frame(frame));
                 }
-                News::Copy(frame) => {
+                LinkEvent::Copy(frame) => {
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
                 }
-                News::Believed(origin) => {
+                LinkEvent::Believed(origin) => {
                     taken.believed = true;
                     self.open[number].sender.believe(origin);
                 }
-                News::Strangers(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
+                LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
                 // Counted and shown in the report of the link; a sender that is locked out is told of.
-                News::Rejected(frame, why) => {
+                LinkEvent::Rejected(frame, why) => {
                     msgs.extend(self.lockouts.refused(&frame, why, now, stamp).map(Msg::LinkSays));
                 }
-                News::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
-                News::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
+                LinkEvent::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
+                LinkEvent::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
                 }
-                News::Down(why) => msgs.push(Msg::OneLinkDown(why)),
+                LinkEvent::Down(why) => msgs.push(Msg::OneLinkDown(why)),
             }
         }
     }

@@ -177,7 +177,7 @@ impl Act {
     }
 
     /// Whether it opens a dialog that commands the vehicle.
-    pub fn opens_ladder(self) -> bool {
+    pub fn opens_confirmation(self) -> bool {
         matches!(
             self,
             Self::Arm
@@ -199,7 +199,7 @@ impl Act {
         match self {
             Self::Tap | Self::RangeTest => false,
             Self::Quit => model.is_at_risk(),
-            act if act.opens_ladder() => true,
+            act if act.opens_confirmation() => true,
             act => matches!(
                 act,
                 Self::Checklist
@@ -283,7 +283,7 @@ impl Bindings {
 
     /// The action that this small letter would have opened as a capital letter.
     pub fn meant_as_capital(&self, letter: char) -> Option<Act> {
-        self.exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_ladder())
+        self.exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_confirmation())
     }
 
     fn chosen<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> Result<Self, BindingError> {
@@ -311,7 +311,7 @@ fn key_for(definition: &Definition, given: &str) -> Result<Key, BindingError> {
         (_, Some(letter), None) if letter.is_ascii_graphic() => letter,
         _ => return Err(BindingError::UnknownKey { action, given: given.to_owned() }),
     };
-    if definition.act.opens_ladder() && !letter.is_ascii_uppercase() {
+    if definition.act.opens_confirmation() && !letter.is_ascii_uppercase() {
         return Err(BindingError::NotCapital { action, given: given.to_owned() });
     }
     Ok(Key::Char(letter))

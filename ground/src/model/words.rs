@@ -45,8 +45,8 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "parachute NOW, landing motor inhibited",
         // Sent by older vehicles, which do not distinguish the two.
         TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
-        TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY => "TOO LATE: no cut-off exists, only stays upright",
-        TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE => "lands here, no cut-off exists",
+        TdAbortEffect::TD_ABORT_EFFECT_LAND_UPRIGHT => "TOO LATE: no cut-off exists, only stays upright",
+        TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE => "lands here, no cut-off exists",
         TdAbortEffect::TD_ABORT_EFFECT_BURN => "burns and lands here, too low for a chute",
         TdAbortEffect::TD_ABORT_EFFECT_IMPACT => return impact(status.abort_impact_m_s),
     };
@@ -125,7 +125,7 @@ mod tests {
         };
         for (effect, consequence) in [
             (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, "parachute"),
-            (TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE, "lands here"),
+            (TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE, "lands here"),
             (TdAbortEffect::TD_ABORT_EFFECT_BURN, "burns and lands here"),
         ] {
             assert!(words(effect, 0).starts_with(consequence), "{}", words(effect, 0));

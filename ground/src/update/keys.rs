@@ -273,7 +273,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
 
 /// Does what a key or an entry of the palette stands for. What commands the vehicle only opens its dialog.
 pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
-    if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_ladder()) {
+    if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_confirmation()) {
         model.info(now, why);
         return swallow_word(model, act, why.to_owned(), now);
     }

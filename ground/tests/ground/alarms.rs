@@ -190,7 +190,7 @@ fn an_abort_that_would_arrive_too_late_says_so() {
         assert!(rig.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition, lands here"));
     }
     rig.phase = TdPhase::TD_PHASE_POWERED;
-    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
     rig.run(2.0);
     assert!(rig.screen(80, 24).contains("abort now: lands here"));
 }
@@ -301,7 +301,7 @@ fn frames_that_are_refused_for_their_signature_raise_an_alarm_while_nothing_else
     assert!(screen.contains("ALARM 160 frames REFUSED, wrong signature"), "{screen}");
     assert!(screen.contains("160 frames REFUSED, wrong signature: is --key the"), "{screen}");
     assert!(rig.actions.contains(&Action::Bell));
-    // Strangers beside a vehicle that is heard ring no bell.
+    // Unknown senders beside a vehicle that is heard ring no bell.
     let mut rig = Rig::crewed();
     rig.msg(Msg::Links { links: Vec::new(), signing: counters(500) });
     rig.run(1.0);

@@ -105,7 +105,7 @@ pub(crate) fn burning_in_space() -> Rig {
     fall(TdPhase::TD_PHASE_AERO_DESCENT, 18..75, (120.0, 6.0));
     fall(TdPhase::TD_PHASE_IGNITION, 17..18, (120.0, 6.0));
     fall(TdPhase::TD_PHASE_POWERED, 7..17, (300.0, 28.0));
-    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
     rig.countdown_ms = -2_700;
     rig.run(0.2);
     rig.state_in_space([8.0, -5.5, 27.5], [-3.0, 2.0, -13.0], (300.0, 28.0));

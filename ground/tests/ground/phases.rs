@@ -185,7 +185,7 @@ fn with_the_parachute_still_to_come_no_burn_is_committed_to() {
 
 #[test]
 fn regress_ignition() {
-    let effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
+    let effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
     let mut rig = in_phase(TdPhase::TD_PHASE_IGNITION, effect, (57.0, -38.5), (200.0, 6.0));
     rig.countdown_ms = -150;
     rig.run(0.1);

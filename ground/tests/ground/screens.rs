@@ -51,7 +51,7 @@ pub(crate) fn counting() -> Rig {
 pub(crate) fn powered() -> Rig {
     let mut rig = counting();
     rig.phase = TdPhase::TD_PHASE_POWERED;
-    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
     rig.countdown_ms = -2_700;
     rig.run(1.0);
     for k in 0..20_u16 {

@@ -192,7 +192,7 @@ fn costs(folders: &[PathBuf]) -> Result<()> {
             } else if plans_a_landing(answer) {
                 "landings planned, from the arming of the motor on"
             } else {
-                "other plans: outlook in the fall, rehearsal on the pad"
+                "other plans: prediction in the fall, rehearsal on the pad"
             };
             classes.entry(class).or_default().push(instructions.parse().with_context(wrong)?);
         }

@@ -1,6 +1,6 @@
 //! What a board must offer to fly the flight computer, and the loop that flies it.
 
-use flight::computer::news::News;
+use flight::computer::news::CrewMessage;
 use flight::computer::{Commands, Computer, Input, Output, flight_time_s};
 use flight_log::frame::{LoggedInput, frame_to_log};
 use protocol::records::computer_v1::ComputerFrame;
@@ -26,7 +26,7 @@ pub trait Board {
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error>;
 
     /// Tells the crew.
-    fn tell(&mut self, news: &[News]);
+    fn tell(&mut self, news: &[CrewMessage]);
 
     /// Appends a frame to the log. It must not wait: a log that cannot follow says so in the next frame's `log`.
     fn keep(&mut self, frame: &ComputerFrame);

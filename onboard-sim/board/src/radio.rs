@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use flight::computer::crew::People;
-use flight::computer::news::News;
+use flight::computer::news::CrewMessage;
 use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::rules::operator::Operator;
@@ -13,7 +13,7 @@ use flight::vehicle::mission::StateWeights;
 use flight_log::frame::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
 use protocol::frame::Framer;
 use protocol::mission::MissionHash;
-use vehicle_link::endpoint::{Heard, VehicleEndpoint};
+use vehicle_link::endpoint::{UplinkState, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
 use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};
 use vehicle_link::vehicle::{MissionName, Vehicle, VehicleKind};
@@ -46,13 +46,13 @@ pub(crate) struct Crewed {
     endpoint: VehicleEndpoint,
     framer: Framer,
     silent_frames: u32,
-    vehicle: Known,
+    vehicle: VehicleFacts,
     /// For the next frame.
-    heard: Heard,
+    heard: UplinkState,
 }
 
 /// What is known of a vehicle beside its flight computer.
-struct Known {
+struct VehicleFacts {
     mission: Mission,
     name: MissionName,
     sensors: SensorWatch,
@@ -61,7 +61,7 @@ struct Known {
 
 /// A vehicle after a frame.
 struct Flown<'a> {
-    vehicle: &'a Known,
+    vehicle: &'a VehicleFacts,
     computer: &'a Computer,
     input: &'a Input<'a>,
 }
@@ -85,13 +85,18 @@ impl Crewed {
             endpoint,
             framer: Framer::new(),
             silent_frames: 0,
-            vehicle: Known { mission, name, sensors: SensorWatch::default(), parachute_ejected: false },
+            vehicle: VehicleFacts {
+                mission,
+                name,
+                sensors: SensorWatch::default(),
+                parachute_ejected: false,
+            },
         }
     }
 
     /// A frame's input, with what the crew has asked for.
     pub(crate) fn hear(&self, input: LoggedInput) -> LoggedInput {
-        let Heard { uplink, commander, requests } = self.heard.clone();
+        let UplinkState { uplink, commander, requests } = self.heard.clone();
         input.hearing(uplink, commander, requests)
     }
 
@@ -113,9 +118,9 @@ impl Crewed {
         self.endpoint.on_answers(&output.answers, &flown);
         for news in &output.news {
             match news {
-                News::Said { severity, words } => self.endpoint.say(*severity, words),
+                CrewMessage::Said { severity, words } => self.endpoint.say(*severity, words),
                 // Seen by the endpoint itself.
-                News::PhaseChanged { .. } => {}
+                CrewMessage::PhaseChanged { .. } => {}
             }
         }
         let mut buffer = [0; 512];

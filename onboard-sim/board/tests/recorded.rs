@@ -8,7 +8,7 @@ use board::radio::Radio;
 use board::recorded::{Board, FlyError, VehicleKind, Watch};
 use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, OnTheAir, Reader, put};
 use flight::computer::Commands;
-use flight::computer::news::News;
+use flight::computer::news::CrewMessage;
 use flight::rules::outputs::Line;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::{LoggedInput, input_from_log};
@@ -175,7 +175,7 @@ impl port::Board for Recorded<'_> {
         Ok(())
     }
 
-    fn tell(&mut self, _: &[News]) {}
+    fn tell(&mut self, _: &[CrewMessage]) {}
 
     fn keep(&mut self, frame: &ComputerFrame) {
         self.kept += 1;

@@ -144,7 +144,8 @@ impl Way {
                 falls && matches!(effect, AbortEffect::Burn | AbortEffect::Impact { .. })
             }
             Self::AbortUnderThrust => {
-                phase == Phase::Powered && matches!(effect, AbortEffect::LandHere | AbortEffect::UprightOnly)
+                phase == Phase::Powered
+                    && matches!(effect, AbortEffect::LandInPlace | AbortEffect::LandUpright)
             }
             _ => false,
         }

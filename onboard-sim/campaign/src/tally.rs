@@ -99,7 +99,7 @@ impl Tally {
         let pilot = flight.pilot();
         if self.ignition.is_none() && pilot.ignited_at_s().is_some() {
             self.ignition = Some(AtIgnition {
-                chosen_onset_m: pilot.outlook().ignition.chosen_m,
+                chosen_onset_m: pilot.prediction().ignition.chosen_m,
                 height_m: world.height_m(),
                 outside_gate: pilot.gate_refusal().is_some(),
             });

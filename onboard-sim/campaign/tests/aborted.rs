@@ -49,7 +49,7 @@ fn an_abort_right_after_the_ignition_lands() {
         let mut tally = Tally::new(&recipe, number).unwrap();
         while tally.step() {}
         let locks = tally.flight().computer().mode().interlocks;
-        assert!(locks.abort_latched && locks.lands_here);
+        assert!(locks.abort_latched && locks.lands_in_place);
         let row = tally.row();
         assert!(row.legs, "{number}: {} {:?} m/s", row.failure, row.touchdown_vertical_m_s);
     }
@@ -58,7 +58,7 @@ fn an_abort_right_after_the_ignition_lands() {
 /// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the height that was chosen. A fall
 /// would end at about 37 m/s.
 #[test]
-fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_here() {
+fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_in_place() {
     let recipe = recipe(None);
     let burns = AbortEffect::Burn;
     let asked = |tally: &Tally| tally.flight().computer().abort_effect();
@@ -72,7 +72,7 @@ fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands
         tally.flight_mut().abort();
         tally.step();
         let falls = *tally.flight().computer().mode();
-        assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_here, "{falls:?}");
+        assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_in_place, "{falls:?}");
         while tally.step() {}
         rows.push(tally.row());
     }

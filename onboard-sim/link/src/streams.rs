@@ -482,7 +482,7 @@ const SELDOM_S: f64 = 1.0;
 
 /// Whose turn it is.
 #[derive(Debug, Default)]
-pub(super) struct CheckTeller {
+pub(super) struct CheckReporter {
     told: Option<(u16, CheckState)>,
     place: usize,
     /// How often every value has been told since the check changed.
@@ -492,7 +492,7 @@ pub(super) struct CheckTeller {
     found: usize,
 }
 
-impl CheckTeller {
+impl CheckReporter {
     /// The message to send now.
     pub(super) fn due(&mut self, vehicle: &dyn Vehicle, now_s: f64) -> Option<MavMessage> {
         let check = vehicle.computer().pad_check();

@@ -2,11 +2,11 @@
 //!
 //! [`FreeTimeProblem`] is a landing whose horizon of `N` intervals may be stretched between an earliest and a latest
 //! end. Everything that depends on the end (length of an interval, thrust and mass in it, drift of the target) follows
-//! from the [`Motor`] and the final time. So the search minimises the price (cost plus broken conditions) over one
+//! from the [`Motor`] and the final time. So the search minimises the merit (cost plus penalties of broken conditions) over one
 //! number.
 //!
 //! Each final time is a landing problem of its own, solved by [`solve_into`](super::solve_into). By the envelope
-//! theorem the derivative of the optimal price by the final time is that of the Lagrangian at the solution
+//! theorem the derivative of the optimal merit by the final time is that of the Lagrangian at the solution
 //! ([`stages::Workspace::lagrangian`]; Bryson and Ho, *Applied Optimal Control*, 1975, section 2.7, have it as the
 //! Hamiltonian at the end). The search is a secant on that derivative, kept between the ends and between points already
 //! known to be worse:
@@ -74,8 +74,8 @@ pub struct FreeTimeSolution {
     pub final_time_s: f64,
     /// The earliest allowed final time, s.
     pub earliest_s: f64,
-    /// Derivative of the optimal price by the final time, 1/s: zero between the ends, positive at the earliest.
-    pub price_slope: f64,
+    /// Derivative of the optimal merit by the final time, 1/s: zero between the ends, positive at the earliest.
+    pub merit_slope: f64,
     /// Problems solved.
     pub solves: u32,
 }
@@ -192,9 +192,9 @@ impl FreeTimeSolution {
         self.solution.status == SolveStatus::Converged && self.solution.condition_miss <= LANDING_MISS
     }
 
-    /// Cost plus the price of missed conditions; infinite if nothing was solved.
-    fn price(&self) -> f64 {
-        if self.solution.inputs_rad.is_empty() { f64::INFINITY } else { self.solution.price }
+    /// Cost plus the penalty of missed conditions; infinite if nothing was solved.
+    fn merit(&self) -> f64 {
+        if self.solution.inputs_rad.is_empty() { f64::INFINITY } else { self.solution.merit }
     }
 
     /// Whether another search can start from it.
@@ -224,10 +224,10 @@ impl<M: Motor> Search<'_, M> {
             let share = index as f64 / (GRID - 1) as f64;
             let span_s = self.problem.latest_s - self.earliest_s;
             self.solve(self.earliest_s + share * span_s, None, &mut trial);
-            if index == 0 || trial.price() < best.price() {
+            if index == 0 || trial.merit() < best.merit() {
                 core::mem::swap(best, &mut trial);
             }
-            let settled = index == 0 && best.lands() && best.price_slope >= 0.0;
+            let settled = index == 0 && best.lands() && best.merit_slope >= 0.0;
             if settled || span_s <= 0.0 || !self.left() {
                 break;
             }
@@ -235,13 +235,13 @@ impl<M: Motor> Search<'_, M> {
         self.workspace.trial = trial;
     }
 
-    /// Moves the final time to the point where the price's slope is zero.
+    /// Moves the final time to the point where the merit's slope is zero.
     fn refine(&mut self, best: &mut FreeTimeSolution) {
         let mut trial = core::mem::take(&mut self.workspace.trial);
         let (mut least_s, mut most_s) = (self.earliest_s, self.problem.latest_s);
         let mut curvature = None;
-        while self.left() && best.price_slope.is_finite() {
-            let slope = best.price_slope;
+        while self.left() && best.merit_slope.is_finite() {
+            let slope = best.merit_slope;
             let from_s = best.final_time_s;
             let step_s = match curvature {
                 Some(curvature) => -slope / curvature,
@@ -260,9 +260,9 @@ impl<M: Motor> Search<'_, M> {
                 break;
             }
             self.solve(to_s, Some((&best.solution, 0.0)), &mut trial);
-            let secant = (trial.price_slope - slope) / (to_s - from_s);
+            let secant = (trial.merit_slope - slope) / (to_s - from_s);
             curvature = Some(secant).filter(|secant| *secant > 0.0 && secant.is_finite());
-            let (worse, better) = if trial.price() < best.price() {
+            let (worse, better) = if trial.merit() < best.merit() {
                 core::mem::swap(best, &mut trial);
                 (from_s, to_s)
             } else {
@@ -301,7 +301,7 @@ impl<M: Motor> Search<'_, M> {
         };
         let ahead = lagrangian(final_time_s + DIFFERENCE_S);
         let behind = lagrangian(final_time_s - DIFFERENCE_S);
-        into.price_slope = (ahead - behind) / (2.0 * DIFFERENCE_S);
+        into.merit_slope = (ahead - behind) / (2.0 * DIFFERENCE_S);
         workspace.posed = Some(posed);
         self.solves += 1;
         self.iterations += into.solution.iterations;

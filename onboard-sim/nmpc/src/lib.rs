@@ -115,8 +115,8 @@ pub struct Solution {
     pub qp_iterations: u32,
     /// Running cost (Eq. 28 of the landing paper), without penalties.
     pub cost: f64,
-    /// Running cost plus the price of every broken condition.
-    pub price: f64,
+    /// Running cost plus the penalty of every broken condition.
+    pub merit: f64,
     /// Length of an interval, s.
     pub step_s: f64,
     /// Largest component of the Lagrangian's gradient by states and inputs.

@@ -40,7 +40,7 @@ pub struct SolverLimits {
     pub max_iterations_after_miss: usize,
     /// Residual of the optimality conditions that counts as converged.
     pub kkt_tolerance: f64,
-    /// Price of a metre of unmet end condition (exact penalty), cost units per metre.
+    /// Penalty of a metre of unmet end condition (exact penalty), cost units per metre.
     pub terminal_penalty: f64,
     /// Largest number of iterations of one quadratic subproblem of the reference solver; nothing else reads it.
     #[serde(default = "subproblem_iterations")]
@@ -69,7 +69,7 @@ impl SolverLimits {
         Settings {
             max_iterations: self.max_iterations,
             tolerance: self.kkt_tolerance,
-            price: self.terminal_penalty,
+            penalty: self.terminal_penalty,
             first_barrier: FIRST_BARRIER,
             guesses,
             spare_guesses,

@@ -53,10 +53,10 @@ impl Trajectory {
         Self { states, cost }
     }
 
-    /// Cost plus the price of every broken condition; infinite if the path is not finite.
-    pub fn merit(&self, conditions: &[Condition], price: f64) -> f64 {
+    /// Cost plus the penalty of every broken condition; infinite if the path is not finite.
+    pub fn merit(&self, conditions: &[Condition], penalty: f64) -> f64 {
         let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
-        let merit = self.cost + price * broken;
+        let merit = self.cost + penalty * broken;
         if merit.is_finite() { merit } else { f64::INFINITY }
     }
 

@@ -92,7 +92,7 @@ impl Workspace {
             return;
         }
         solution.cost = outcome.cost;
-        solution.price = outcome.price;
+        solution.merit = outcome.merit;
         solution.kkt_stationarity = outcome.stationarity;
         solution.kkt_feasibility = outcome.feasibility;
         solution.condition_miss = outcome.miss;

@@ -38,11 +38,11 @@ fn cold(problem: &Problem) -> Solution {
     });
     let iterations = left.iterations + right.iterations;
     let qp_iterations = left.qp_iterations + right.qp_iterations;
-    let price = |solution: &Solution| {
-        let priced = solution.cost + problem.solver.terminal_penalty * solution.condition_miss;
-        if priced.is_finite() { priced } else { f64::INFINITY }
+    let merit = |solution: &Solution| {
+        let merit = solution.cost + problem.solver.terminal_penalty * solution.condition_miss;
+        if merit.is_finite() { merit } else { f64::INFINITY }
     };
-    let better = if price(&right) < price(&left) { right } else { left };
+    let better = if merit(&right) < merit(&left) { right } else { left };
     Solution { iterations, qp_iterations, ..better }
 }
 
@@ -71,9 +71,9 @@ mod tests {
     fn lagrangian(problem: &Problem, inputs_rad: &[f64], multipliers: &[f64]) -> f64 {
         let trajectory = Trajectory::of(problem, inputs_rad);
         let conditions = problem.conditions();
-        let priced: f64 =
+        let penalties: f64 =
             conditions.iter().zip(multipliers).map(|(row, y)| y * row.value(&trajectory.states)).sum();
-        trajectory.cost - priced
+        trajectory.cost - penalties
     }
 
     fn lagrangian_gradient(problem: &Problem, inputs_rad: &[f64], multipliers: &[f64]) -> DVector<f64> {

@@ -104,7 +104,7 @@ fn solution_of(
     let (end_multipliers, floor_multipliers) = multipliers.split_at(ends);
     Solution {
         cost: iterate.trajectory.cost,
-        price: iterate.merit,
+        merit: iterate.merit,
         kkt_stationarity: residual.stationarity,
         kkt_feasibility: residual.feasibility,
         condition_miss: iterate.trajectory.worst_violation(conditions),
@@ -131,12 +131,12 @@ fn residual(
         .zip(inputs_rad)
         .map(|(slope, input)| if pushes_out(*slope, *input, limit) { 0.0 } else { slope.abs() })
         .fold(0.0, f64::max);
-    let price = problem.solver.terminal_penalty;
+    let penalty = problem.solver.terminal_penalty;
     let feasibility = conditions
         .iter()
         .zip(&linear.values)
         .zip(multipliers)
-        .map(|((condition, value), multiplier)| match Role::of(condition.equality, *multiplier, price) {
+        .map(|((condition, value), multiplier)| match Role::of(condition.equality, *multiplier, penalty) {
             Role::Held => value.abs(),
             Role::Slack => (-value).max(0.0),
             Role::Broken(sign) => (sign * value).max(0.0),
@@ -153,7 +153,7 @@ fn subproblem(
     multipliers: &[f64],
     inputs_rad: &[f64],
 ) -> Option<QpSolution> {
-    let price = problem.solver.terminal_penalty;
+    let penalty = problem.solver.terminal_penalty;
     let limit = problem.gimbal_limit_rad;
     let included: Vec<usize> = (0..conditions.len())
         .filter(|row| conditions[*row].equality || linear.values[*row] < WINDOW || multipliers[*row] > 0.0)
@@ -181,7 +181,7 @@ fn subproblem(
         lower: &lower,
         upper: &upper,
         rows: &rows,
-        price,
+        penalty,
         max_iterations: problem.solver.qp_max_iterations,
     };
     let places = pinned
@@ -194,12 +194,12 @@ fn subproblem(
         })
         .collect();
     let roles =
-        included.iter().map(|row| Role::of(conditions[*row].equality, multipliers[*row], price)).collect();
+        included.iter().map(|row| Role::of(conditions[*row].equality, multipliers[*row], penalty)).collect();
     let guess = ActiveSet { places, roles };
     let solution = if let Some(solution) = polished(&newton, guess.clone()) {
         solution
     } else {
-        let (hessian, gradient) = convexified(&exact, linear, conditions, multipliers, &pinned, price)?;
+        let (hessian, gradient) = convexified(&exact, linear, conditions, multipliers, &pinned, penalty)?;
         let convex = Qp { hessian: &hessian, gradient: &gradient, ..newton };
         if let Some(solution) = polished(&convex, guess) {
             solution
@@ -241,7 +241,7 @@ const MERIT_ROUNDING: f64 = 1e-12;
 pub(super) struct Iterate {
     pub(super) inputs_rad: Vec<f64>,
     pub(super) trajectory: Trajectory,
-    /// Cost plus the price of every broken condition.
+    /// Cost plus the penalty of every broken condition.
     pub(super) merit: f64,
 }
 
@@ -301,12 +301,12 @@ fn corrected(
     candidate: &Iterate,
     multipliers: &[f64],
 ) -> Option<Iterate> {
-    let price = problem.solver.terminal_penalty;
+    let penalty = problem.solver.terminal_penalty;
     let limit = problem.gimbal_limit_rad;
     let held: Vec<usize> = (0..conditions.len())
         .filter(|row| {
             let multiplier = multipliers[*row].abs();
-            multiplier < price && (conditions[*row].equality || multiplier > 0.0)
+            multiplier < penalty && (conditions[*row].equality || multiplier > 0.0)
         })
         .collect();
     let free: Vec<usize> =

@@ -2,13 +2,13 @@
 //! on a guessed active set, which is corrected until it is the right one.
 //!
 //! ```text
-//! minimise    p' H p / 2 + g' p + price * (sum of elastics)
+//! minimise    p' H p / 2 + g' p + penalty * (sum of elastics)
 //! subject to  c_i + a_i' p = e_i+ - e_i-      equalities
 //!             c_i + a_i' p + e_i >= 0         inequalities
 //!             lower <= p <= upper,  e >= 0
 //! ```
 //!
-//! The conditions are elastic, so the subproblem always has a solution and no multiplier exceeds the price.
+//! The conditions are elastic, so the subproblem always has a solution and no multiplier exceeds the penalty.
 //!
 //! Near a solution the active set of the last iteration is almost right, and a few linear systems replace an
 //! interior-point run. Far from it, the interior-point solution shows the set. Its own multipliers have an error of its
@@ -42,14 +42,14 @@ pub(super) struct Qp<'a> {
     pub(super) lower: &'a [f64],
     pub(super) upper: &'a [f64],
     pub(super) rows: &'a [QpRow],
-    pub(super) price: f64,
+    pub(super) penalty: f64,
     pub(super) max_iterations: u32,
 }
 
 /// The subproblem's solution.
 pub(super) struct QpSolution {
     pub(super) step: Vec<f64>,
-    /// One for each row, from -price (equalities) or 0 to price.
+    /// One for each row, from -penalty (equalities) or 0 to penalty.
     pub(super) multipliers: Vec<f64>,
     pub(super) iterations: u32,
 }
@@ -63,7 +63,7 @@ impl Qp<'_> {
         let (a, b, cones) = self.constraints();
         let elastics: usize = self.rows.iter().map(|row| if row.equality { 2 } else { 1 }).sum();
         let mut linear: Vec<f64> = self.gradient.iter().copied().collect();
-        linear.extend(core::iter::repeat_n(self.price, elastics));
+        linear.extend(core::iter::repeat_n(self.penalty, elastics));
         let mut solver =
             DefaultSolver::new(&self.quadratic(elastics), &linear, &a, &b, &cones, self.settings()).ok()?;
         solver.solve();
@@ -200,7 +200,7 @@ impl Qp<'_> {
 /// Curvature added across the conditions that hold, relative to the largest of the inputs.
 const STIFFNESSES: [f64; 2] = [1.0, 10.0];
 
-/// A multiplier this close to zero or to its price, relative to the price, does not show that its condition holds.
+/// A multiplier this close to zero or to its penalty, relative to the penalty, does not show that its condition holds.
 const UNSETTLED: f64 = 1e-6;
 
 /// Smallest curvature of a convexified model, relative to its largest.
@@ -224,7 +224,7 @@ pub(super) fn convexified(
     conditions: &[Condition],
     multipliers: &[f64],
     pinned: &[bool],
-    price: f64,
+    penalty: f64,
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let largest = exact.diagonal().amax();
     let mut plain = exact.clone();
@@ -240,8 +240,8 @@ pub(super) fn convexified(
     let held: Vec<usize> = (0..conditions.len())
         .filter(|row| {
             let multiplier = multipliers[*row];
-            multiplier.abs() < price * (1.0 - UNSETTLED)
-                && (conditions[*row].equality || multiplier > price * UNSETTLED)
+            multiplier.abs() < penalty * (1.0 - UNSETTLED)
+                && (conditions[*row].equality || multiplier > penalty * UNSETTLED)
         })
         .collect();
     let mut hessian = plain.clone();
@@ -277,8 +277,8 @@ const ROUNDS: u32 = 12;
 /// An interior-point step this close to an input's limit (rad) counts as on it.
 const ON_LIMIT_RAD: f64 = 1e-6;
 
-/// A multiplier this close to zero or to its price, relative to the price, counts as there.
-const AT_PRICE: f64 = 1e-6;
+/// A multiplier this close to zero or to its penalty, relative to the penalty, counts as there.
+const AT_PENALTY: f64 = 1e-6;
 
 /// Conditions whose triangular factor falls to this, relative to the largest, depend on the others.
 const DEPENDENT: f64 = 1e-11;
@@ -304,7 +304,7 @@ pub(super) enum Role {
     Held,
     /// Not broken and not needed: multiplier zero.
     Slack,
-    /// Broken upwards or downwards: multiplier at its price, of this sign.
+    /// Broken upwards or downwards: multiplier at its penalty, of this sign.
     Broken(f64),
 }
 
@@ -336,7 +336,7 @@ impl ActiveSet {
             .rows
             .iter()
             .zip(&solution.multipliers)
-            .map(|(row, multiplier)| Role::of(row.equality, *multiplier, qp.price))
+            .map(|(row, multiplier)| Role::of(row.equality, *multiplier, qp.penalty))
             .collect();
         Self { places, roles }
     }
@@ -344,12 +344,12 @@ impl ActiveSet {
 
 impl Role {
     /// The role a multiplier shows.
-    pub(super) fn of(equality: bool, multiplier: f64, price: f64) -> Self {
-        if multiplier >= price * (1.0 - AT_PRICE) {
+    pub(super) fn of(equality: bool, multiplier: f64, penalty: f64) -> Self {
+        if multiplier >= penalty * (1.0 - AT_PENALTY) {
             Self::Broken(1.0)
-        } else if equality && multiplier <= price * (AT_PRICE - 1.0) {
+        } else if equality && multiplier <= penalty * (AT_PENALTY - 1.0) {
             Self::Broken(-1.0)
-        } else if !equality && multiplier <= price * AT_PRICE {
+        } else if !equality && multiplier <= penalty * AT_PENALTY {
             Self::Slack
         } else {
             Self::Held
@@ -391,7 +391,7 @@ fn solved_on(qp: &Qp<'_>, set: &ActiveSet, round: u32) -> Option<QpSolution> {
         .iter()
         .map(|role| match role {
             Role::Held | Role::Slack => 0.0,
-            Role::Broken(sign) => sign * qp.price,
+            Role::Broken(sign) => sign * qp.penalty,
         })
         .collect();
 
@@ -468,8 +468,8 @@ fn mended(qp: &Qp<'_>, set: &ActiveSet, solution: &QpSolution) -> ActiveSet {
         .map(|((role, row), multiplier)| {
             let value = row.after(&solution.step);
             match role {
-                Role::Held if *multiplier > qp.price => Role::Broken(1.0),
-                Role::Held if row.equality && *multiplier < -qp.price => Role::Broken(-1.0),
+                Role::Held if *multiplier > qp.penalty => Role::Broken(1.0),
+                Role::Held if row.equality && *multiplier < -qp.penalty => Role::Broken(-1.0),
                 Role::Held if !row.equality && *multiplier < 0.0 => Role::Slack,
                 Role::Slack if value < -ROUNDING => Role::Held,
                 Role::Broken(sign) if sign * value > ROUNDING => Role::Held,
@@ -491,7 +491,7 @@ mod tests {
         root: &[f64],
         gradient: &[f64],
         rows: &[(f64, Vec<f64>, bool)],
-        price: f64,
+        penalty: f64,
     ) -> (QpSolution, Option<QpSolution>) {
         let count = gradient.len();
         let root = DMatrix::from_row_slice(count, count, root);
@@ -511,7 +511,7 @@ mod tests {
             lower: &vec![-1.0; count],
             upper: &vec![1.0; count],
             rows: &rows,
-            price,
+            penalty,
             max_iterations: 100,
         };
         let rough = qp.solve().unwrap();
@@ -520,8 +520,8 @@ mod tests {
     }
 
     #[test]
-    fn the_multiplier_of_an_unreachable_condition_is_at_its_price() {
-        // p <= 1 cannot make p - 3 zero. A price of 5 per unit exceeds the curvature, so p goes to its limit.
+    fn the_multiplier_of_an_unreachable_condition_is_at_its_penalty() {
+        // p <= 1 cannot make p - 3 zero. A penalty of 5 per unit exceeds the curvature, so p goes to its limit.
         let (_, polished) = both(&[0.0], &[0.0], &[(-3.0, vec![1.0], true)], 5.0);
         let polished = polished.unwrap();
         assert!((polished.step[0] - 1.0).abs() < 1e-12 && (polished.multipliers[0] - 5.0).abs() < 1e-12);

@@ -182,7 +182,7 @@ impl Sortie {
             rehearsal.step();
         }
         self.let_go_when_cleared();
-        let sensed = self.surroundings.feel();
+        let sensed = self.surroundings.sample_sensors();
         self.frame += 1;
         self.dead = self.frames_down > 0;
         if self.dead {
@@ -253,7 +253,7 @@ impl Sortie {
         if self.world().hangs()
             && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
         {
-            self.surroundings.world.let_go();
+            self.surroundings.world.release();
         }
     }
 

@@ -65,7 +65,7 @@ impl Surroundings {
 
     /// The world moves for one frame, and the sensors measure it. `None` if they have given no sample: what is true is then known to
     /// nobody. Without sensors the computer is told the true state.
-    pub(crate) fn feel(&mut self) -> Option<Sensed> {
+    pub(crate) fn sample_sensors(&mut self) -> Option<Sensed> {
         let mut measured = None;
         for _ in 0..FRAME_MS {
             self.world.step(&self.actuators);

@@ -1,6 +1,6 @@
 //! Input limits and elastic conditions, with their slacks and multipliers.
 //!
-//! An input limit is a hard inequality. A condition `c(x)` on one state component is an exact penalty at the price
+//! An input limit is a hard inequality. A condition `c(x)` on one state component is an exact penalty at the penalty
 //! `M`: with slacks `c = s - e`, `s > 0` above and `e > 0` below,
 //!
 //! ```text
@@ -8,7 +8,7 @@
 //! equality    c  = 0   cost M (s + e)   -M < y < M     s (M + y) = mu    e (M - y) = mu
 //! ```
 //!
-//! so the price limits `y`, and a condition that cannot be met is missed by as little as the price allows. Conditions
+//! so the penalty limits `y`, and a condition that cannot be met is missed by as little as the penalty allows. Conditions
 //! are linear, so `c = s - e` holds at every iterate if it holds at the first. The elimination of slacks and multiplier
 //! from the Newton system leaves a diagonal term `1 / D`, `D = s / (y + l) + e / (M - y)`, on the condition's
 //! component.
@@ -21,8 +21,8 @@ pub(crate) const LAST_BARRIER: f64 = 1e-8;
 /// Slacks up to this do not change a multiplier.
 const SLACK: f64 = 1e-3;
 
-/// A multiplier this close to its price, relative to it, counts as at its price.
-const AT_PRICE: f64 = 1e-9;
+/// A multiplier this close to its penalty, relative to it, counts as at its penalty.
+const AT_PENALTY: f64 = 1e-9;
 
 /// Multipliers of an input's lower and upper limit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -77,10 +77,10 @@ pub(crate) struct Elastic {
     pub(crate) above: f64,
     /// `e`.
     pub(crate) below: f64,
-    /// `l`, the negative of the multiplier's smallest value: 0, or the price for an equality.
+    /// `l`, the negative of the multiplier's smallest value: 0, or the penalty for an equality.
     least: f64,
     /// `M`, the multiplier's largest value.
-    price: f64,
+    penalty: f64,
 }
 
 /// Change of an [`Elastic`].
@@ -93,41 +93,41 @@ pub(crate) struct ElasticStep {
 
 impl Elastic {
     /// The elastic of a condition at value `c` on the central path.
-    pub(crate) fn central(c: f64, equality: bool, price: f64, barrier: f64) -> Self {
-        let least = if equality { price } else { 0.0 };
-        let width = price + least;
+    pub(crate) fn central(c: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
+        let least = if equality { penalty } else { 0.0 };
+        let width = penalty + least;
         // c = mu / a - mu / (width - a); the smaller root of a quadratic, for the side c is on.
         let size = c.abs() * width;
         let root = libm::sqrt(size * size + 4.0 * barrier * barrier);
         let near = 2.0 * barrier * width / (size + 2.0 * barrier + root);
         let (a, b) = if c >= 0.0 { (near, width - near) } else { (width - near, near) };
-        Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
+        Self { a, b, above: barrier / a, below: barrier / b, least, penalty }.fitted(c)
     }
 
     /// The elastic of a condition at value `c` with a multiplier from an earlier solution.
-    pub(crate) fn warm(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+    pub(crate) fn warm(c: f64, multiplier: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
         /// Smallest distance of a multiplier from the ends of its range, as a fraction of its value on the central
         /// path.
         const KEPT: f64 = 0.1;
-        let least = if equality { price } else { 0.0 };
+        let least = if equality { penalty } else { 0.0 };
         let nearest = KEPT * barrier / c.abs().max(SLACK);
         let a = (multiplier + least).max(nearest);
-        let b = (price - multiplier).max(nearest);
-        Self { a, b, above: barrier / a, below: barrier / b, least, price }.fitted(c)
+        let b = (penalty - multiplier).max(nearest);
+        Self { a, b, above: barrier / a, below: barrier / b, least, penalty }.fitted(c)
     }
 
     /// The elastic of a condition at value `c` with the multiplier of an optimum, which may be at an end of its range.
-    pub(crate) fn settled(c: f64, multiplier: f64, equality: bool, price: f64, barrier: f64) -> Self {
+    pub(crate) fn settled(c: f64, multiplier: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
         /// Smallest distance from the ends: negligible, but above zero.
         const NOTHING: f64 = 1e-9;
-        let least = if equality { price } else { 0.0 };
-        let (a, b) = ((multiplier + least).max(NOTHING), (price - multiplier).max(NOTHING));
+        let least = if equality { penalty } else { 0.0 };
+        let (a, b) = ((multiplier + least).max(NOTHING), (penalty - multiplier).max(NOTHING));
         let (above, below) = (barrier / a, barrier / b);
-        let mut settled = Self { a, b, above, below, least, price };
+        let mut settled = Self { a, b, above, below, least, penalty };
         if c >= 0.0 {
-            settled.below = below.min(barrier / price);
+            settled.below = below.min(barrier / penalty);
         } else {
-            settled.above = above.min(barrier / price);
+            settled.above = above.min(barrier / penalty);
         }
         settled.fitted(c)
     }
@@ -145,7 +145,7 @@ impl Elastic {
 
     /// With slacks and multiplier raised to the barrier, for a condition at value `c`.
     pub(crate) fn raised(&self, c: f64, barrier: f64) -> Self {
-        let width = self.price + self.least;
+        let width = self.penalty + self.least;
         let least = (barrier / c.abs().max(SLACK)).min(0.5 * width);
         let mut raised = *self;
         if self.a < least {
@@ -166,14 +166,14 @@ impl Elastic {
     /// `y`.
     #[inline]
     pub(crate) fn multiplier(&self) -> f64 {
-        if self.a < self.b { self.a - self.least } else { self.price - self.b }
+        if self.a < self.b { self.a - self.least } else { self.penalty - self.b }
     }
 
-    /// `y`, set exactly to its price if a broken condition has brought it close.
+    /// `y`, set exactly to its penalty if a broken condition has brought it close.
     pub(crate) fn settled_multiplier(&self) -> f64 {
-        if self.b <= AT_PRICE * self.price {
-            self.price
-        } else if self.least > 0.0 && self.a <= AT_PRICE * self.price {
+        if self.b <= AT_PENALTY * self.penalty {
+            self.penalty
+        } else if self.least > 0.0 && self.a <= AT_PENALTY * self.penalty {
             -self.least
         } else {
             self.multiplier()
@@ -186,13 +186,13 @@ impl Elastic {
         (self.a, self.b)
     }
 
-    /// The violation that the price is paid for.
+    /// The violation that the penalty is for.
     #[inline]
     pub(crate) fn broken(&self) -> f64 {
         if self.least > 0.0 { self.above + self.below } else { self.below }
     }
 
-    /// The change of the violation that the price is paid for.
+    /// The change of the violation that the penalty is for.
     #[inline]
     pub(crate) fn broken_by(&self, step: &ElasticStep) -> f64 {
         if self.least > 0.0 { step.above + step.below } else { step.below }

@@ -91,7 +91,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             } else {
                 self.differentiate(model);
             }
-            let (settled, residual) = self.look(model);
+            let (settled, residual) = self.update_roles(model);
             if !residual.is_finite() || steps >= STRAY_STEPS && residual > STRAY {
                 return Err((steps, sweeps));
             }
@@ -273,7 +273,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         let bent = condition.value(&trial.states) - straight;
         let Some(fraction) = first_root(before, straight - before, bent) else { return false };
 
-        let (least, most) = condition.range(model.settings().price);
+        let (least, most) = condition.range(model.settings().penalty);
         let multiplier = &mut sides.multipliers[index];
         *multiplier = (*multiplier - fraction * stiffness * straight).clamp(least, most);
         for (k, input) in current.inputs.iter_mut().enumerate() {

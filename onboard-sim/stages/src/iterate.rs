@@ -80,10 +80,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         model.cost(&self.states, &self.inputs)
     }
 
-    /// Cost plus the price of every broken condition.
-    pub(crate) fn price(&self, model: &M, conditions: &[Condition]) -> f64 {
+    /// Cost plus the penalty of every broken condition.
+    pub(crate) fn merit(&self, model: &M, conditions: &[Condition]) -> f64 {
         let broken: f64 = conditions.iter().map(|row| row.violation(row.value(&self.states))).sum();
-        self.cost(model) + model.settings().price * broken
+        self.cost(model) + model.settings().penalty * broken
     }
 
     /// The largest violation of any condition.
@@ -91,7 +91,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         conditions.iter().map(|row| row.violation(row.value(&self.states))).fold(0.0, f64::max)
     }
 
-    /// The objective of the barrier problem: cost, elastics at their price and the logarithms of all slacks.
+    /// The objective of the barrier problem: cost, elastics at their penalty and the logarithms of all slacks.
     pub(crate) fn barrier_objective(&self, model: &M, barrier: f64) -> f64 {
         /// Number of factors per logarithm, small enough that their product does not underflow.
         const FACTORS: usize = 8;
@@ -107,13 +107,13 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
             }
             logarithms += libm::log(product);
         }
-        let mut priced = 0.0;
+        let mut broken = 0.0;
         for elastics in self.elastics.chunks(FACTORS) {
             let product: f64 = elastics.iter().map(|elastic| elastic.above * elastic.below).product();
             logarithms += libm::log(product);
-            priced += elastics.iter().map(Elastic::broken).sum::<f64>();
+            broken += elastics.iter().map(Elastic::broken).sum::<f64>();
         }
-        self.cost(model) + model.settings().price * priced - barrier * logarithms
+        self.cost(model) + model.settings().penalty * broken - barrier * logarithms
     }
 
     /// Rolls the inputs out from the first state; the states then have no defects.

@@ -10,9 +10,9 @@
 //! subject to  x_{k+1} = F_k(x_k, u_k),   x_0 given,   lower <= u_k <= upper
 //! ```
 //!
-//! [`Condition`]s on states (a floor, a box at the end) are exact penalties at the price `M` (`barrier`). So the
-//! problem always has a solution, and an unreachable condition is missed by as little as the price allows. A condition
-//! whose multiplier stays below the price holds exactly, so a high price makes it a hard one.
+//! [`Condition`]s on states (a floor, a box at the end) are exact penalties at the penalty `M` (`barrier`). So the
+//! problem always has a solution, and an unreachable condition is missed by as little as the penalty allows. A condition
+//! whose multiplier stays below the penalty holds exactly, so a high penalty makes it a hard one.
 //!
 //! There is no cost of products of states and inputs, no condition on several components at once, and input limits are
 //! the same in all intervals. A further state can stand for what is missing.

@@ -130,9 +130,9 @@ pub struct Settings {
     pub max_iterations: usize,
     /// Residual of the optimality conditions that counts as converged.
     pub tolerance: f64,
-    /// Price of one unit by which a condition is missed.
-    pub price: f64,
-    /// Barrier of a cold solve's first iteration, of the order of the price, so that nothing is active yet.
+    /// Penalty of one unit by which a condition is missed.
+    pub penalty: f64,
+    /// Barrier of a cold solve's first iteration, of the order of the penalty, so that nothing is active yet.
     pub first_barrier: f64,
     /// Number of guesses of a cold solve; the cheapest result is kept.
     pub guesses: usize,
@@ -176,7 +176,7 @@ impl Condition {
 
     /// The range of its multiplier.
     #[inline]
-    pub(crate) fn range(&self, price: f64) -> (f64, f64) {
-        (if self.equality { -price } else { 0.0 }, price)
+    pub(crate) fn range(&self, penalty: f64) -> (f64, f64) {
+        (if self.equality { -penalty } else { 0.0 }, penalty)
     }
 }

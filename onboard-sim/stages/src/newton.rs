@@ -122,7 +122,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
     /// Slope of the barrier objective along the step.
     pub(crate) fn slope(&self, model: &M, iterate: &Iterate<M, NX, NU>, barrier: f64) -> f64 {
         let ranges = model.input_ranges();
-        let price = model.settings().price;
+        let penalty = model.settings().penalty;
         let mut slope = model.slope_along(&iterate.states, &self.sweep.states);
         for (k, (input, step)) in iterate.inputs.iter().zip(&self.sweep.inputs).enumerate() {
             let own = model.input_slope(k, input);
@@ -132,7 +132,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
             }
         }
         for (elastic, step) in iterate.elastics.iter().zip(&self.elastics) {
-            slope += price * elastic.broken_by(step)
+            slope += penalty * elastic.broken_by(step)
                 - barrier * (step.above / elastic.above + step.below / elastic.below);
         }
         slope

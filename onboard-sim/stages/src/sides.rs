@@ -45,8 +45,8 @@ pub(crate) enum Role {
     Least,
     /// Within its range; the condition holds as an equation.
     Held,
-    /// At its price: the condition is broken below.
-    Price,
+    /// At its penalty: the condition is broken below.
+    Penalty,
 }
 
 /// The side of every limit and condition.
@@ -82,16 +82,16 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 };
             }
         }
-        let price = model.settings().price;
+        let penalty = model.settings().penalty;
         for (index, condition) in self.conditions.iter().enumerate() {
             let elastic = &current.elastics[index];
             let value = condition.value(&current.states);
             let (a, b) = elastic.room();
-            let (least, most) = condition.range(price);
+            let (least, most) = condition.range(penalty);
             let (role, multiplier) = if a < value {
                 (Role::Least, least)
             } else if b < -value {
-                (Role::Price, most)
+                (Role::Penalty, most)
             } else {
                 (Role::Held, elastic.multiplier())
             };
@@ -101,23 +101,23 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
     /// Releases the inputs that pull away from their limits. Returns whether there was none, and the largest residual
     /// of the optimality conditions for the sides.
-    pub(crate) fn look(&mut self, model: &M) -> (bool, f64) {
+    pub(crate) fn update_roles(&mut self, model: &M) -> (bool, f64) {
         let (current, sides) = (&self.current, &mut self.sides);
         let count = current.inputs.len();
-        let price = model.settings().price;
+        let penalty = model.settings().penalty;
         let mut settled = true;
         let mut worst = 0.0_f64;
         push_nodes(model, current, &mut self.scratch);
         for (index, condition) in self.conditions.iter().enumerate() {
             self.scratch[condition.node][condition.component] -= condition.sign * sides.multipliers[index];
             let value = condition.value(&current.states);
-            let (least, most) = condition.range(price);
+            let (least, most) = condition.range(penalty);
             let role = &mut sides.roles[index];
             match *role {
                 Role::Held => worst = larger(worst, value.abs() * (most - least)),
                 Role::Least if value < 0.0 => (*role, settled) = (Role::Held, false),
-                Role::Price if value > 0.0 => (*role, settled) = (Role::Held, false),
-                Role::Least | Role::Price => {}
+                Role::Penalty if value > 0.0 => (*role, settled) = (Role::Held, false),
+                Role::Least | Role::Penalty => {}
             }
         }
         let mut worsts = [worst; NX];
@@ -182,7 +182,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Takes the whole step; returns whether a limit or condition changed sides.
     pub(crate) fn step_sides(&mut self, model: &M, stiffness: f64) -> bool {
         let ranges = model.input_ranges();
-        let price = model.settings().price;
+        let penalty = model.settings().penalty;
         let (current, sides, sweep) = (&mut self.current, &mut self.sides, &self.newton.sweep);
         let mut changed = false;
         for (state, step) in current.states.iter_mut().zip(&sweep.states) {
@@ -202,12 +202,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             if sides.roles[index] != Role::Held {
                 continue;
             }
-            let (least, most) = condition.range(price);
+            let (least, most) = condition.range(penalty);
             let moved = sides.multipliers[index] - stiffness * condition.value(&current.states);
             (sides.roles[index], sides.multipliers[index]) = if moved < least {
                 (Role::Least, least)
             } else if moved > most {
-                (Role::Price, most)
+                (Role::Penalty, most)
             } else {
                 (Role::Held, moved)
             };
@@ -219,7 +219,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Gives limits and conditions the slacks and multipliers of the barrier method; returns the residual with them.
     pub(crate) fn settle(&mut self, model: &M) -> Residual {
         let ranges = model.input_ranges();
-        let price = model.settings().price;
+        let penalty = model.settings().penalty;
         let (current, sides) = (&mut self.current, &self.sides);
         for (k, places) in sides.places.iter().enumerate() {
             let inputs = &mut current.inputs[k];
@@ -249,7 +249,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let value = condition.value(&current.states);
             let multiplier = sides.multipliers[index];
             current.elastics[index] =
-                Elastic::settled(value, multiplier, condition.equality, price, LAST_BARRIER);
+                Elastic::settled(value, multiplier, condition.equality, penalty, LAST_BARRIER);
         }
         self.residual(model)
     }

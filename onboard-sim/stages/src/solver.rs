@@ -23,7 +23,7 @@ const RAISES: u32 = 4;
 const LONGER: usize = 10;
 
 /// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between limits.
-const JAMMED: f64 = 0.1;
+const STEP_FRACTION_MIN: f64 = 0.1;
 
 /// A barrier problem is solved when its residual is at most this multiple of the barrier.
 const BARRIER_TOLERANCE: f64 = 30.0;
@@ -122,13 +122,13 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 self.current.roll_out(model);
             }
             outcome.miss = self.current.worst_violation(&self.conditions);
-            let price = self.current.price(model, &self.conditions);
-            if best.is_none_or(|(_, least)| price < least) && price.is_finite() {
-                best = Some((outcome, price));
+            let merit = self.current.merit(model, &self.conditions);
+            if best.is_none_or(|(_, least)| merit < least) && merit.is_finite() {
+                best = Some((outcome, merit));
                 core::mem::swap(&mut self.current, &mut self.other);
             }
         }
-        let Some((best, price)) = best else {
+        let Some((best, merit)) = best else {
             core::mem::swap(&mut self.current, &mut self.other);
             return SolveEnd { iterations, sweeps, ..SolveEnd::BAD };
         };
@@ -143,7 +143,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             iterations += again.iterations;
             sweeps += again.sweeps;
             again.miss = self.current.worst_violation(&self.conditions);
-            if again.status == Status::Converged && self.current.price(model, &self.conditions) <= price {
+            if again.status == Status::Converged && self.current.merit(model, &self.conditions) <= merit {
                 return SolveEnd { iterations, sweeps, ..again };
             }
         }
@@ -191,8 +191,9 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
             let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
             let fractions = self.newton.fractions(model, &self.current, kept);
-            let jammed =
-                raises == 0 && barrier < RAISED_BARRIER && fractions.primal.min(fractions.dual) < JAMMED;
+            let jammed = raises == 0
+                && barrier < RAISED_BARRIER
+                && fractions.primal.min(fractions.dual) < STEP_FRACTION_MIN;
             if jammed || !self.advance(model, barrier, fractions, residual.infeasibility) {
                 if raises >= RAISES {
                     break Status::Stalled;
@@ -281,7 +282,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 }
 
 // The Lagrangian of a problem at the solution of another problem. By the envelope theorem, its derivative by a
-// parameter of dynamics, cost or conditions equals the derivative of the optimal price.
+// parameter of dynamics, cost or conditions equals the derivative of the optimal merit.
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Cost, plus costates times the defects of the dynamics, minus the conditions times their multipliers, at a

@@ -31,9 +31,9 @@ pub(crate) fn cold<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model.guess(index, &mut start.states, &mut start.inputs);
     start.costates.fill([0.0; NX]);
     start.centre_limits(model, barrier);
-    let price = model.settings().price;
+    let penalty = model.settings().penalty;
     for (elastic, condition) in start.elastics.iter_mut().zip(conditions) {
-        *elastic = Elastic::central(condition.value(&start.states), condition.equality, price, barrier);
+        *elastic = Elastic::central(condition.value(&start.states), condition.equality, penalty, barrier);
     }
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn warm<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     start: &mut Iterate<M, NX, NU>,
 ) -> bool {
     let ranges = model.input_ranges();
-    let price = model.settings().price;
+    let penalty = model.settings().penalty;
     let count = model.intervals();
     start.states[0] = model.initial();
     for (inputs, from) in start.inputs.iter_mut().zip(warm.inputs) {
@@ -78,7 +78,7 @@ pub(crate) fn warm<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     let known = known.map(|value| if value.is_finite() { *value } else { 0.0 });
     for ((elastic, condition), multiplier) in start.elastics.iter_mut().zip(conditions).zip(known) {
         let value = condition.value(&start.states);
-        *elastic = Elastic::warm(value, multiplier, condition.equality, price, barrier);
+        *elastic = Elastic::warm(value, multiplier, condition.equality, penalty, barrier);
     }
     complete
 }
@@ -142,8 +142,8 @@ pub struct Outcome {
     pub factorisations: u32,
     /// The cost without penalties. If it is not finite, nothing else of the path is usable.
     pub cost: f64,
-    /// The cost plus the price of every broken condition.
-    pub price: f64,
+    /// The cost plus the penalty of every broken condition.
+    pub merit: f64,
     /// Largest component of the Lagrangian's gradient by states and inputs.
     pub stationarity: f64,
     /// Largest defect of the dynamics or product of a slack and its multiplier.
@@ -217,7 +217,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             iterations,
             factorisations: sweeps,
             cost,
-            price: current.price(model, &self.conditions),
+            merit: current.merit(model, &self.conditions),
             stationarity: residual.stationarity,
             feasibility: residual.defect.max(residual.complementarity(0.0)),
             miss: current.worst_violation(&self.conditions),

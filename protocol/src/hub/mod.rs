@@ -29,7 +29,7 @@ const MAX_STREAMS: usize = 8;
 
 /// Something that happened on a link.
 #[derive(Debug, Clone, PartialEq)]
-pub enum News {
+pub enum LinkEvent {
     /// A valid frame that was not heard before.
     Frame(Frame),
     /// A frame that had already arrived over another link.
@@ -40,7 +40,7 @@ pub enum News {
     /// (`transport::TransportSender::believe`).
     Believed(Origin),
     /// The link does not answer some senders; the text says how many.
-    Strangers(String),
+    UnknownSenders(String),
     /// The link works; the text names the peer.
     Up(String),
     /// The link does not work; the text says why.
@@ -117,14 +117,14 @@ impl HubLink {
                 }
                 return Taken::Nothing;
             }
-            Received::Strangers(words) => return Taken::News(News::Strangers(words)),
+            Received::UnknownSenders(words) => return Taken::LinkEvent(LinkEvent::UnknownSenders(words)),
             Received::Up(peer) => {
                 self.trouble = None;
-                return Taken::News(News::Up(peer));
+                return Taken::LinkEvent(LinkEvent::Up(peer));
             }
             Received::Down(why) => {
                 self.trouble = Some(why.clone());
-                return Taken::News(News::Down(why));
+                return Taken::LinkEvent(LinkEvent::Down(why));
             }
         };
         let frames: Vec<Frame> = core::iter::from_fn(|| framer.next_frame()).collect();
@@ -137,7 +137,7 @@ impl HubLink {
 
 enum Taken {
     Nothing,
-    News(News),
+    LinkEvent(LinkEvent),
     Frames(Vec<Frame>, Origin),
 }
 
@@ -175,34 +175,34 @@ impl Hub {
 
     /// Takes what a link received. `clock` is the wall clock as a timestamp ([`crate::signing::stamp_of`]), which
     /// only signatures need. An unknown link number is ignored.
-    pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<News> {
+    pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<LinkEvent> {
         let Some(of) = self.links.get_mut(link) else { return Vec::new() };
         let (frames, origin) = match of.take(received, now) {
             Taken::Nothing => return Vec::new(),
-            Taken::News(news) => return vec![news],
+            Taken::LinkEvent(news) => return vec![news],
             Taken::Frames(frames, origin) => (frames, origin),
         };
-        let mut news: Vec<News> =
+        let mut news: Vec<LinkEvent> =
             frames.into_iter().map(|frame| self.judge(link, frame, now, clock)).collect();
         if news.iter().any(|news| self.proves_its_sender(news)) {
-            news.insert(0, News::Believed(origin));
+            news.insert(0, LinkEvent::Believed(origin));
         }
         news
     }
 
     /// With a key the frame must be signed: a radio's report is accepted unsigned, and anybody can forge one.
-    fn proves_its_sender(&self, news: &News) -> bool {
+    fn proves_its_sender(&self, news: &LinkEvent) -> bool {
         match news {
-            News::Frame(frame) | News::Copy(frame) => self.signing.is_none() || frame.is_signed(),
+            LinkEvent::Frame(frame) | LinkEvent::Copy(frame) => self.signing.is_none() || frame.is_signed(),
             _ => false,
         }
     }
 
-    fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> News {
+    fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> LinkEvent {
         if let Some(signing) = &mut self.signing
             && let Err(rejection) = signing.check(&frame, clock)
         {
-            return News::Rejected(frame, rejection);
+            return LinkEvent::Rejected(frame, rejection);
         }
         if frame.message_id() == RADIO_STATUS_ID
             && frame.source() == RADIO
@@ -216,9 +216,9 @@ impl Hub {
         let operator = self.signing.as_ref().map_or(0, |signing| signing.operator_of(&frame));
         if self.duplicates.is_copy(&frame, operator, link, now) {
             self.links[link].copies += 1;
-            return News::Copy(frame);
+            return LinkEvent::Copy(frame);
         }
-        News::Frame(frame)
+        LinkEvent::Frame(frame)
     }
 
     /// Returns the bytes of a frame for one link; with a key they are signed for this link alone.
@@ -299,7 +299,7 @@ pub enum Received {
     Silence(StreamId),
     Gone(StreamId),
     /// The link does not answer some senders; the text says how many. It comes at most once in ten seconds.
-    Strangers(String),
+    UnknownSenders(String),
     /// The link works; the text names the peer.
     Up(String),
     /// The link does not work; the text says why. The transport tries again.
@@ -312,7 +312,7 @@ impl Received {
         match self {
             Self::Datagram { from, .. } => Some(Origin::Datagram(*from)),
             Self::Stream(id, _) | Self::Silence(id) => Some(Origin::Stream(*id)),
-            Self::Gone(_) | Self::Strangers(_) | Self::Up(_) | Self::Down(_) => None,
+            Self::Gone(_) | Self::UnknownSenders(_) | Self::Up(_) | Self::Down(_) => None,
         }
     }
 }

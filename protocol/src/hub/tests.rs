@@ -23,8 +23,8 @@ fn datagram_of(bytes: Vec<u8>) -> Received {
 }
 
 /// The news about frames, without the news about who sent them.
-fn of_frames(news: Vec<News>) -> Vec<News> {
-    news.into_iter().filter(|news| !matches!(news, News::Believed(_))).collect()
+fn of_frames(news: Vec<LinkEvent>) -> Vec<LinkEvent> {
+    news.into_iter().filter(|news| !matches!(news, LinkEvent::Believed(_))).collect()
 }
 
 fn ms(milliseconds: u64) -> Duration {
@@ -50,7 +50,7 @@ fn over_two_lossy_links_every_frame_is_passed_on_once() {
     arrivals.sort_by_key(|(at, link, _)| (*at, *link));
     for (at, link, frame) in arrivals {
         for news in hub.take(link, datagram(frame), ms(at), CLOCK) {
-            if let News::Frame(frame) = news {
+            if let LinkEvent::Frame(frame) = news {
                 heard.push(frame.sequence());
             }
         }
@@ -68,9 +68,9 @@ fn streams_of_one_link_are_framed_separately() {
     let (head, tail) = frames[0].as_bytes().split_at(9);
     assert!(hub.take(0, Received::Stream(1, head.to_vec()), ms(0), 0).is_empty());
     let other = hub.take(0, Received::Stream(2, frames[1].as_bytes().to_vec()), ms(1), 0);
-    assert_eq!(of_frames(other), [News::Frame(frames[1].clone())]);
+    assert_eq!(of_frames(other), [LinkEvent::Frame(frames[1].clone())]);
     let rest = hub.take(0, Received::Stream(1, tail.to_vec()), ms(2), 0);
-    assert_eq!(of_frames(rest), [News::Frame(frames[0].clone())]);
+    assert_eq!(of_frames(rest), [LinkEvent::Frame(frames[0].clone())]);
     hub.take(0, Received::Gone(1), ms(3), 0);
     assert_eq!(hub.links()[0].framing().frames, 2, "the frames of an ended stream still count");
     for stream in 0..100 {
@@ -86,13 +86,13 @@ fn a_forged_frame_does_not_hide_the_true_one() {
     let frame = &beats(1)[0];
     // The forger knows sequence number, message and checksum, but not the key.
     let rejected = far.take(0, datagram(frame), ms(0), CLOCK);
-    assert_eq!(rejected, [News::Rejected(frame.clone(), Rejection::Unsigned)]);
+    assert_eq!(rejected, [LinkEvent::Rejected(frame.clone(), Rejection::Unsigned)]);
     let bytes: Vec<Vec<u8>> = (0..2).map(|link| near.bytes_for(link, frame, CLOCK)).collect();
     let first = far.take(0, datagram_of(bytes[0].clone()), ms(1), CLOCK);
-    assert!(matches!(&first[..], [News::Believed(_), News::Frame(_)]));
+    assert!(matches!(&first[..], [LinkEvent::Believed(_), LinkEvent::Frame(_)]));
     let second = far.take(1, datagram_of(bytes[1].clone()), ms(2), CLOCK);
     assert!(
-        matches!(&second[..], [News::Believed(_), News::Copy(_)]),
+        matches!(&second[..], [LinkEvent::Believed(_), LinkEvent::Copy(_)]),
         "it is signed for the other link and still the same frame"
     );
     assert_eq!(far.signing().map(|counters| (counters.accepted, counters.unsigned)), Some((2, 1)));
@@ -117,7 +117,7 @@ fn trouble_is_reported_until_the_link_works_again() {
 /// Returns the senders that are accepted after one datagram with these bytes.
 fn believed(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
     let origin = |news| match news {
-        News::Believed(origin) => Some(origin),
+        LinkEvent::Believed(origin) => Some(origin),
         _ => None,
     };
     hub.take(0, datagram_of(bytes), ms(0), CLOCK).into_iter().filter_map(origin).collect()
@@ -155,7 +155,7 @@ fn nobody_turns_another_one_s_frame_into_a_copy() {
     let take = |hub: &mut Hub, link: usize, frame: Frame| {
         hub.take(link, Received::Stream(0, frame.as_bytes().to_vec()), Duration::ZERO, 6_000_000)
     };
-    let seen = |news: &[News]| news.iter().filter(|news| matches!(news, News::Frame(_))).count();
+    let seen = |news: &[LinkEvent]| news.iter().filter(|news| matches!(news, LinkEvent::Frame(_))).count();
     let id = observer.link_id(0);
     let forged = take(&mut hub, 0, observer.sign(&abort, id, 6_000_000));
     let (first, second) = (ann.link_id(1), ann.link_id(0));

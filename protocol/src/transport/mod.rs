@@ -56,7 +56,7 @@ impl TransportSender {
         queued
     }
 
-    /// Tells the link that a frame of this sender was accepted ([`crate::hub::News::Believed`]). Only then is the
+    /// Tells the link that a frame of this sender was accepted ([`crate::hub::LinkEvent::Believed`]). Only then is the
     /// sender answered and protected from being displaced by other senders.
     pub fn believe(&self, origin: Origin) {
         // When the queue is full, the sender's next frame repeats this.

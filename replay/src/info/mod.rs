@@ -44,7 +44,7 @@ pub fn info_of<R: Read>(
     log: &mut FlightLog<R>,
     summary: impl FnOnce() -> Option<SummaryFacts>,
 ) -> Result<Info, LogError> {
-    let mut seen = Seen::default();
+    let mut seen = IndexTotals::default();
     while let Some(stamped) = log.next_entry()? {
         seen.channels.count(&stamped);
         seen.span = Some(match seen.span {
@@ -66,7 +66,7 @@ pub fn info_of<R: Read>(
 
 /// Facts collected while the log is read.
 #[derive(Default)]
-struct Seen {
+struct IndexTotals {
     channels: ChannelCounter,
     flights: Flights,
     span: Option<(u64, u64)>,
@@ -80,7 +80,7 @@ struct Seen {
     unreadable: Option<String>,
 }
 
-impl Seen {
+impl IndexTotals {
     fn take(&mut self, entry: Entry, record: u32) {
         match entry {
             Entry::Telemetry(telemetry) => {

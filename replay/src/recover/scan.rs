@@ -63,13 +63,13 @@ pub(super) struct Contents {
     pub(super) lost: Vec<LostStretch>,
     /// The end mark is there.
     pub(super) ended: bool,
-    pub(super) told: Told,
+    pub(super) told: WriterReport,
 }
 
 /// What the summary behind the end mark tells, as far as it can be read. Its own index is not used: bytes that were lost
 /// have shifted it.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct WriterReport {
     pub(super) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(super) channels: BTreeMap<u16, Channel>,
     /// Where each chunk began, its length and its name.
@@ -192,8 +192,8 @@ impl Records {
     }
 
     /// What is told from here to the footer, or to the first record that makes no sense.
-    fn told(&mut self, from_byte: u64) -> Result<Told, LogError> {
-        let mut told = Told::default();
+    fn told(&mut self, from_byte: u64) -> Result<WriterReport, LogError> {
+        let mut told = WriterReport::default();
         let mut checksum = crc32fast::Hasher::new();
         let mut at = from_byte;
         while self.begins_record(at)? {

@@ -8,7 +8,7 @@ use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 
-use super::scan::Told;
+use super::scan::WriterReport;
 use super::{RecoverError, Recovery};
 use crate::output::{Destination, NewFile};
 
@@ -20,7 +20,7 @@ type Writer = mcap::Writer<BufWriter<NewFile>>;
 pub(super) struct Rescue<'a> {
     path: PathBuf,
     /// What the file's own summary tells of its channels, for messages whose channel record is lost.
-    told: &'a Told,
+    told: &'a WriterReport,
     /// Created when the library's name is known, which is the first record of a file.
     state: State,
     /// The file's schemas and channels by their numbers there.
@@ -44,7 +44,7 @@ impl<'a> Rescue<'a> {
     pub(super) fn create(
         destination: Destination,
         input: &Path,
-        told: &'a Told,
+        told: &'a WriterReport,
     ) -> Result<Self, RecoverError> {
         let path = destination.path;
         let file = NewFile::create(destination, input)

@@ -53,7 +53,7 @@ pub(super) struct Plant {
 
 /// What the flight computer estimated and decided at a planning frame.
 #[derive(Debug, Clone)]
-pub(super) struct Thought {
+pub(super) struct Decision {
     /// The estimated state.
     pub(super) sample: Sample,
     /// The index of the control level.
@@ -158,7 +158,7 @@ pub(super) struct Flight {
     pub(super) in_space: Option<InSpace>,
     pub(super) plant: Vec<Plant>,
     /// At the planning frames.
-    pub(super) thoughts: Vec<Thought>,
+    pub(super) thoughts: Vec<Decision>,
     /// The state at contact.
     pub(super) contact: Option<[f64; 6]>,
     pub(super) gimbal: Vec<GimbalAxis>,
@@ -230,7 +230,7 @@ impl Flight {
         let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));
         let world = &recording.world;
         let plant: Vec<Plant> = world.iter().map(|sample| plant(sample, &recording.frames, &plane)).collect();
-        let thoughts: Vec<Thought> = again.iter().map(|frame| thought(frame, world, &plane)).collect();
+        let thoughts: Vec<Decision> = again.iter().map(|frame| thought(frame, world, &plane)).collect();
         let known = |samples: Vec<Sample>| Some(samples).filter(|samples| !samples.is_empty());
         let of_plant = known(plant.iter().map(|plant| plant.sample).collect());
         let (teller, track) = match (of_plant, known(thoughts.iter().map(|thought| thought.sample).collect()))
@@ -457,7 +457,7 @@ fn gimbal(name: &'static str, axis: usize, world: &[flight_v1::TruthSample]) -> 
     }
 }
 
-fn thought(frame: &Again, world: &[flight_v1::TruthSample], plane: &Plane) -> Thought {
+fn thought(frame: &Again, world: &[flight_v1::TruthSample], plane: &Plane) -> Decision {
     let place = world.partition_point(|sample| sample.time_s < frame.time_s - SAME_MOMENT_S);
     // The feet are below the centre of gravity, as in the record of the world.
     let feet_below_m = world.get(place).map_or(0.0, |sample| sample.state.position_m.z - sample.height_m);
@@ -465,7 +465,7 @@ fn thought(frame: &Again, world: &[flight_v1::TruthSample], plane: &Plane) -> Th
         in_plane(plane, &estimate.state, estimate.state.position_m.z - feet_below_m)
     });
     let plan = frame.plan.as_ref().map(|(report, ..)| report);
-    Thought {
+    Decision {
         sample: Sample { time_s: frame.time_s, phase: phase_of(frame.phase), state },
         level: plan.map_or(u32::from(ControlLevel::Idle.index()), |_| frame.level),
         iterations: plan.map_or(0, |report| report.iterations),

@@ -271,7 +271,7 @@ pub struct Row {
 pub struct TableReader {
     shapes: Vec<TableShape>,
     /// By channel; `None` for records that are not ours.
-    channels: BTreeMap<u16, Option<Known>>,
+    channels: BTreeMap<u16, Option<OpenTable>>,
     /// The tables of MAVLink messages.
     messages: BTreeMap<(Address, u32), usize>,
     limits: Option<usize>,
@@ -279,7 +279,7 @@ pub struct TableReader {
 }
 
 /// The known structure of a channel's records.
-struct Known {
+struct OpenTable {
     table: usize,
     descriptor: MessageDescriptor,
     places: Vec<Place>,
@@ -385,12 +385,12 @@ impl TableReader {
                         shapes.push(shape);
                         shapes.len() - 1
                     });
-                    Some(Known { table, descriptor, places })
+                    Some(OpenTable { table, descriptor, places })
                 });
                 entry.insert(known)
             }
         };
-        let Known { table, descriptor, places } = known.as_ref()?;
+        let OpenTable { table, descriptor, places } = known.as_ref()?;
         let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
         let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
         let flight_time = match &stamped.entry {

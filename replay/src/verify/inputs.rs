@@ -32,11 +32,11 @@ const ROUNDING_S: f64 = 1e-3;
 /// What is looked at from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Inputs {
-    last: Option<Seen>,
+    last: Option<LastInput>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct LastInput {
     frame: u64,
     in_flight: bool,
     pin_out: bool,
@@ -49,7 +49,7 @@ struct Seen {
 impl Inputs {
     /// Why the input cannot be; `None` if it can.
     pub(super) fn judge(&mut self, input: &ComputerInput, in_flight: bool) -> Option<String> {
-        let now = Seen {
+        let now = LastInput {
             frame: input.frame,
             in_flight,
             pin_out: input.pin_out,
@@ -126,7 +126,7 @@ fn known(Estimate { state, .. }: &Estimate) -> Option<String> {
         .or_else(|| vector("rate, rad/s,", rate_rad_s, RATE_MAX_RAD_S))
 }
 
-fn out_of_order(before: &Seen, now: &Seen) -> Option<String> {
+fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {
     let passed_s = now.frame.saturating_sub(before.frame) as f64 * FRAME_S;
     // An age grows with the time, or begins anew with what is heard.
     let aged = |what: &str, then: Option<f64>, now: Option<f64>| {

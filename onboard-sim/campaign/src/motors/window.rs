@@ -82,8 +82,8 @@ impl<'a> Onset<'a> {
         let sound =
             settings.impulse_scales.iter().chain(&settings.burn_time_scales).all(|scale| *scale > 0.05);
         let room_m = 2.0 * scatter * self.igniter_s * speed_m_s;
-        let outlook = || settings.outlook(&self.column, self.curve, 0.0, -speed_m_s, 0.0);
-        sound && outlook().common.is_some_and(|common| common.high_m - common.low_m >= room_m)
+        let prediction = || settings.prediction(&self.column, self.curve, 0.0, -speed_m_s, 0.0);
+        sound && prediction().common.is_some_and(|common| common.high_m - common.low_m >= room_m)
     }
 
     /// The largest scatter that one ignition height suits at a speed, m/s; 0 if even none is too much.
@@ -96,7 +96,7 @@ impl<'a> Onset<'a> {
 
     /// Height of the feet at which guidance lets the thrust begin, m, at a speed, m/s.
     pub(crate) fn chosen_m(&self, speed_m_s: f64) -> Option<f64> {
-        self.settings.outlook(&self.column, self.curve, 0.0, -speed_m_s, 0.0).chosen_m
+        self.settings.prediction(&self.column, self.curve, 0.0, -speed_m_s, 0.0).chosen_m
     }
 
     /// The window at a speed, m/s; `None` if no landing exists.

@@ -16,8 +16,8 @@ import numpy as np
 import landing
 from result import MOST_ITERATIONS
 
-# Curvature of the price, which the QP wants, cost units per square metre; smaller ones fail more often.
-PRICE_CURVATURE = 10.0
+# Curvature of the penalty, which the QP wants, cost units per square metre; smaller ones fail more often.
+PENALTY_CURVATURE = 10.0
 
 # Gauss-Newton steps converge slowly, where they do.
 MOST_GAUSS_NEWTON_ITERATIONS = 200
@@ -82,13 +82,13 @@ def problem(kind):
     model.disc_dyn_expr = landing.STEP(state, gimbal)
     ocp.model = model
     ocp.dims.N = landing.HORIZON
-    _price(ocp)
+    _penalty(ocp)
     _limit(ocp, kind)
     _options(ocp.solver_options, kind)
     return ocp
 
 
-def _price(ocp):
+def _penalty(ocp):
     """The running cost. The start costs nothing, the end costs a whole step: a sum over the ends of the intervals."""
     weights, target = np.diag(landing.STATE_WEIGHTS), landing.TARGET
     cost = ocp.cost
@@ -109,10 +109,10 @@ def _limit(ocp, kind):
     limits.lbu, limits.ubu = np.array([-landing.GIMBAL_LIMIT_RAD]), np.array([landing.GIMBAL_LIMIT_RAD])
     limits.idxbx_e = np.array([X, Z])
     limits.lbx_e, limits.ubx_e = np.array([-landing.X_FINAL_M, 0.0]), np.array([landing.X_FINAL_M, 0.0])
-    if kind.problem == landing.PRICED:
+    if kind.problem == landing.SOFT:
         limits.idxsbx_e = np.array([1])
-        cost.zl_e = cost.zu_e = np.array([landing.PRICE_PER_M])
-        cost.Zl_e = cost.Zu_e = np.array([PRICE_CURVATURE])
+        cost.zl_e = cost.zu_e = np.array([landing.PENALTY_PER_M])
+        cost.Zl_e = cost.Zu_e = np.array([PENALTY_CURVATURE])
 
 
 def _options(options, kind):

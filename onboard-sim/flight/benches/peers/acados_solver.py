@@ -88,7 +88,7 @@ class Acados:
             if k < intervals:
                 solver.set(k, "u", np.array([plan.inputs[k]]))
                 solver.set(k, "pi", plan.dynamics[k] if with_multipliers else np.zeros(6))
-        if self.problem == landing.PRICED:
+        if self.problem == landing.SOFT:
             for slack in ("sl", "su"):
                 solver.set(intervals, slack, np.zeros(1))
 
@@ -135,10 +135,10 @@ class Acados:
 
     def warm(self, samples, start, retry=False):
         """Solves what is left some samples after the plan began, from the plan shifted and rolled out from where the
-        vehicle is; with `retry`, without multipliers. A single iteration of the priced problem is nearer the optimum from
+        vehicle is; with `retry`, without multipliers. A single iteration of the soft problem is nearer the optimum from
         the plan as it is; with a hard end height every fifth QP then has no solution."""
         rest = self.plan.rest(samples)
-        if not (self.kind.rti and self.problem == landing.PRICED):
+        if not (self.kind.rti and self.problem == landing.SOFT):
             rest.states = rollout.states(start, rest.inputs)
         return self.solve(start, rest, not retry)
 
@@ -153,7 +153,7 @@ def entrants(folder, wheel_folder):
     os.makedirs(folder, exist_ok=True)
     os.chdir(folder)  # acados writes into the working directory
     made = []
-    for problem in (landing.HARD, landing.PRICED):
+    for problem in (landing.HARD, landing.SOFT):
         model = None
         for rti, exact, full in itertools.product((False, True), (True, False), (False, True)):
             entrant = Acados(acados_problem.Kind(problem, rti, exact, full), folder, model)

@@ -16,12 +16,12 @@ KICKS = range(1, 49, 6)
 def jobs(solvers, folder):
     """(solver, which problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold
     and the kicked solves are compiled with more effort, and first."""
-    for problem in (landing.HARD, landing.PRICED):
+    for problem in (landing.HARD, landing.SOFT):
         for samples in (0, *KICKS):
             yield from (_plane(solver, problem, landing.HORIZON - samples, folder) for solver in solvers)
     for intervals in range(landing.HORIZON - 1, 0, -1):
         if landing.HORIZON - intervals not in KICKS:
-            for problem in (landing.HARD, landing.PRICED):
+            for problem in (landing.HARD, landing.SOFT):
                 yield from (_plane(solver, problem, intervals, folder) for solver in solvers)
     for intervals in space_measure.HORIZONS:
         for solver in solvers:

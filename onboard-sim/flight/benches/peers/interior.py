@@ -145,5 +145,5 @@ def entrants(solver, folder):
     package = os.path.dirname(ca.__file__)
     numbered = sorted(glob.glob(os.path.join(package, f"lib{solver}.so.*")), key=len)
     number = numbered[-1].split(".so.")[1] if numbered else "of unknown version"
-    made = [Interior(solver, problem, folder) for problem in (landing.HARD, landing.PRICED)]
+    made = [Interior(solver, problem, folder) for problem in (landing.HARD, landing.SOFT)]
     return f"{solver} {number} in casadi {ca.__version__}", made

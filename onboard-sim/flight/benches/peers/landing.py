@@ -1,9 +1,9 @@
 """The landing paper's problem as a CasADi NLP, compiled to C.
 
-Variables are ordered by stage: (u_0, x_1, u_1, x_2, ..., u_{N-1}, x_N), and for the priced problem two slacks; the start
+Variables are ordered by stage: (u_0, x_1, u_1, x_2, ..., u_{N-1}, x_N), and for the soft problem two slacks; the start
 state is a parameter. SI and radians; states are (x, z, theta, u, w, q) as in the controller.
 
-The end height is either a hard condition, z_N = 0, or priced: a miss costs 1000 a metre.
+The end height is either a hard condition, z_N = 0, or soft: a miss costs 1000 a metre.
 """
 
 import math
@@ -22,9 +22,9 @@ GIMBAL_LIMIT_RAD = math.radians(20.0)
 X_FINAL_M = 20.0
 TOLERANCE = 1e-6
 
-HARD, PRICED = "hard", "priced"
+HARD, SOFT = "hard", "soft"
 # Of a metre of missed end height, cost units.
-PRICE_PER_M = 1000.0
+PENALTY_PER_M = 1000.0
 
 
 def step_function():
@@ -57,7 +57,7 @@ STEP = step_function()
 
 def slacks(problem):
     """Number of variables after the path: the miss of the end height, above and below."""
-    return 2 if problem == PRICED else 0
+    return 2 if problem == SOFT else 0
 
 
 def nlp(intervals, problem):
@@ -69,8 +69,8 @@ def nlp(intervals, problem):
     weighted = ca.mtimes(ca.diag(ca.DM(STATE_WEIGHTS)), misses)
     cost = STEP_S * 0.5 * (ca.dot(misses, weighted) + INPUT_WEIGHT * ca.dot(gimbals, gimbals))
     equations = [ca.vec(gaps)]
-    if problem == PRICED:
-        cost += PRICE_PER_M * ca.sum1(miss)
+    if problem == SOFT:
+        cost += PENALTY_PER_M * ca.sum1(miss)
         equations.append(after[1, -1] - miss[0] + miss[1])
     return {"x": ca.vertcat(ca.vec(path), miss), "p": start, "f": cost, "g": ca.vertcat(*equations)}
 

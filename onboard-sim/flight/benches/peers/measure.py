@@ -1,6 +1,6 @@
 """Runs the entrants on the same problems, taking turns, and flies every answer again.
 
-An entrant is `ours.Ours` or a `worker.Entrant`. Entrants of the hard and of the priced problem take turns, too.
+An entrant is `ours.Ours` or a `worker.Entrant`. Entrants of the hard and of the soft problem take turns, too.
 """
 
 import dataclasses
@@ -126,7 +126,7 @@ def _ours(records, problem):
 
 def adopt(records, start):
     """Gives every entrant the same landing as its plan; its states and inputs."""
-    best = _ours(records, landing.PRICED).cold_both(start)
+    best = _ours(records, landing.SOFT).cold_both(start)
     nodes = rollout.states(start, best.inputs)
     for record in records:
         if isinstance(record.entrant, Ours):

@@ -7,8 +7,8 @@ import numpy as np
 import landing
 from result import BENDS_RAD, Result
 
-# With this price a condition whose multiplier is smaller holds exactly, so it is a hard one; per metre.
-HARD_PRICE_PER_M = landing.PRICE_PER_M
+# With this penalty a condition whose multiplier is smaller holds exactly, so it is a hard one; per metre.
+HARD_PENALTY_PER_M = landing.PENALTY_PER_M
 
 # Iterations of a solve that is not to be stopped, as in the profile.
 MOST_ITERATIONS = 60
@@ -25,7 +25,7 @@ class Ours:
     def __init__(self, program, problem):
         self.problem, self.status = problem, None
         self.process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
-        self._ask("price", landing.PRICE_PER_M if problem == landing.PRICED else HARD_PRICE_PER_M)
+        self._ask("penalty", landing.PENALTY_PER_M if problem == landing.SOFT else HARD_PENALTY_PER_M)
 
     def _ask(self, *words):
         line = " ".join(repr(float(w)) if isinstance(w, float) else str(w) for w in words)

@@ -15,7 +15,7 @@ BENDS_RAD = (0.3, -0.3)
 
 @dataclasses.dataclass
 class Result:
-    """One solve. `cost` is the running cost that the solver claims, without the price of a miss; inputs in rad."""
+    """One solve. `cost` is the running cost that the solver claims, without the penalty of a miss; inputs in rad."""
 
     converged: bool
     ns: int

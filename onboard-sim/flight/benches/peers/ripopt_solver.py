@@ -95,7 +95,7 @@ class Solver:
     def __init__(self, ripopt, bridge, functions, intervals, problem, how):
         self.ripopt, self.functions, self.intervals = ripopt, functions, intervals
         lower, upper = (np.clip(bound, -INFINITE, INFINITE) for bound in landing.bounds(intervals, problem))
-        self.variables, self.equations = len(lower), 6 * intervals + (1 if problem == landing.PRICED else 0)
+        self.variables, self.equations = len(lower), 6 * intervals + (1 if problem == landing.SOFT else 0)
         zeros = np.zeros(self.equations)
         nonzeros = [len(functions.sparsity[name][0]) for name in ("jac_g", "hess_l")]
         callbacks = [ctypes.cast(getattr(bridge, f"bridge_{name}"), ctypes.c_void_p) for name in CALLBACKS]
@@ -199,4 +199,4 @@ def entrants(library, bridge, folder):
     number = (ctypes.c_int(), ctypes.c_int(), ctypes.c_int())
     ripopt.ripopt_get_version(*map(ctypes.byref, number))
     version = ".".join(str(part.value) for part in number)
-    return f"ripopt {version}", [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.PRICED)]
+    return f"ripopt {version}", [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.SOFT)]

@@ -44,11 +44,11 @@ def states(start, inputs):
 
 @dataclasses.dataclass
 class Flown:
-    """What the inputs do: running cost, cost with the price of the missed end height, height at the end in m, and the
+    """What the inputs do: running cost, cost with the penalty of the missed end height, height at the end in m, and the
     largest component of the projected gradient by the inputs, in the problem's own units."""
 
     cost: float
-    price: float
+    merit: float
     z_m: float
     gradient: float
 
@@ -58,18 +58,18 @@ class Flown:
 
     def worth(self, problem):
         """What the problem minimises."""
-        return self.price if problem == landing.PRICED else self.cost
+        return self.merit if problem == landing.SOFT else self.cost
 
     def confirms(self, solved, problem):
         """Whether a converged answer does what it claims."""
         as_claimed = abs(self.cost - solved.cost) <= COST_SHARE * max(1.0, abs(self.cost))
-        return as_claimed and (problem == landing.PRICED or self.lands)
+        return as_claimed and (problem == landing.SOFT or self.lands)
 
 
 def flown(start, inputs, problem):
     """Flies inputs.
 
-    The gradient is that of the cost plus nu z_N as a function of the inputs alone; nu is the price where the priced
+    The gradient is that of the cost plus nu z_N as a function of the inputs alone; nu is the penalty where the soft
     problem's end is missed, and else the one that fits the inputs off their limits best. It comes from an adjoint
     sweep, with no solver's multipliers.
     """
@@ -88,8 +88,8 @@ def flown(start, inputs, problem):
         by_cost = a.T @ by_cost + weights * (nodes[k] - landing.TARGET)
         by_height = a.T @ by_height
     z_m = float(nodes[-1, 1])
-    if problem == landing.PRICED and abs(z_m) > LANDED_M:
-        nu = landing.PRICE_PER_M * np.sign(z_m)
+    if problem == landing.SOFT and abs(z_m) > LANDED_M:
+        nu = landing.PENALTY_PER_M * np.sign(z_m)
     else:
         free = np.abs(inputs) < landing.GIMBAL_LIMIT_RAD - ON_LIMIT_RAD
         scale = height[free] @ height[free]
@@ -99,4 +99,4 @@ def flown(start, inputs, problem):
     limit = landing.GIMBAL_LIMIT_RAD
     wrong = np.abs(inputs - np.clip(inputs - total, -limit, limit))
     running = result.cost(nodes, inputs)
-    return Flown(running, running + landing.PRICE_PER_M * abs(z_m), z_m, float(wrong.max()))
+    return Flown(running, running + landing.PENALTY_PER_M * abs(z_m), z_m, float(wrong.max()))

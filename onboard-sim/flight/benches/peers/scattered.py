@@ -33,12 +33,12 @@ def ours(own, all_starts):
         lands.append(landed)
         times.append(result.ns)
         if result.converged:
-            ends["converged to a landing" if landed else "converged, the end height missed at its price"] += 1
+            ends["converged to a landing" if landed else "converged, the end height missed at its penalty"] += 1
         else:
             ends[own.status] += 1
             if own.status != "not landable":
                 odd.append((own.status, start))
-    print(f"\n**{len(all_starts)} random cold starts, ours, priced**\n")
+    print(f"\n**{len(all_starts)} random cold starts, ours, soft**\n")
     head(["end", "starts"])
     for end, count in ends.most_common():
         row([end, str(count)])
@@ -53,7 +53,7 @@ def run(records):
     """Both tables."""
     all_starts = draws()
     own = {record.problem: record.entrant for record in records if isinstance(record.entrant, Ours)}
-    lands = ours(own[landing.PRICED], all_starts)
+    lands = ours(own[landing.SOFT], all_starts)
     few = [start for start, landed in zip(all_starts[:THEIRS], lands) if landed]
     print(f"\n**the first {len(few)} of them that ours lands, both guesses each**\n")
     head(["", "problem", "neither guess lands", "dearer than the best", "ms", "ratio"])
@@ -61,25 +61,25 @@ def run(records):
     best = [np.inf] * len(few)
     for index, start in enumerate(few):
         for record, solves in found.items():
-            price, ns = attempt(record, start)
-            best[index] = min(best[index], price)
-            solves.append((price, ns))
+            merit, ns = attempt(record, start)
+            best[index] = min(best[index], merit)
+            solves.append((merit, ns))
     for record, solves in found.items():
         base = next(each for other, each in found.items() if isinstance(other.entrant, Ours) and other.problem == record.problem)
-        failed = sum(not np.isfinite(price) for price, _ in solves)
-        worse = sum(np.isfinite(price) and dearer(price, least) for (price, _), least in zip(solves, best))
-        pairs = [(ns, own_ns) for (price, ns), (_, own_ns) in zip(solves, base) if np.isfinite(price)]
+        failed = sum(not np.isfinite(merit) for merit, _ in solves)
+        worse = sum(np.isfinite(merit) and dearer(merit, least) for (merit, _), least in zip(solves, best))
+        pairs = [(ns, own_ns) for (merit, ns), (_, own_ns) in zip(solves, base) if np.isfinite(merit)]
         time, ratio = geometric(ns for ns, _ in pairs) / NS_PER_MS, geometric(ns / own_ns for ns, own_ns in pairs)
         row([record.name, record.problem, str(failed), str(worse), number(time), number(ratio)])
 
 
 def attempt(record, start):
-    """The price of the better landing of both guesses, infinite if there is none, and the time of both."""
+    """The merit of the better landing of both guesses, infinite if there is none, and the time of both."""
     entrant = record.entrant
     if isinstance(entrant, Ours):
         results = [entrant.cold_both(start)]
     else:
         results = [entrant.cold(start, bend) for bend in BENDS_RAD]
     solves = [record.solved(start, result) for result in results]
-    prices = [s.flown.worth(record.problem) for s in solves if s.confirmed and s.flown.lands]
-    return min(prices, default=np.inf), sum(s.ns for s in solves)
+    merits = [s.flown.worth(record.problem) for s in solves if s.confirmed and s.flown.lands]
+    return min(merits, default=np.inf), sum(s.ns for s in solves)

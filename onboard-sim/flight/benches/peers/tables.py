@@ -110,7 +110,7 @@ def warm_cells(field, solves, own, counted, best=None):
 def solves(field):
     """Cold, kicked and undisturbed."""
     kicks, solvable = len(field.solvable), int(field.solvable.sum())
-    what = "z_N = 0 hard" if field.problem == landing.HARD else "z_N priced"
+    what = "z_N = 0 hard" if field.problem == landing.HARD else "z_N soft"
     print(f"\n**{what}**: ms, and ratio to ours; {solvable} of {kicks} kicks have a solution\n")
     head(["", "cold, one guess", "ratio", "cold, both", "ratio", "kicked", "ratio", "undisturbed", "ratio"])
     for record in field.records:

@@ -4,7 +4,7 @@
 //! m/s and rad/s. The problem is the landing paper's own (only distance and height are limited at the end), N = 50.
 //!
 //! ```text
-//! price PRICE              what a metre of missed end height costs from now on; a high price makes it a hard condition
+//! penalty PENALTY              what a metre of missed end height costs from now on; a high penalty makes it a hard condition
 //! cold both STATE          solve the whole horizon from the solver's own two bent guesses
 //! cold 0|1 STATE           solve it from one of them
 //! hold                     make the last solution the plan
@@ -80,11 +80,11 @@ impl Peer {
     fn answer(&mut self, line: &str) -> Result<String> {
         let mut words = line.split_whitespace();
         match words.next() {
-            Some("price") => {
-                let price = number(words.next(), "price")?;
-                self.solver.terminal_penalty = price;
-                self.space.set_price(price);
-                Ok("priced".to_owned())
+            Some("penalty") => {
+                let penalty = number(words.next(), "penalty")?;
+                self.solver.terminal_penalty = penalty;
+                self.space.set_penalty(penalty);
+                Ok("penalised".to_owned())
             }
             Some("cold") => {
                 let which = words.next().context("which guess is missing")?;
@@ -115,7 +115,7 @@ impl Peer {
             Some("space") => self.in_space(words),
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
-            _ => bail!("must start with price, cold, hold, warm, space, sweep or peak"),
+            _ => bail!("must start with penalty, cold, hold, warm, space, sweep or peak"),
         }
     }
 

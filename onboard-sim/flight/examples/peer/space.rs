@@ -44,8 +44,8 @@ impl Space {
         Self { workspace: SpaceWorkspace::default(), problem: landing(solver), plan: Plan::default() }
     }
 
-    pub(crate) fn set_price(&mut self, price: f64) {
-        self.problem.solver.terminal_penalty = price;
+    pub(crate) fn set_penalty(&mut self, penalty: f64) {
+        self.problem.solver.terminal_penalty = penalty;
     }
 
     /// Solves the whole horizon, with so much thrust over weight at its beginning.

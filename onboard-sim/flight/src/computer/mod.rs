@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
-use self::news::{MotorWatch, News, Readiness, Severity};
+use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
 use self::pilot::{Pilot, Pointed, Sensed};
@@ -459,7 +459,7 @@ pub struct Output {
     /// An answer to each request, in order.
     pub answers: Vec<Answer>,
     /// Reports, in order.
-    pub news: Vec<News>,
+    pub news: Vec<CrewMessage>,
     /// A plan was made.
     pub planned: bool,
 }

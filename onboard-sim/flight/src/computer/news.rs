@@ -27,7 +27,7 @@ pub enum Severity {
 
 /// One report of the flight computer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum News {
+pub enum CrewMessage {
     /// A message to the crew.
     Said {
         severity: Severity,
@@ -74,7 +74,7 @@ pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(
     } else {
         "ABORT: no cut-off exists; landing on the ground below"
     };
-    (after.lands_here && !before.lands_here).then_some((Severity::Critical, words))
+    (after.lands_in_place && !before.lands_in_place).then_some((Severity::Critical, words))
 }
 
 /// The failing arming check that the crew on the pad was last told of.
@@ -97,7 +97,7 @@ impl Readiness {
 
 /// The state that the crew was last told of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-struct Told {
+struct LastReported {
     status: MotorStatus,
     /// On the ground after the flight.
     landed: bool,
@@ -107,12 +107,12 @@ struct Told {
 
 /// Watches the landing motor.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct MotorWatch(Told);
+pub(super) struct MotorWatch(LastReported);
 
 impl Default for MotorWatch {
     /// A vehicle with its pin in, as it is powered up.
     fn default() -> Self {
-        Self(Told { status: MotorStatus::PinIn, landed: false, free: true })
+        Self(LastReported { status: MotorStatus::PinIn, landed: false, free: true })
     }
 }
 
@@ -120,7 +120,7 @@ impl MotorWatch {
     /// A message if the state has changed.
     pub(super) fn news(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
         use MotorStatus as M;
-        let now = Told {
+        let now = LastReported {
             status: mode.motor_status(time_s),
             landed: matches!(mode.phase, Phase::Touchdown | Phase::Safed),
             free: mode.approach_wait_s(time_s) == Some(0.0),
@@ -130,28 +130,28 @@ impl MotorWatch {
             return None;
         }
         let (severity, words) = match now {
-            Told { status: M::Live, landed: true, free: false } => {
+            LastReported { status: M::Live, landed: true, free: false } => {
                 let words = format!("LIVE MOTOR: do not approach for {MISFIRE_WAIT_S} s, then pin first");
                 return Some((Severity::Critical, words));
             }
-            Told { status: M::Live, landed: true, free: true } => {
+            LastReported { status: M::Live, landed: true, free: true } => {
                 (Severity::Critical, "LIVE MOTOR: the wait is over; put the pin in before anything else")
             }
             // All other states are told once, when the status changes.
             _ if now.status == before.status => return None,
-            Told { status: M::Hot, .. } => {
+            LastReported { status: M::Hot, .. } => {
                 return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
             }
-            Told { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
+            LastReported { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
                 (Severity::Info, "pin out: landing motor live")
             }
-            Told { status: M::Live, landed: false, .. } => {
+            LastReported { status: M::Live, landed: false, .. } => {
                 (Severity::Critical, "landing motor live: no light")
             }
-            Told { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
-            Told { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
+            LastReported { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
+            LastReported { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
             // The crew was told when the motor was commanded to light.
-            Told { status: M::Burning, .. } => return None,
+            LastReported { status: M::Burning, .. } => return None,
         };
         Some((severity, words.to_owned()))
     }

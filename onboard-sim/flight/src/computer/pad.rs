@@ -50,7 +50,7 @@ impl Stance {
 
 /// Result of one second on the pad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct Found {
+struct PadFindings {
     /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was not at rest.
     at_rest: Option<PadStart>,
     /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in the mean.
@@ -75,7 +75,7 @@ pub(super) struct PadWatch {
     pressures: u32,
     altitude_sum_m: f64,
     falling_frames: u32,
-    found: Option<Found>,
+    found: Option<PadFindings>,
 }
 
 impl PadWatch {
@@ -102,7 +102,7 @@ impl PadWatch {
         let over = core::mem::take(self);
         self.falling_frames = over.falling_frames;
         let across_m_s2 = over.force_sum_m_s2.yz().norm();
-        self.found = Some(Found {
+        self.found = Some(PadFindings {
             at_rest: over.alignment.finish(0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
@@ -280,7 +280,7 @@ impl Computer {
         arming_checks(&self.arming, &input)
     }
 
-    pub(super) fn complain_of_readiness(&mut self) {
+    pub(super) fn report_readiness_changes(&mut self) {
         if self.table.mode().phase == Phase::PadIdle
             && let Some(words) = self.readiness.news(&self.arming_checks())
         {
@@ -298,12 +298,12 @@ impl Computer {
             self.test_itself(input);
         }
         if self.rehearsed.is_some() {
-            self.complain_of_readiness();
+            self.report_readiness_changes();
         }
         match self.start_point() {
             // A drone's pilot lets go, and the fall is felt.
             StartPoint::Drone => self.wait_below_the_drone(),
-            _ if self.countdown_is_over() => self.let_go(),
+            _ if self.countdown_is_over() => self.release(),
             StartPoint::Pad => self.wait_on_the_rail(input),
             StartPoint::Apogee => {}
         }
@@ -312,7 +312,7 @@ impl Computer {
 
     /// A motor may light that nobody lit.
     fn wait_on_the_rail(&mut self, input: &Input<'_>) {
-        if self.pilot.feels_lift_off(&input.sensed) {
+        if self.pilot.detects_lift_off(&input.sensed) {
             self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
             if self.table.happen(Event::LiftOff).is_ok() {
                 self.begin_flight();
@@ -374,7 +374,7 @@ impl Computer {
     }
 
     /// The countdown has ended: the flight begins where the simulation releases the vehicle.
-    pub(super) fn let_go(&mut self) {
+    pub(super) fn release(&mut self) {
         let event = match self.start_point() {
             StartPoint::Pad => Event::CountdownElapsed,
             at => Event::ReleasedAt(at),

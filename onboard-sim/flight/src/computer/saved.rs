@@ -237,7 +237,7 @@ impl Computer {
             // The table accepts these events in this order; a test checks that.
             let _ = self.table.happen(event);
         }
-        self.let_go();
+        self.release();
         self.table.take_news();
         self.motor_watch.news(self.table.mode(), self.table.time_s());
         self.input.log = LogState { running: true, space_bytes: u64::MAX };

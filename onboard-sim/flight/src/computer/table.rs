@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use super::Computer;
-use super::news::{News, Severity, words_of, words_of_landing_here};
+use super::news::{CrewMessage, Severity, words_of, words_of_landing_here};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
 
@@ -23,7 +23,7 @@ pub struct PhaseTable {
     #[serde(skip)]
     time_s: f64,
     #[serde(skip)]
-    news: Vec<News>,
+    news: Vec<CrewMessage>,
 }
 
 impl PhaseTable {
@@ -81,14 +81,14 @@ impl PhaseTable {
             self.say(severity, words.to_owned());
         }
         if self.mode.phase != before.phase {
-            self.news.push(News::PhaseChanged { from: before.phase, to: self.mode.phase });
+            self.news.push(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
         }
         Ok(next.effects)
     }
 
     /// Sends a message to the crew.
     pub(crate) fn say(&mut self, severity: Severity, words: String) {
-        self.news.push(News::Said { severity, words });
+        self.news.push(CrewMessage::Said { severity, words });
     }
 
     /// Tells the crew that the ignition gate is shut.
@@ -97,7 +97,7 @@ impl PhaseTable {
     }
 
     /// Takes the reports of this frame, in order.
-    pub(super) fn take_news(&mut self) -> Vec<News> {
+    pub(super) fn take_news(&mut self) -> Vec<CrewMessage> {
         core::mem::take(&mut self.news)
     }
 }
@@ -123,9 +123,9 @@ pub enum AbortEffect {
         m_s: u8,
     },
     /// The motor burns and has no cut-off: land on the ground below instead of at the pad.
-    LandHere,
-    /// As `LandHere`, but no plan is available: hold upright.
-    UprightOnly,
+    LandInPlace,
+    /// As `LandInPlace`, but no plan is available: hold upright.
+    LandUpright,
 }
 
 impl Computer {
@@ -177,12 +177,12 @@ impl Computer {
             () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
             () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
             () if does(Effect::RecordLoss) => impact(),
-            () if next.mode.interlocks.lands_here => match () {
+            () if next.mode.interlocks.lands_in_place => match () {
                 () if mode.phase.in_descent() => AbortEffect::Burn,
                 // It was commanded to light and has not.
                 () if mode.phase == Phase::Ignition && mode.interlocks.no_light_latched => impact(),
-                () if self.plans_a_landing() => AbortEffect::LandHere,
-                () => AbortEffect::UprightOnly,
+                () if self.plans_a_landing() => AbortEffect::LandInPlace,
+                () => AbortEffect::LandUpright,
             },
             () => AbortEffect::ChuteAtApogee,
         }

@@ -79,8 +79,8 @@ impl IgnitionSettings {
         })
     }
 
-    /// The outlook from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
-    pub fn outlook(
+    /// The prediction from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
+    pub fn prediction(
         &self,
         column: &Column,
         curve: &ThrustCurve,

@@ -48,7 +48,7 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
             (!locks.armed).then_some("not armed"),
             (!locks.pin_out).then_some("the pin is in"),
             // An abort too low for the parachute lands on the motor, and so does one after the command to light.
-            (locks.abort_latched && !locks.lands_here).then_some("an abort is latched"),
+            (locks.abort_latched && !locks.lands_in_place).then_some("an abort is latched"),
             None,
         ],
         Line::Separation => [
@@ -240,7 +240,7 @@ mod tests {
                     (outputs.is_on(Line::AscentIgniter), outputs.is_on(Line::LandingIgniter));
                 let locks = mode.interlocks;
                 assert!(!(ascent && (stopped || locks.abort_latched)), "{asked:?}: {mode:?}");
-                assert!(!(landing && (stopped || locks.abort_latched) && !locks.lands_here), "{mode:?}");
+                assert!(!(landing && (stopped || locks.abort_latched) && !locks.lands_in_place), "{mode:?}");
                 assert!(!outputs.lights() || (locks.armed && locks.pin_out), "{mode:?}");
                 assert!(!(ascent && landing), "{mode:?}");
                 assert!(!outputs.is_on(Line::Parachute) || !outputs.lights(), "{mode:?}");

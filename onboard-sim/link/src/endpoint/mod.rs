@@ -36,12 +36,12 @@ use protocol::text;
 use self::lane::{Answer, Lane};
 use self::questions::FileService;
 pub use self::questions::gives_out_its_log;
-pub use self::requests::Heard;
+pub use self::requests::UplinkState;
 use self::requests::{Answered, Refusals, Waiting, Warnings};
 use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
-use crate::streams::{CheckTeller, Streams};
+use crate::streams::{CheckReporter, Streams};
 use crate::vehicle::{Identity, Vehicle, VehicleKind};
 use crate::{commands, telemetry};
 
@@ -79,11 +79,11 @@ pub struct VehicleEndpoint {
     known: BTreeSet<Address>,
     refusals: Refusals,
     warnings: Warnings,
-    told: Option<Told>,
+    told: Option<LastReported>,
     told_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)>,
     aborted_at_s: Option<f64>,
     files: FileService,
-    check_teller: CheckTeller,
+    check_teller: CheckReporter,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -102,14 +102,14 @@ struct Context {
 
 /// State that is reported to the crew at once when it changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Told {
+struct LastReported {
     phase: Phase,
     interlocks: Interlocks,
     counting_down: bool,
     held: bool,
 }
 
-impl From<&Mode> for Told {
+impl From<&Mode> for LastReported {
     fn from(mode: &Mode) -> Self {
         let Mode { phase, interlocks, countdown_end_s, hold, .. } = *mode;
         Self { phase, interlocks, counting_down: countdown_end_s.is_some(), held: hold.is_some() }
@@ -154,7 +154,7 @@ impl VehicleEndpoint {
             told_crew: None,
             aborted_at_s: None,
             files: FileService::default(),
-            check_teller: CheckTeller::default(),
+            check_teller: CheckReporter::default(),
         }
     }
 
@@ -317,7 +317,7 @@ impl VehicleEndpoint {
 
     /// Reports a change of state to the crew at once, with the two messages that carry it.
     fn watch(&mut self, mode: &Mode) {
-        let told = Told::from(mode);
+        let told = LastReported::from(mode);
         let before = self.told.replace(told);
         if before != Some(told) {
             self.hurry(HEARTBEAT_DATA::ID);

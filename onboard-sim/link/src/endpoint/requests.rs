@@ -29,7 +29,7 @@ const MAX_ANSWERED: usize = 16;
 
 /// What a frame of the vehicle is told of its links, and asked by its crew.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Heard {
+pub struct UplinkState {
     /// How well the best station is heard.
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
@@ -126,10 +126,10 @@ impl VehicleEndpoint {
     }
 
     /// What the vehicle's next frame is told of its links and asked by its crew.
-    pub fn heard(&self, time_s: f64) -> Heard {
+    pub fn heard(&self, time_s: f64) -> UplinkState {
         let (uplink, commander) = self.uplink(time_s);
         let requests = self.waiting.iter().map(|waiting| waiting.request).collect();
-        Heard { uplink, commander, requests }
+        UplinkState { uplink, commander, requests }
     }
 
     /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has just decided. A dead

@@ -120,7 +120,7 @@ impl InSpace<'_> {
 
     fn descent(&self, pilot: &Pilot, estimate: &Estimate, feet_m: f64) -> DescentFacts {
         let phase = self.known.computer.mode().phase;
-        let outlook = pilot.outlook();
+        let prediction = pilot.prediction();
         let (place, velocity) = (&estimate.state.position_m, &estimate.state.velocity_m_s);
         let height_m = place.z - feet_m;
         let rising = phase.before_apogee();
@@ -142,10 +142,10 @@ impl InSpace<'_> {
         DescentFacts {
             height_m,
             vertical_m_s: velocity.z,
-            band_m: outlook.ignition.band.map(|band| (band.low_m, band.high_m)),
-            chosen_m: outlook.ignition.chosen_m,
-            commit_height_m: outlook.commit_height_m,
-            ignition_in_s: outlook.ignition.command_in_s.filter(|_| deciding),
+            band_m: prediction.ignition.band.map(|band| (band.low_m, band.high_m)),
+            chosen_m: prediction.ignition.chosen_m,
+            commit_height_m: prediction.commit_height_m,
+            ignition_in_s: prediction.ignition.command_in_s.filter(|_| deciding),
             // North is x, east is against y.
             wind_m_s: [estimate.wind_m_s.x, -estimate.wind_m_s.y],
             drag_scale: motor.air_scale(),

@@ -69,7 +69,7 @@ pub struct Sender {
 
 /// A station with an accepted frame.
 #[derive(Debug, Clone, PartialEq)]
-struct Known {
+struct Peer {
     address: Address,
     key: u8,
     /// 0: it tells none.
@@ -87,7 +87,7 @@ struct Known {
     crowded_at_s: Option<f64>,
 }
 
-impl Known {
+impl Peer {
     fn is_of(&self, sender: &Sender) -> bool {
         (self.address, self.key) == (sender.address, sender.key)
     }
@@ -128,7 +128,7 @@ struct Refused {
 #[derive(Debug, Clone)]
 pub struct Stations {
     most: usize,
-    known: Vec<Known>,
+    known: Vec<Peer>,
     /// How many there were.
     numbered: u32,
     /// The known station that is told next.
@@ -176,7 +176,7 @@ impl Stations {
             None => self.place_of(sender),
         };
         let Some(place) = place.or_else(|| self.add(sender, session.unwrap_or(0), time_s)) else {
-            let same = |known: &&mut Known| session.is_some() && known.address == sender.address;
+            let same = |known: &&mut Peer| session.is_some() && known.address == sender.address;
             self.known.iter_mut().filter(same).for_each(|known| known.crowded_at_s = Some(time_s));
             return;
         };
@@ -218,9 +218,9 @@ impl Stations {
                 && known.takes(sender.path)
         });
         let Some(twin) = twin else { return self.known[original].learn(sender.path) };
-        let commands = |known: &Known| self.commander.is_some_and(|(station, _)| station == known.station());
+        let commands = |known: &Peer| self.commander.is_some_and(|(station, _)| station == known.station());
         let (stays, goes) = if commands(&self.known[twin]) { (twin, original) } else { (original, twin) };
-        let Known { paths, heartbeat_at_s, accepted_at_s, .. } = self.known[goes].clone();
+        let Peer { paths, heartbeat_at_s, accepted_at_s, .. } = self.known[goes].clone();
         let one = &mut self.known[stays];
         paths.into_iter().rev().for_each(|path| one.learn(path));
         one.heartbeat_at_s = [one.heartbeat_at_s, heartbeat_at_s].into_iter().flatten().reduce(f64::max);
@@ -230,7 +230,7 @@ impl Stations {
 
     /// The station that a heartbeat belongs to. One that spoke before its first heartbeat has it now.
     fn place_of_session(&self, sender: &Sender, session: u32) -> Option<usize> {
-        let of = |same: &dyn Fn(&Known) -> bool| {
+        let of = |same: &dyn Fn(&Peer) -> bool| {
             self.known.iter().position(|known| known.is_of(sender) && same(known))
         };
         of(&|known| {
@@ -245,7 +245,7 @@ impl Stations {
     fn place_of(&self, sender: &Sender) -> Option<usize> {
         let candidates = self.known.iter().enumerate();
         let candidates = candidates.filter(|(_, known)| known.is_of(sender) && known.takes(sender.path));
-        let beat_at_s = |known: &Known| known.heartbeat_at_s.unwrap_or(f64::NEG_INFINITY);
+        let beat_at_s = |known: &Peer| known.heartbeat_at_s.unwrap_or(f64::NEG_INFINITY);
         candidates
             .max_by(|(_, one), (_, other)| beat_at_s(one).total_cmp(&beat_at_s(other)))
             .map(|(place, _)| place)
@@ -258,7 +258,7 @@ impl Stations {
             self.known.remove(leaving);
         }
         self.numbered += 1;
-        self.known.push(Known {
+        self.known.push(Peer {
             address: sender.address,
             key: sender.key,
             session,
@@ -276,7 +276,7 @@ impl Stations {
     /// The entry of a station that never proved itself or has been gone for a long time; under the same ids for a short one,
     /// as when a station was started again.
     fn replaceable(&self, address: Address, time_s: f64) -> Option<usize> {
-        let proven = |known: &Known| {
+        let proven = |known: &Peer| {
             let for_s = if known.address == address { SAME_IDS_FOR_S } else { PROVEN_FOR_S };
             known.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= for_s)
                 || self.commander.is_some_and(|(station, _)| station == known.station())
@@ -296,17 +296,17 @@ impl Stations {
         station_of(sender.address, number)
     }
 
-    fn known(&self, station: Station) -> Option<&Known> {
+    fn known(&self, station: Station) -> Option<&Peer> {
         self.known.iter().find(|known| known.station() == station)
     }
 
     /// How many other stations are there under the same ids; those that found no place count as one.
     pub fn same_ids(&self, station: Station, time_s: f64) -> usize {
-        let same = |known: &&Known| {
+        let same = |known: &&Peer| {
             (known.address.system_id, known.address.component_id) == (station.system, station.component)
         };
-        let same: Vec<&Known> = self.known.iter().filter(same).collect();
-        let crowded = |known: &&Known| known.crowded_at_s.is_some_and(|at_s| time_s - at_s <= SAME_IDS_FOR_S);
+        let same: Vec<&Peer> = self.known.iter().filter(same).collect();
+        let crowded = |known: &&Peer| known.crowded_at_s.is_some_and(|at_s| time_s - at_s <= SAME_IDS_FOR_S);
         let others = same.iter().filter(|known| known.station() != station && known.is_there(time_s));
         others.count() + usize::from(station.number != 0 && same.iter().any(crowded))
     }
@@ -369,14 +369,14 @@ impl Stations {
         known.map(|known| self.message(Some(known), time_s)).collect()
     }
 
-    fn message(&self, to: Option<&Known>, time_s: f64) -> MavMessage {
+    fn message(&self, to: Option<&Peer>, time_s: f64) -> MavMessage {
         let age_ms = |at_s: Option<f64>| {
             at_s.map_or(u16::MAX, |at_s| (1000.0 * (time_s - at_s)).clamp(0.0, 65_534.0) as u16)
         };
         let refused = self.refused;
         let from = refused.map_or(EVERYBODY, |refused| refused.from);
         let address = to.map_or(EVERYBODY, |known| known.address);
-        let station = to.map(Known::station);
+        let station = to.map(Peer::station);
         let same_ids = station.map_or(0, |station| self.same_ids(station, time_s));
         MavMessage::TD_UPLINK(TD_UPLINK_DATA {
             time_boot_ms: libm::round(1000.0 * time_s) as u32,

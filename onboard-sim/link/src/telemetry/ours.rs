@@ -65,8 +65,8 @@ fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
         AbortEffect::ChuteNow => (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, 0),
         AbortEffect::Burn => (TdAbortEffect::TD_ABORT_EFFECT_BURN, 0),
         AbortEffect::Impact { m_s } => (TdAbortEffect::TD_ABORT_EFFECT_IMPACT, m_s),
-        AbortEffect::LandHere => (TdAbortEffect::TD_ABORT_EFFECT_LAND_HERE, 0),
-        AbortEffect::UprightOnly => (TdAbortEffect::TD_ABORT_EFFECT_UPRIGHT_ONLY, 0),
+        AbortEffect::LandInPlace => (TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE, 0),
+        AbortEffect::LandUpright => (TdAbortEffect::TD_ABORT_EFFECT_LAND_UPRIGHT, 0),
     }
 }
 
@@ -357,8 +357,8 @@ mod tests {
             (AbortEffect::SafeOnPad, 1, 0),
             (AbortEffect::ChuteAtApogee, 2, 0),
             (AbortEffect::ChuteNow, 3, 0),
-            (AbortEffect::UprightOnly, 5, 0),
-            (AbortEffect::LandHere, 6, 0),
+            (AbortEffect::LandUpright, 5, 0),
+            (AbortEffect::LandInPlace, 6, 0),
             (AbortEffect::Burn, 7, 0),
             (AbortEffect::Impact { m_s: 41 }, 8, 41),
         ];

@@ -95,14 +95,14 @@ fn describe(scale: f64, found: &FreeTimeSolution) -> String {
         .iter()
         .fold(0.0_f64, |most, state| most.max((state.theta_rad.to_degrees() - 90.0).abs()));
     format!(
-        "{scale}: {:?} at {:.4} s (earliest {:.4}), J = {:.2}, price {:.2}, slope {:.2}, {} solves, {} iterations, \
+        "{scale}: {:?} at {:.4} s (earliest {:.4}), J = {:.2}, merit {:.2}, slope {:.2}, {} solves, {} iterations, \
          miss {:.1e}, tilt {tilt:.0} deg, x {:?}, u {:?}",
         solution.status,
         found.final_time_s,
         found.earliest_s,
         solution.cost,
-        solution.price,
-        found.price_slope,
+        solution.merit,
+        found.merit_slope,
         found.solves,
         solution.iterations,
         solution.condition_miss,
@@ -138,17 +138,17 @@ fn val_solver_study_real_motor_lands_over_a_range_of_thrust() {
     }
 }
 
-/// The best price at a fixed final time.
-fn price_at(problem: &FreeTimeProblem, motor: &Curve, at_s: f64, from: &FreeTimeSolution) -> f64 {
+/// The best merit at a fixed final time.
+fn merit_at(problem: &FreeTimeProblem, motor: &Curve, at_s: f64, from: &FreeTimeSolution) -> f64 {
     let fixed = FreeTimeProblem { earliest_s: at_s, latest_s: at_s, ..problem.clone() };
     let found = solve_free_time(&fixed, motor, Some((from, 0.0)));
     assert_eq!(found.solution.status, SolveStatus::Converged);
     assert!((found.final_time_s - at_s).abs() < 1e-12);
-    found.solution.price
+    found.solution.merit
 }
 
 #[test]
-fn val_finite_differences_slope_of_the_price() {
+fn val_finite_differences_slope_of_the_merit() {
     const H: f64 = 2e-3;
     let motor = Curve::h45(1.0);
     let mut problem = study(20.0);
@@ -160,17 +160,17 @@ fn val_finite_differences_slope_of_the_price() {
         problem.earliest_s = at_s;
         let found = solve_free_time(&problem, &motor, None);
         assert_eq!(found.solution.status, SolveStatus::Converged);
-        let ahead = price_at(&problem, &motor, at_s + H, &found);
-        let behind = price_at(&problem, &motor, at_s - H, &found);
+        let ahead = merit_at(&problem, &motor, at_s + H, &found);
+        let behind = merit_at(&problem, &motor, at_s - H, &found);
         let expected = (ahead - behind) / (2.0 * H);
-        let error = (found.price_slope - expected).abs();
-        println!("slope at {at_s} s: {} and {expected}", found.price_slope);
-        assert!(error < 1e-2 * (1.0 + expected.abs()), "{} {expected}", found.price_slope);
+        let error = (found.merit_slope - expected).abs();
+        println!("slope at {at_s} s: {} and {expected}", found.merit_slope);
+        assert!(error < 1e-2 * (1.0 + expected.abs()), "{} {expected}", found.merit_slope);
     }
 }
 
 /// A new plan every 0.1 s from the vehicle's state, in at most three solves. The vehicle flies the real curve within
-/// each interval, where the plan has the mean. The price is flat near the best end, so the end moves a little.
+/// each interval, where the plan has the mean. The merit is flat near the best end, so the end moves a little.
 #[test]
 fn a_whole_landing_planned_warm_ends_as_the_first_plan_predicts() {
     for scale in [0.95, 1.0, 1.07] {

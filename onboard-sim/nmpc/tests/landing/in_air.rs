@@ -86,7 +86,7 @@ fn a_resampled_start_converges_to_the_cold_solution() {
         println!("{intervals} x {step_s}: {} iterations warm, {} cold", warm.iterations, cold.iterations);
         assert_eq!(warm.status, SolveStatus::Converged, "{intervals} x {step_s}");
         assert!(warm.iterations < cold.iterations / 2, "{} {}", warm.iterations, cold.iterations);
-        assert!(warm.price < 1.02 * cold.price, "{} {}", warm.price, cold.price);
+        assert!(warm.merit < 1.02 * cold.merit, "{} {}", warm.merit, cold.merit);
     }
 }
 

@@ -182,16 +182,16 @@ fn the_paper_optimum_goes_below_the_ground_and_the_flown_plan_does_not() {
     assert!(lowest(settled) > -1e-6);
 }
 
-/// An unreachable condition is missed at its price: its multiplier equals the price, and the solve still converges.
+/// An unreachable condition is missed at its penalty: its multiplier equals the penalty, and the solve still converges.
 #[test]
 fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
     let start = PlanarState { z_m: 0.5, u_m_s: -0.5, ..nominal_start() };
     let problem = problem(start, 3);
     let solution = solve(&problem, None);
     assert_eq!(solution.status, SolveStatus::Converged);
-    let price = problem.solver.terminal_penalty;
+    let penalty = problem.solver.terminal_penalty;
     assert!(solution.condition_miss > 0.1);
-    assert!((solution.terminal_multiplier().abs() - price).abs() < 1e-9);
+    assert!((solution.terminal_multiplier().abs() - penalty).abs() < 1e-9);
 }
 
 /// The printed equations can be solved, too, in hundreds of iterations, because their gravity curves the wrong way.

@@ -77,7 +77,7 @@ fn draws(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// Whole landings along the shrinking horizon, with a disturbance of 2 mm/s and 0.05 deg/s (one sigma) per sample. In
-/// the last steps the end is out of reach and is missed at its price.
+/// the last steps the end is out of reach and is missed at its penalty.
 #[test]
 fn no_solve_fails_in_the_disturbed_closed_loop() {
     let model = model();

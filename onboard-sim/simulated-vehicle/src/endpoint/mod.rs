@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use flight::computer::crew::{Answer, Request};
-pub use vehicle_link::endpoint::{Heard, Outgoing, Path, VehicleEndpoint, gives_out_its_log};
+pub use vehicle_link::endpoint::{Outgoing, Path, UplinkState, VehicleEndpoint, gives_out_its_log};
 pub use vehicle_link::vehicle::VehicleKind;
 
-use crate::vehicle::{Frame, Vehicle, VehicleEvent};
+use crate::vehicle::{Vehicle, VehicleEvent, VehicleStep};
 
 /// Steps the vehicle by one frame with the requests from the links and from its own programme. Returns the events and
 /// the answers to its own programme. Answers to the links come out of [`VehicleEndpoint::poll`].
@@ -16,10 +16,10 @@ pub fn step(
     own: &[Request],
     stopwatch: &mut dyn FnMut() -> Duration,
 ) -> (Vec<VehicleEvent>, Vec<Answer>) {
-    let Heard { uplink, commander, mut requests } = endpoint.heard(vehicle.time_s());
+    let UplinkState { uplink, commander, mut requests } = endpoint.heard(vehicle.time_s());
     vehicle.set_uplink(uplink, commander);
     requests.extend_from_slice(own);
-    let Frame { events, mut answers } = vehicle.step(&requests, stopwatch);
+    let VehicleStep { events, mut answers } = vehicle.step(&requests, stopwatch);
     let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
     endpoint.on_answers(&answers, vehicle);
     for event in &events {

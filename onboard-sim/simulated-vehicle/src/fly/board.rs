@@ -30,7 +30,7 @@ use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::record::Record;
 use protocol::transport::LinkAddress;
 
-use crate::endpoint::Heard;
+use crate::endpoint::UplinkState;
 use crate::vehicle::{Vehicle, VehicleEvent};
 
 /// A board that is silent for longer has stopped. An emulated one plans a landing in a second or two.
@@ -53,7 +53,7 @@ pub enum BoardError {
     #[error("frame {frame}: the board has decided something else than the computer in this process")]
     Differs { frame: u64 },
     #[error("what the board has heard: {0}")]
-    Heard(#[from] RecordError),
+    Uplink(#[from] RecordError),
 }
 
 /// A board at the other end of two pipes.
@@ -117,7 +117,7 @@ impl OnBoard {
         vehicle: &mut Vehicle,
         stopwatch: &mut dyn FnMut() -> Duration,
     ) -> Result<Vec<VehicleEvent>, BoardError> {
-        let Heard { uplink, commander, requests } = self.heard()?;
+        let UplinkState { uplink, commander, requests } = self.heard()?;
         vehicle.set_uplink(uplink, commander);
         let events = vehicle.step(&requests, stopwatch).events;
         self.heard = None;
@@ -125,13 +125,13 @@ impl OnBoard {
         Ok(events)
     }
 
-    fn heard(&self) -> Result<Heard, RecordError> {
+    fn heard(&self) -> Result<UplinkState, RecordError> {
         let Some(stream::Heard { uplink, commander, requests }) = &self.heard else {
-            return Ok(Heard { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
+            return Ok(UplinkState { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
         };
         let next = self.last.map_or(0, |last| last + 1);
         let requests = requests.iter().map(|request| request_from_log(request, next));
-        Ok(Heard {
+        Ok(UplinkState {
             uplink: uplink_from_log(uplink.as_ref()),
             commander: commander.as_ref().map(|commander| commander_from_log(commander, next)).transpose()?,
             requests: requests.collect::<Result<_, _>>()?,

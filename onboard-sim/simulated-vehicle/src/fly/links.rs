@@ -11,7 +11,7 @@ use protocol::command::CommandRequest;
 use protocol::crew_file::{CrewFile, Mode};
 use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA, TdRole};
 use protocol::frame::Frame;
-use protocol::hub::{Hub, HubLink, News};
+use protocol::hub::{Hub, HubLink, LinkEvent};
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
 use protocol::log::record::Direction;
@@ -89,7 +89,7 @@ impl Intake {
 }
 
 /// A frame from a link.
-pub(super) enum Heard {
+pub(super) enum Received {
     /// A frame to act on, and how it came in.
     Frame(Path, Frame),
     /// A frame that had come in another way before.
@@ -131,7 +131,7 @@ impl Links {
         })
     }
 
-    pub(super) fn receive(&mut self, time_s: f64) -> Vec<Heard> {
+    pub(super) fn receive(&mut self, time_s: f64) -> Vec<Received> {
         let (now, clock) = (Duration::from_secs_f64(time_s), self.stamps.now());
         let recorder = self.recorder.as_ref();
         let mut heard = Vec::new();
@@ -142,23 +142,25 @@ impl Links {
                 let path = Path { link: number, origin: received.origin() };
                 for news in self.hub.take(number, received, now, clock) {
                     match news {
-                        News::Believed(origin) => {
+                        LinkEvent::Believed(origin) => {
                             believed = true;
                             sender.believe(origin);
                         }
-                        News::Frame(frame) => {
+                        LinkEvent::Frame(frame) => {
                             self.intake.record(name, &frame, time_s);
-                            heard.push(Heard::Frame(path, frame));
+                            heard.push(Received::Frame(path, frame));
                         }
-                        News::Copy(frame) => {
+                        LinkEvent::Copy(frame) => {
                             self.intake.record(name, &frame, time_s);
-                            heard.push(Heard::Copy(path, frame));
+                            heard.push(Received::Copy(path, frame));
                         }
                         // Counted but not recorded: a flood of forgeries must not fill the log.
-                        News::Rejected(frame, why) => heard.push(Heard::Rejected(frame, why)),
-                        News::Strangers(words) => note(recorder, time_s, &format!("link {name}: {words}")),
-                        News::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
-                        News::Down(why) => note(recorder, time_s, &format!("link {name} down: {why}")),
+                        LinkEvent::Rejected(frame, why) => heard.push(Received::Rejected(frame, why)),
+                        LinkEvent::UnknownSenders(words) => {
+                            note(recorder, time_s, &format!("link {name}: {words}"));
+                        }
+                        LinkEvent::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
+                        LinkEvent::Down(why) => note(recorder, time_s, &format!("link {name} down: {why}")),
                     }
                 }
             }

@@ -25,7 +25,7 @@ use tokio::sync::watch;
 use self::board::OnBoard;
 pub use self::board::{BoardError, OnTheWire};
 pub(crate) use self::links::Delayed;
-use self::links::{Heard, Links, operators_of, people_of};
+use self::links::{Links, Received, operators_of, people_of};
 use self::load::OwnStart;
 pub use self::load::load_flight;
 pub use self::pace::Lateness;
@@ -298,9 +298,9 @@ pub async fn fly_observed(
         let arrived = links.receive(vehicle.time_s());
         for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             match heard {
-                Heard::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle),
-                Heard::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle),
-                Heard::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
+                Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle),
+                Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle),
+                Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
         let own = own_start.requests(&vehicle);

@@ -9,7 +9,7 @@ mod ground;
 use std::time::Duration;
 
 use flight::computer::crew::{Answer, People, Request};
-use flight::computer::news::{News, Severity};
+use flight::computer::news::{CrewMessage, Severity};
 use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
@@ -93,7 +93,7 @@ impl Watch for Watcher<'_> {
 
 /// The result of one frame.
 #[derive(Debug, Clone, Default)]
-pub struct Frame {
+pub struct VehicleStep {
     /// Events, in order.
     pub events: Vec<VehicleEvent>,
     /// An answer to each request, in order; none while the flight computer is dead.
@@ -174,7 +174,7 @@ impl Vehicle {
 
     /// Advances by one frame, in which these requests are decided. `stopwatch` may be any clock: only differences of
     /// its values are used, to time the flight computer.
-    pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> Frame {
+    pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> VehicleStep {
         let outside = Outside {
             pin_out: self.pin_out,
             log: self.log,
@@ -202,7 +202,7 @@ impl Vehicle {
             self.sensors.take(measured, self.sortie.frame());
         }
         events.extend(self.events_of_the_simulation(released));
-        Frame { events, answers }
+        VehicleStep { events, answers }
     }
 
     /// The event for a frame in which the pilot planned.
@@ -382,11 +382,11 @@ pub enum VehicleEvent {
     },
 }
 
-impl From<News> for VehicleEvent {
-    fn from(news: News) -> Self {
+impl From<CrewMessage> for VehicleEvent {
+    fn from(news: CrewMessage) -> Self {
         match news {
-            News::Said { severity, words } => Self::Text { severity, text: words },
-            News::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
+            CrewMessage::Said { severity, words } => Self::Text { severity, text: words },
+            CrewMessage::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
         }
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn problem(limit: f64) -> Polynomial<2, 1> {
         input_weights: [[STEP_S]],
         ranges: [within(limit)],
         conditions: vec![equals(INTERVALS, 0, 1.0), equals(INTERVALS, 1, 0.0)],
-        price: 100.0,
+        penalty: 100.0,
     }
 }
 
@@ -80,14 +80,14 @@ fn a_force_in_one_direction_only_stays_in_its_range() {
     assert!(outcome.miss < 1e-8, "{outcome:?}");
 }
 
-/// An unreachable condition is missed at its price.
+/// An unreachable condition is missed at its penalty.
 #[test]
-fn a_target_out_of_reach_costs_its_price() {
+fn a_target_out_of_reach_costs_its_penalty() {
     let model = problem(0.2);
     let (workspace, outcome) = solved(&model);
     Optimality::of(&model, &workspace).assert_within(1e-6);
     assert!(outcome.miss > 0.1, "{outcome:?}");
-    assert!(workspace.condition_multipliers().any(|multiplier| multiplier.abs() >= model.price));
+    assert!(workspace.condition_multipliers().any(|multiplier| multiplier.abs() >= model.penalty));
 }
 
 // A bound on the work of several solves together.

@@ -53,7 +53,7 @@ fn problem<const NX: usize, const NU: usize>(seed: u64, limit: f64) -> Polynomia
         input_weights: draw.weights(),
         ranges: [within(limit); NU],
         conditions: vec![equals(INTERVALS, 0, 0.3)],
-        price: 1e4,
+        penalty: 1e4,
     }
 }
 

@@ -110,11 +110,11 @@ impl Optimality {
             gradients[condition.node][condition.component] -= condition.sign * multiplier;
             let value = condition.value(states);
             let (over, under) = (value.max(0.0), (-value).max(0.0));
-            let least = if condition.equality { -model.price } else { 0.0 };
+            let least = if condition.equality { -model.penalty } else { 0.0 };
             worse(&mut found.complementarity, over * (multiplier - least));
-            worse(&mut found.complementarity, under * (model.price - multiplier));
+            worse(&mut found.complementarity, under * (model.penalty - multiplier));
             worse(&mut found.complementarity, (multiplier - least).min(0.0));
-            worse(&mut found.complementarity, (model.price - multiplier).min(0.0));
+            worse(&mut found.complementarity, (model.penalty - multiplier).min(0.0));
             found.held += usize::from(!condition.equality && value.abs() < NEAR);
         }
         for gradient in gradients.iter().skip(1).flatten() {

@@ -25,7 +25,7 @@ pub(super) struct Polynomial<const NX: usize, const NU: usize> {
     pub(super) input_weights: [[f64; NU]; NU],
     pub(super) ranges: [InputRange; NU],
     pub(super) conditions: Vec<Condition>,
-    pub(super) price: f64,
+    pub(super) penalty: f64,
 }
 
 impl<const NX: usize, const NU: usize> Polynomial<NX, NU> {
@@ -103,8 +103,8 @@ impl<const NX: usize, const NU: usize> Model<NX, NU> for Polynomial<NX, NU> {
         Settings {
             max_iterations: 200,
             tolerance: 1e-7,
-            price: self.price,
-            first_barrier: self.price,
+            penalty: self.penalty,
+            first_barrier: self.penalty,
             guesses: 1,
             spare_guesses: 0,
             acceptable_miss: 1e-6,

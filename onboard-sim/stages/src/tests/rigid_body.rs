@@ -63,7 +63,7 @@ pub(super) fn problem(limit_n_m: f64) -> Polynomial<13, 3> {
         input_weights: diagonal(&[0.5; 3]),
         ranges: [within(limit_n_m); 3],
         conditions,
-        price: 1e3,
+        penalty: 1e3,
     }
 }
 

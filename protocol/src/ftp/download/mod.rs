@@ -1,7 +1,7 @@
 //! The side of MAVLink FTP that fetches a file.
 //!
 //! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and pieces of the file come
-//! out as [`News`]. The caller writes them, keeps [`Download::part`] beside them, and computes the checksum of the
+//! out as [`DownloadEvent`]. The caller writes them, keeps [`Download::part`] beside them, and computes the checksum of the
 //! whole file when it is there. A download that begins with such a [`Part`] asks for nothing that is there already.
 
 mod pieces;
@@ -50,7 +50,7 @@ pub enum Failure {
 
 /// What a packet has brought.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum News {
+pub enum DownloadEvent {
     /// The file is open. If nothing of it was kept (`fresh`), what was written before is not of this file.
     Begins { fresh: bool },
     /// A piece of the file.
@@ -178,7 +178,7 @@ impl Download {
     }
 
     /// Takes the checksum of what was written.
-    pub fn compare(&mut self, crc: u32) -> Option<News> {
+    pub fn compare(&mut self, crc: u32) -> Option<DownloadEvent> {
         if self.phase != Phase::Comparing {
             return None;
         }
@@ -191,11 +191,11 @@ impl Download {
             return None;
         }
         self.begin(Ranges::default());
-        Some(News::Begins { fresh: true })
+        Some(DownloadEvent::Begins { fresh: true })
     }
 
     /// Takes an answer of the vehicle.
-    pub fn take(&mut self, packet: &Packet, now: Duration) -> Option<News> {
+    pub fn take(&mut self, packet: &Packet, now: Duration) -> Option<DownloadEvent> {
         if self.ended().is_some() {
             return None;
         }
@@ -303,7 +303,7 @@ impl Download {
     }
 
     /// The file is open: continues with what is kept of it, if it is the same file.
-    fn opened(&mut self, crc: Option<u32>) -> Option<News> {
+    fn opened(&mut self, crc: Option<u32>) -> Option<DownloadEvent> {
         let path = self.path.clone()?;
         // A session that was opened again goes on with what is there.
         let so_far = (self.bytes > 0).then(|| core::mem::take(&mut self.have));
@@ -314,7 +314,7 @@ impl Download {
         self.crc = crc;
         let fresh = kept.is_none();
         self.begin(kept.map(|part| part.have).unwrap_or_default());
-        Some(News::Begins { fresh })
+        Some(DownloadEvent::Begins { fresh })
     }
 
     fn begin(&mut self, have: Ranges) {
@@ -325,7 +325,7 @@ impl Download {
         self.turn_to(if self.bytes == self.len { Phase::Comparing } else { Phase::Reading });
     }
 
-    fn take_piece(&mut self, packet: &Packet, now: Duration) -> Option<News> {
+    fn take_piece(&mut self, packet: &Packet, now: Duration) -> Option<DownloadEvent> {
         if self.phase != Phase::Reading || packet.session != self.session {
             return None;
         }
@@ -364,7 +364,7 @@ impl Download {
         if self.bytes == self.len {
             self.turn_to(Phase::Comparing);
         }
-        Some(News::Piece { offset: packet.offset, data: packet.data.clone() })
+        Some(DownloadEvent::Piece { offset: packet.offset, data: packet.data.clone() })
     }
 
     fn refused(&mut self, why: Refusal) {

@@ -100,7 +100,7 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
                 }
             }
             () = tokio::time::sleep_until(report_due_at.unwrap_or(opened_at)), if report_due_at.is_some() => {
-                reports.extend(peers.report(opened_at.elapsed()).map(Received::Strangers));
+                reports.extend(peers.report(opened_at.elapsed()).map(Received::UnknownSenders));
             }
         }
     }

@@ -19,7 +19,7 @@ const SILENT_AFTER: Duration = Duration::from_secs(10);
 /// it is refused. It keeps that place until it has been silent for this long.
 const GUEST_SILENT_AFTER: Duration = Duration::from_secs(5);
 
-/// Strangers are reported at most this often.
+/// Unknown senders are reported at most this often.
 const REPORT_INTERVAL: Duration = Duration::from_secs(10);
 /// The first report waits this long, so that a newcomer whose first frame is still being checked is not reported.
 const FIRST_REPORT_DELAY: Duration = Duration::from_secs(1);
@@ -37,7 +37,7 @@ struct Proven {
 
 /// Senders that were not accepted since the last report.
 #[derive(Debug, Default)]
-struct Strangers {
+struct UnknownSenders {
     datagrams: BTreeMap<SocketAddr, u64>,
     uncounted: u64,
     last: Option<SocketAddr>,
@@ -49,7 +49,7 @@ pub(super) struct Peers {
     fixed: Option<SocketAddr>,
     proven: Vec<Proven>,
     guest: Option<(SocketAddr, Duration)>,
-    strangers: Strangers,
+    strangers: UnknownSenders,
     /// When the most recent peers were named.
     named_at: VecDeque<Duration>,
     unnamed: u64,
@@ -64,7 +64,7 @@ impl Peers {
             fixed: None,
             proven: Vec::new(),
             guest: None,
-            strangers: Strangers::default(),
+            strangers: UnknownSenders::default(),
             named_at: VecDeque::new(),
             unnamed: 0,
             reported_at: None,
@@ -151,7 +151,7 @@ impl Peers {
     /// Returns one line about the senders that are not answered and the peers that were not named.
     pub(super) fn report(&mut self, now: Duration) -> Option<String> {
         self.report_due_at = None;
-        let Strangers { datagrams, uncounted, last } = std::mem::take(&mut self.strangers);
+        let UnknownSenders { datagrams, uncounted, last } = std::mem::take(&mut self.strangers);
         let further = std::mem::take(&mut self.unnamed);
         let count: u64 = datagrams.values().sum::<u64>() + uncounted;
         let mut words = Vec::new();

@@ -9,7 +9,7 @@ use super::{COMPONENTS, rms_and_max};
 use crate::info::{Info, SolveTimes};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, paragraph, table};
-use crate::report::track::{AHEAD_S, EstimateError, Flight, InSpace, Plant, Thought};
+use crate::report::track::{AHEAD_S, Decision, EstimateError, Flight, InSpace, Plant};
 
 pub(super) fn tracking(flight: &Flight) -> String {
     // By phase, in the order flown: phase index, then actual minus planned state for each prediction time.
@@ -239,7 +239,7 @@ fn time_rows(times: &SolveTimes) -> [Vec<String>; 5] {
 
 pub(super) fn solver(flight: &Flight, info: &Info) -> String {
     let idle = u32::from(ControlLevel::Idle.index());
-    let plans: Vec<&Thought> = flight.thoughts.iter().filter(|thought| thought.level != idle).collect();
+    let plans: Vec<&Decision> = flight.thoughts.iter().filter(|thought| thought.level != idle).collect();
     if plans.is_empty() {
         return paragraph("The flight computer planned no landing.");
     }
@@ -262,7 +262,7 @@ pub(super) fn solver(flight: &Flight, info: &Info) -> String {
         limits,
         ..Chart::default()
     };
-    let point = |plan: &&Thought| (flight.axis_s(plan.sample.time_s), plan.iterations as f64);
+    let point = |plan: &&Decision| (flight.axis_s(plan.sample.time_s), plan.iterations as f64);
     let points = plans.iter().map(point).collect();
     let mut pictures = vec![chart("Newton iterations of each plan", points, Vec::new()).svg()];
     let Some(times) = info.frames.and_then(|frames| frames.solve_time) else {

@@ -7,12 +7,12 @@ use crate::report::html::{charts, paragraph, table};
 use crate::report::track::Flight;
 
 /// A flight and what its log says.
-pub(in crate::report) type Told<'a> = (&'a Flight, &'a Info);
+pub(in crate::report) type LogFacts<'a> = (&'a Flight, &'a Info);
 
 /// The names of the two flights in the pictures, with their classes.
 const NAMES: [(&str, &str); 2] = [("A", "a"), ("B", "b")];
 
-pub(in crate::report) fn html(flights: [Told<'_>; 2]) -> String {
+pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
     let rows = NAMES.iter().zip(flights).map(|((name, _), (flight, info))| {
         let ending = info.ending.clone().unwrap_or_else(|| "no verdict".to_owned());
         vec![(*name).to_owned(), flight.recording.name.clone(), ending]

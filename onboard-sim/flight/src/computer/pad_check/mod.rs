@@ -70,7 +70,7 @@ pub struct PadCheck {
 
 /// One frame on the pad, as the check sees it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(super) struct PadReadings<'a> {
     /// Where the surfaces are: gimbal (pitch, yaw), fins 1 to 4, rad.
     pub(super) surfaces_rad: [f64; SURFACES],
     pub(super) measured: &'a Measurements,
@@ -90,7 +90,7 @@ pub(super) struct PadSwitches {
 }
 
 /// Where a surface is told to go: its number, and its angle, rad. All others rest.
-pub(super) type Told = (usize, f64);
+pub(super) type SurfaceCommand = (usize, f64);
 
 impl Default for PadCheck {
     fn default() -> Self {
@@ -128,7 +128,12 @@ impl PadCheck {
     }
 
     /// One frame of a running check: where a surface is told to go, if one moves.
-    pub(super) fn step(&mut self, seen: &Seen<'_>, mission: &Mission, arming: &ArmingLimits) -> Option<Told> {
+    pub(super) fn step(
+        &mut self,
+        seen: &PadReadings<'_>,
+        mission: &Mission,
+        arming: &ArmingLimits,
+    ) -> Option<SurfaceCommand> {
         match &mut self.stage {
             Stage::Resting => return None,
             Stage::Sweeping(sweep) => {
@@ -440,7 +445,7 @@ impl Computer {
             return;
         }
         let ([pitch_rad, yaw_rad], [one, two, three, four]) = (input.gimbal_rad, input.fins_rad);
-        let seen = Seen {
+        let seen = PadReadings {
             surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
             measured: &as_measured(&input.sensed),
             switches: PadSwitches {

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::{Finding, Item, SURFACES, Told, larger};
+use super::{Finding, Item, SURFACES, SurfaceCommand, larger};
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
@@ -129,7 +129,10 @@ impl Sweep {
     }
 
     /// One frame: what to command, `None` at the end; and what was found of a surface that is done.
-    pub(super) fn step(&mut self, surfaces_rad: &[f64; SURFACES]) -> (Option<Told>, Option<[Finding; 3]>) {
+    pub(super) fn step(
+        &mut self,
+        surfaces_rad: &[f64; SURFACES],
+    ) -> (Option<SurfaceCommand>, Option<[Finding; 3]>) {
         let Some(reach) = self.reaches.get(self.surface).copied() else { return (None, None) };
         let targets = reach.targets_rad();
         let (target_rad, way_rad) = (targets[self.target], way_rad(&reach, &targets, self.target));

@@ -50,7 +50,7 @@ impl Bench {
         Self { servos, lines_rad, at_rad: [0.0; SURFACES], wrong }
     }
 
-    fn step(&mut self, told: Option<Told>) -> [f64; SURFACES] {
+    fn step(&mut self, told: Option<SurfaceCommand>) -> [f64; SURFACES] {
         for surface in 0..SURFACES {
             let wanted_rad = told.filter(|(moved, _)| *moved == surface).map_or(0.0, |(_, angle)| angle);
             self.lines_rad[surface].push_back(wanted_rad);
@@ -110,7 +110,7 @@ fn checked(wrong: Wrong, noise: f64, switches: PadSwitches, moves: bool) -> PadC
     let mut told = None;
     for frame in 0..6000 {
         let measured = at_rest(frame, noise);
-        let seen = Seen { surfaces_rad: bench.step(told), measured: &measured, switches };
+        let seen = PadReadings { surfaces_rad: bench.step(told), measured: &measured, switches };
         let before = check.progress_percent();
         told = check.step(&seen, &mission, &mission.arming);
         assert!(check.progress_percent() >= before, "frame {frame}");
@@ -200,7 +200,7 @@ proptest! {
         for frame in 0..4000_usize {
             let surfaces_rad = core::array::from_fn(|surface| feedback[(frame + 7 * surface) % 64]);
             let measured = at_rest(0, 1.0);
-            let seen = Seen { surfaces_rad, measured: &measured, switches: SWITCHES };
+            let seen = PadReadings { surfaces_rad, measured: &measured, switches: SWITCHES };
             match check.step(&seen, &mission, &mission.arming) {
                 Some((0..2, angle_rad)) => prop_assert!(angle_rad.abs() <= limit_rad),
                 Some((surface, angle_rad)) => {

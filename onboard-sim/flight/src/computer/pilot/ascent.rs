@@ -45,7 +45,7 @@ const CHARGE_LASTS_S: f64 = 1.0;
 
 /// What the watch sees of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct AscentSeen {
+pub(super) struct AscentReadings {
     pub(super) time_s: f64,
     pub(super) frame_s: f64,
     pub(super) phase: Phase,
@@ -109,8 +109,8 @@ impl AscentWatch {
     }
 
     /// The event of this frame, if there is one.
-    pub(super) fn look(&mut self, seen: &AscentSeen) -> Option<Event> {
-        self.feel_the_pressure(seen);
+    pub(super) fn update(&mut self, seen: &AscentReadings) -> Option<Event> {
+        self.update_heights(seen);
         if !self.lifted_off {
             return self.wait_for_lift_off(seen);
         }
@@ -128,15 +128,15 @@ impl AscentWatch {
     }
 
     /// Whether the vehicle lifts off in this frame, in which it feels this along its axis, m/s^2.
-    pub(super) fn feels_lift_off(&mut self, axial_m_s2: f64, frame_s: f64) -> bool {
+    pub(super) fn detects_lift_off(&mut self, axial_m_s2: f64, frame_s: f64) -> bool {
         let gain_m_s = (axial_m_s2 - STANDARD_GRAVITY_M_S2) * frame_s;
         self.gained_m_s = if axial_m_s2 > PUSHED_M_S2 { self.gained_m_s + gain_m_s } else { 0.0 };
         self.lifted_off = self.gained_m_s >= LIFTED_OFF_M_S;
         self.lifted_off
     }
 
-    fn wait_for_lift_off(&mut self, seen: &AscentSeen) -> Option<Event> {
-        if self.feels_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
+    fn wait_for_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
+        if self.detects_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
             return Some(Event::LiftOff);
         }
         // The second opinion counts while a lift-off is expected, also after an abort of the ignition: in a day on the pad
@@ -149,25 +149,25 @@ impl AscentWatch {
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
     }
 
-    fn has_burnt_out(&mut self, seen: &AscentSeen) -> bool {
+    fn has_burnt_out(&mut self, seen: &AscentReadings) -> bool {
         let braking = seen.axial_specific_force_m_s2 < 0.0;
         self.braking_s = lasts_s(self.braking_s, Some(braking), seen.frame_s);
         self.braking_s >= BRAKING_S
     }
 
-    fn separation_is_due(&self, seen: &AscentSeen) -> bool {
+    fn separation_is_due(&self, seen: &AscentReadings) -> bool {
         let to_apogee_s = seen.vertical_m_s / STANDARD_GRAVITY_M_S2;
         self.separating_since_s.is_none() && to_apogee_s <= seen.separate_before_apogee_s
     }
 
-    fn has_passed_apogee(&mut self, seen: &AscentSeen) -> bool {
+    fn has_passed_apogee(&mut self, seen: &AscentReadings) -> bool {
         self.falling_frames = if seen.vertical_m_s < 0.0 { self.falling_frames + 1 } else { 0 };
         let climbs = self.climbing && seen.time_s - self.marked_at_s < CLIMBED_S;
         let sunk_s = if seen.vertical_m_s > RISES_FAST_M_S { SUNK_FAST_S } else { SUNK_S };
         (self.falling_frames >= FALLING_FRAMES && !climbs) || self.sunk_s >= sunk_s
     }
 
-    fn feel_the_pressure(&mut self, seen: &AscentSeen) {
+    fn update_heights(&mut self, seen: &AscentReadings) {
         let disturbed = self.separating_since_s.is_some_and(|since_s| seen.time_s - since_s < CHARGE_LASTS_S);
         if let Some(altitude_m) = seen.pressure_altitude_m.filter(|_| !disturbed) {
             self.highest_m = self.highest_m.max(altitude_m);
@@ -257,7 +257,7 @@ pub(super) struct FinWatch {
 
 impl FinWatch {
     /// Takes a frame: measured and commanded angles of the fins, rad.
-    pub(super) fn look(&mut self, found_rad: &[f64; 4], told_rad: &[f64; 4], frame_s: f64) {
+    pub(super) fn update(&mut self, found_rad: &[f64; 4], told_rad: &[f64; 4], frame_s: f64) {
         for ((fin, found_rad), told_rad) in self.fins.iter_mut().zip(found_rad).zip(told_rad) {
             if (found_rad - fin.rests_at_rad).abs() > ANSWERING_RAD {
                 *fin = Watched { rests_at_rad: *found_rad, called_for_s: 0.0 };
@@ -280,8 +280,8 @@ mod tests {
 
     use crate::computer::FRAME_S;
 
-    fn seen(time_s: f64, phase: Phase, force_m_s2: f64, vertical_m_s: f64) -> AscentSeen {
-        AscentSeen {
+    fn seen(time_s: f64, phase: Phase, force_m_s2: f64, vertical_m_s: f64) -> AscentReadings {
+        AscentReadings {
             time_s,
             frame_s: 0.005,
             phase,
@@ -301,12 +301,12 @@ mod tests {
     fn a_knock_is_no_lift_off_and_a_push_of_five_g_is_one_after_75_ms() {
         let mut watch = AscentWatch::default();
         for (frame, force_m_s2) in [200.0, 200.0, 9.8, 9.8].into_iter().enumerate() {
-            let event = watch.look(&seen(0.005 * frame as f64, Phase::Boost, force_m_s2, 0.0));
+            let event = watch.update(&seen(0.005 * frame as f64, Phase::Boost, force_m_s2, 0.0));
             assert_eq!(event, None, "{frame}");
         }
         // 40 m/s^2 over the weight: 3 m/s after 75 ms.
         let events: Vec<_> = (0..15)
-            .filter_map(|frame| watch.look(&seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 0.0)))
+            .filter_map(|frame| watch.update(&seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 0.0)))
             .collect();
         assert_eq!(events, [Event::LiftOff]);
     }
@@ -314,11 +314,11 @@ mod tests {
     #[test]
     fn without_a_push_there_is_no_lift_off_after_three_seconds() {
         let mut watch = AscentWatch::default();
-        assert_eq!(watch.look(&seen(2.995, Phase::Boost, 9.81, 0.0)), None);
-        assert_eq!(watch.look(&seen(3.0, Phase::Boost, 9.81, 0.0)), Some(Event::NoLiftOff));
+        assert_eq!(watch.update(&seen(2.995, Phase::Boost, 9.81, 0.0)), None);
+        assert_eq!(watch.update(&seen(3.0, Phase::Boost, 9.81, 0.0)), Some(Event::NoLiftOff));
         // Nobody waits for a lift-off after an abort, but it is still noticed.
-        assert_eq!(watch.look(&seen(9.0, Phase::PadIdle, 9.81, 0.0)), None);
-        let late = (0..15).filter_map(|_| watch.look(&seen(9.1, Phase::PadIdle, 49.81, 0.0)));
+        assert_eq!(watch.update(&seen(9.0, Phase::PadIdle, 9.81, 0.0)), None);
+        let late = (0..15).filter_map(|_| watch.update(&seen(9.1, Phase::PadIdle, 49.81, 0.0)));
         assert_eq!(late.collect::<Vec<_>>(), [Event::LiftOff]);
     }
 
@@ -328,21 +328,21 @@ mod tests {
         for frame in 0..100 {
             // 50 ms below the drag, then thrust again.
             let force_m_s2 = if frame % 20 < 10 { -5.0 } else { 30.0 };
-            assert_eq!(watch.look(&seen(0.5, Phase::Boost, force_m_s2, 40.0)), None, "{frame}");
+            assert_eq!(watch.update(&seen(0.5, Phase::Boost, force_m_s2, 40.0)), None, "{frame}");
         }
-        let out = (0..20).filter_map(|_| watch.look(&seen(0.5, Phase::Boost, -5.0, 40.0)));
+        let out = (0..20).filter_map(|_| watch.update(&seen(0.5, Phase::Boost, -5.0, 40.0)));
         assert_eq!(out.collect::<Vec<_>>(), [Event::Burnout]);
     }
 
     #[test]
     fn the_booster_is_separated_once_and_apogee_says_whether_it_went() {
         let mut watch = lifted_off();
-        assert_eq!(watch.look(&seen(5.0, Phase::Coast, -2.0, 20.0)), None);
-        assert_eq!(watch.look(&seen(5.1, Phase::Coast, -2.0, 19.6)), Some(Event::SeparationDue));
+        assert_eq!(watch.update(&seen(5.0, Phase::Coast, -2.0, 20.0)), None);
+        assert_eq!(watch.update(&seen(5.1, Phase::Coast, -2.0, 19.6)), Some(Event::SeparationDue));
         assert!(watch.separates());
-        assert_eq!(watch.look(&seen(5.2, Phase::Coast, -2.0, 18.6)), None);
-        let stuck = AscentSeen { booster_attached: true, ..seen(7.2, Phase::Coast, 0.0, -0.01) };
-        let events: Vec<_> = (0..3).filter_map(|_| watch.look(&stuck)).collect();
+        assert_eq!(watch.update(&seen(5.2, Phase::Coast, -2.0, 18.6)), None);
+        let stuck = AscentReadings { booster_attached: true, ..seen(7.2, Phase::Coast, 0.0, -0.01) };
+        let events: Vec<_> = (0..3).filter_map(|_| watch.update(&stuck)).collect();
         assert_eq!(events, [Event::Apogee { booster_attached: true }]);
     }
 
@@ -356,12 +356,12 @@ mod tests {
         for frame in 0..1_800 {
             let time_s = 0.005 * f64::from(frame);
             let altitude_m = 60.0 * time_s - 5.0 * time_s * time_s;
-            let dead = AscentSeen {
+            let dead = AscentReadings {
                 pressure_altitude_m: (frame % 4 == 0).then_some(altitude_m),
                 booster_attached: true,
                 ..seen(time_s, Phase::Boost, 0.0, -9.81 * time_s)
             };
-            events.extend(watch.look(&dead).map(|event| (time_s, event)));
+            events.extend(watch.update(&dead).map(|event| (time_s, event)));
         }
         assert_eq!(events[0].1, Event::LiftOff);
         // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
@@ -378,11 +378,11 @@ mod tests {
         for frame in 0..400 {
             let time_s = 0.005 * f64::from(frame);
             let jump_m = if time_s < 1.0 { 0.0 } else { -20.0 };
-            let climbing = AscentSeen {
+            let climbing = AscentReadings {
                 pressure_altitude_m: Some(100.0 + 40.0 * time_s + jump_m),
                 ..seen(time_s, Phase::Coast, -2.0, 40.0)
             };
-            assert_eq!(watch.look(&climbing), None, "{time_s}");
+            assert_eq!(watch.update(&climbing), None, "{time_s}");
         }
     }
 
@@ -390,19 +390,19 @@ mod tests {
     #[test]
     fn the_charges_pressure_is_no_apogee_and_a_lasting_one_is() {
         let mut watch = lifted_off();
-        let at = |time_s: f64, altitude_m: f64| AscentSeen {
+        let at = |time_s: f64, altitude_m: f64| AscentReadings {
             pressure_altitude_m: Some(altitude_m),
             ..seen(time_s, Phase::Coast, -2.0, 15.0)
         };
-        assert_eq!(watch.look(&at(5.0, 280.0)), Some(Event::SeparationDue));
+        assert_eq!(watch.update(&at(5.0, 280.0)), Some(Event::SeparationDue));
         for frame in 0..190 {
             let time_s = 5.005 + 0.005 * f64::from(frame);
-            assert_eq!(watch.look(&at(time_s, 240.0)), None, "{time_s}");
+            assert_eq!(watch.update(&at(time_s, 240.0)), None, "{time_s}");
         }
         // A stuck estimate, and a barometer that has sunk for 0.2 s.
         let events: Vec<_> = (0..45)
             .filter_map(|frame| {
-                watch.look(&at(7.0 + 0.005 * f64::from(frame), 273.0)).map(|event| (frame, event))
+                watch.update(&at(7.0 + 0.005 * f64::from(frame), 273.0)).map(|event| (frame, event))
             })
             .collect();
         assert_eq!(events.first(), Some(&(39, Event::Apogee { booster_attached: false })));
@@ -417,7 +417,7 @@ mod tests {
             if *time_s < stuck_from_s {
                 fin_rad += (told_rad - fin_rad).clamp(-rate_rad_s * FRAME_S, rate_rad_s * FRAME_S);
             }
-            watch.look(&[0.6, fin_rad, 0.6, 0.6], &[0.6, told_rad, 0.6, 0.6], FRAME_S);
+            watch.update(&[0.6, fin_rad, 0.6, 0.6], &[0.6, told_rad, 0.6, 0.6], FRAME_S);
             watch.any_stuck()
         })
     }

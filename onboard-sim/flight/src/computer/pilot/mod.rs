@@ -1,20 +1,20 @@
 //! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
 //!
 //! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms: estimate, watch
-//! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the outlook and plans the
+//! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the prediction and plans the
 //! landing.
 
 mod ascent;
-mod known;
-mod outlook;
+mod prediction;
 mod step;
+mod vehicle_model;
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
-use self::known::Known;
-pub use self::outlook::{ApogeeAhead, Outlook, touchdown_from_below_m, touchdown_m};
+pub use self::prediction::{ApogeeAhead, Prediction, touchdown_from_below_m, touchdown_m};
+use self::vehicle_model::VehicleModel;
 use crate::computer::Input;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
@@ -55,14 +55,14 @@ pub(super) struct Pointed {
 /// The pilot and everything that it remembers.
 #[derive(Debug, Clone, Serialize)]
 pub struct Pilot {
-    known: Known,
+    model: VehicleModel,
     estimator: Estimator,
     estimate: Option<Estimate>,
     ascent: AscentWatch,
     /// Height at which the fall begins or began, m.
     apogee_m: f64,
     ignited_at_s: Option<f64>,
-    outlook: Outlook,
+    prediction: Prediction,
     powered: PoweredGuidance,
     /// The law that flies the landing burn instead of a plan, if any.
     baseline: Option<Baseline>,
@@ -86,7 +86,7 @@ impl Pilot {
     ) -> Self {
         let airframe = &mission.airframe;
         let frame_s = mission.estimator.frame_s;
-        let known = Known {
+        let model = VehicleModel {
             mission: mission.clone(),
             mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
             motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
@@ -104,8 +104,8 @@ impl Pilot {
                 _ => mission.start.height_m,
             },
             ignited_at_s: None,
-            outlook: Outlook::default(),
-            powered: known.guidance(),
+            prediction: Prediction::default(),
+            powered: model.guidance(),
             baseline: None,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
@@ -114,13 +114,13 @@ impl Pilot {
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
             gate_shut_since_s: None,
-            known,
+            model,
         }
     }
 
     /// Takes over the state on the rail, and the gyro's bias, body, rad/s, from there.
     pub(super) fn stand(&mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) {
-        let config = &self.known.mission.estimator;
+        let config = &self.model.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
         self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
     }
@@ -136,8 +136,8 @@ impl Pilot {
     }
 
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
-    pub(super) fn feels_lift_off(&mut self, sensed: &Sensed) -> bool {
-        self.ascent.feels_lift_off(axial_m_s2(sensed), self.known.mission.estimator.frame_s)
+    pub(super) fn detects_lift_off(&mut self, sensed: &Sensed) -> bool {
+        self.ascent.detects_lift_off(axial_m_s2(sensed), self.model.mission.estimator.frame_s)
     }
 
     /// Sets the law that flies the landing burn from now on.
@@ -168,24 +168,24 @@ impl Pilot {
         self.powered.report()
     }
 
-    /// The outlook on ignition and abort.
-    pub fn outlook(&self) -> &Outlook {
-        &self.outlook
+    /// The prediction on ignition and abort.
+    pub fn prediction(&self) -> &Prediction {
+        &self.prediction
     }
 
     /// The landing motor as certified.
     pub fn curve(&self) -> &ThrustCurve {
-        &self.known.mission.motor_curve
+        &self.model.mission.motor_curve
     }
 
     /// The motor as estimated in flight, and the scale of the aerodynamic forces.
     pub fn motor(&self) -> &MotorEstimate {
-        &self.known.motor
+        &self.model.motor
     }
 
     /// Time since the landing motor's thrust began, s.
     pub fn burning_s(&self, time_s: f64) -> Option<f64> {
-        self.known.burning_s(time_s)
+        self.model.burning_s(time_s)
     }
 
     /// When the landing motor was commanded to light, s.
@@ -210,7 +210,7 @@ impl Pilot {
         Self {
             powered: self.powered.reconfigured(&mission.powered),
             aim_loop: self.aim_loop.reconfigured(mission.aim),
-            known: Known { mission: mission.clone(), mass, ..self.known.clone() },
+            model: VehicleModel { mission: mission.clone(), mass, ..self.model.clone() },
             ..self.clone()
         }
     }
@@ -229,7 +229,7 @@ impl Pilot {
 
     /// The mission it flies.
     pub fn mission(&self) -> &Mission {
-        &self.known.mission
+        &self.model.mission
     }
 
     /// The landing planned in this frame, solved separately; `None` if none was planned. `before` is this pilot one
@@ -243,7 +243,7 @@ impl Pilot {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
         let estimate = self.estimate.as_ref()?;
         let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
-        let (preferred, fallback) = self.known.situations_to_plan(estimate, &burning, &input.fins_rad);
+        let (preferred, fallback) = self.model.situations_to_plan(estimate, &burning, &input.fins_rad);
         before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
     }
 }
@@ -251,7 +251,7 @@ impl Pilot {
 // What a pilot saves for a restart in the air, and how it goes on.
 
 /// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has
-/// seen of its ascent and of its fins. Covariances of the estimator, outlook, plan and gimbal loop are not kept.
+/// seen of its ascent and of its fins. Covariances of the estimator, prediction, plan and gimbal loop are not kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
@@ -268,7 +268,7 @@ pub struct SavedPilot {
 impl Pilot {
     pub(super) fn saved(&self) -> SavedPilot {
         SavedPilot {
-            motor: self.known.motor,
+            motor: self.model.motor,
             estimate: self.estimate,
             ascent: self.ascent,
             apogee_m: self.apogee_m,
@@ -285,7 +285,7 @@ impl Pilot {
     /// at apogee.
     #[must_use]
     pub(super) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
-        let mission = &self.known.mission;
+        let mission = &self.model.mission;
         let uncertainty = StartUncertainty::at_apogee();
         let estimator = saved.estimate.map_or_else(
             || self.estimator.clone(),
@@ -328,7 +328,7 @@ impl Pilot {
             gimbal_rad,
             ..self.clone()
         };
-        resumed.known.motor = motor;
+        resumed.model.motor = motor;
         resumed
     }
 }

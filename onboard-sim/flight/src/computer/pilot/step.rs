@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::ascent::{AscentSeen, axial_m_s2, words_of_ascent};
-use super::known::Burning;
-use super::outlook::{commit_height_m, touchdown_m};
-use super::{FRAMES_PER_PLAN, Outlook, Pilot, Pointed, Sensed};
+use super::ascent::{AscentReadings, axial_m_s2, words_of_ascent};
+use super::prediction::{commit_height_m, touchdown_m};
+use super::vehicle_model::Burning;
+use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction, Sensed};
 use crate::computer::Input;
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
@@ -64,18 +64,18 @@ impl Pilot {
     /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
     pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
         let Some(estimate) = self.estimate else { return };
-        // Before the outlook: at apogee an abort has to know at once whether the parachute has room.
+        // Before the prediction: at apogee an abort has to know at once whether the parachute has room.
         self.watch_the_ascent(table, input, &estimate);
         // A drop lasts 2 to 3 s, so it is predicted in every planning frame.
-        let dropped = self.known.mission.start.at == StartPoint::Drone;
+        let dropped = self.model.mission.start.at == StartPoint::Drone;
         let far = table.mode().phase == Phase::AeroDescent && !dropped;
         let due = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
-        // Without an outlook, right after apogee and after a restart, an abort would not know whether the parachute has
+        // Without an prediction, right after apogee and after a restart, an abort would not know whether the parachute has
         // room.
-        if (due || self.outlook == Outlook::default()) && table.mode().phase.in_descent() {
-            self.look_ahead(&estimate, self.density_kg_m3(&estimate));
+        if (due || self.prediction == Prediction::default()) && table.mode().phase.in_descent() {
+            self.update_prediction(&estimate, self.density_kg_m3(&estimate));
         }
-        self.fin_watch.look(&input.fins_rad, &self.fins_rad, self.known.mission.estimator.frame_s);
+        self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
     /// Plans the landing in every tenth frame of a burn that no simpler law flies. Returns whether this was a frame to plan
@@ -112,7 +112,7 @@ impl Pilot {
                         None => [0.0; 2],
                     },
                 };
-                let mass = self.known.mass_now(self.known.burning_s(input.time_s));
+                let mass = self.model.mass_now(self.model.burning_s(input.time_s));
                 self.fins_rad =
                     self.fins(mode, estimate, &mass, self.density_kg_m3(estimate), burning.is_some());
             }
@@ -127,41 +127,41 @@ impl Pilot {
 
     /// The vehicle with its motor burning; `None` if it does not burn.
     pub(super) fn burning(&self, mode: &Mode, time_s: f64) -> Option<Burning> {
-        let burning_s = self.known.burning_s(time_s)?;
+        let burning_s = self.model.burning_s(time_s)?;
         Some(Burning {
             burning_s,
-            mass: self.known.mass_now(Some(burning_s)),
+            mass: self.model.mass_now(Some(burning_s)),
             density_kg_m3: self.density_kg_m3(self.estimate.as_ref()?),
-            lands_here: mode.interlocks.lands_here,
+            lands_in_place: mode.interlocks.lands_in_place,
         })
     }
 
     /// Of the air at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
-        Air::at_height_m(self.known.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
+        Air::at_height_m(self.model.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
     }
 
     /// Commands of the simpler law, if one flies the landing burn: gimbal and fins, rad.
     fn baseline_commands(&mut self, burning_s: f64, estimate: &Estimate) -> Option<([f64; 2], [f64; 4])> {
         let baseline = self.baseline.as_mut()?;
-        Some(baseline.commands_rad(burning_s, estimate, &self.known.motor))
+        Some(baseline.commands_rad(burning_s, estimate, &self.model.motor))
     }
 
     fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
         match input.sensed {
             Sensed::Known(estimate) => estimate,
             Sensed::Measured(measurements) => {
-                let burning_s = self.known.burning_s(input.time_s);
-                let mass = self.known.mass_now(burning_s);
+                let burning_s = self.model.burning_s(input.time_s);
+                let mass = self.model.mass_now(burning_s);
                 let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
-                let air = Air::at_height_m(self.known.mission.pad_altitude_m + height_m);
+                let air = Air::at_height_m(self.model.mission.pad_altitude_m + height_m);
                 let vehicle = VehicleNow::of(
-                    self.known.airframe(),
+                    self.model.airframe(),
                     &mass,
                     air.density_kg_m3,
                     input.fins_rad,
                     burning_s.is_some() || phase.in_landing_burn(),
-                    self.known.mission.lidar_ahead_of_feet_m,
+                    self.model.mission.lidar_ahead_of_feet_m,
                 );
                 let (measurements, vehicle) = if phase.before_apogee() {
                     on_the_way_up(&measurements, &vehicle, phase)
@@ -179,18 +179,18 @@ impl Pilot {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
-        let mass = self.known.mass_now(self.known.burning_s(input.time_s));
+        let mass = self.model.mass_now(self.model.burning_s(input.time_s));
         let burning = phase.in_landing_burn();
         let vehicle = VehicleNow::of(
-            self.known.airframe(),
+            self.model.airframe(),
             &mass,
             self.density_kg_m3(estimate),
             input.fins_rad,
             burning,
-            self.known.mission.lidar_ahead_of_feet_m,
+            self.model.mission.lidar_ahead_of_feet_m,
         );
-        let burns = self.known.motor.stage() == MotorStage::Burning;
-        let vehicle = if burns { vehicle.in_exhaust(&self.known.mission.exhaust) } else { vehicle };
+        let burns = self.model.motor.stage() == MotorStage::Burning;
+        let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
         let sample = MotorSample {
@@ -201,38 +201,38 @@ impl Pilot {
             gimbal_rad: self.gimbal_rad,
             may_burn: burning,
         };
-        self.known.motor.update(&self.known.mission.motor_curve, &sample);
+        self.model.motor.update(&self.model.mission.motor_curve, &sample);
     }
 
-    fn look_ahead(&mut self, estimate: &Estimate, density_kg_m3: f64) {
-        let column = self.known.column(density_kg_m3, self.known.mission.soft_tilt_deg);
+    fn update_prediction(&mut self, estimate: &Estimate, density_kg_m3: f64) {
+        let column = self.model.column(density_kg_m3, self.model.mission.soft_tilt_deg);
         let state = &estimate.state;
-        let height_m = state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0));
+        let height_m = state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0));
         let vertical_m_s = state.velocity_m_s.z;
-        let fins_m2 = self.known.motor.air_scale() * self.known.fin_drag_area_m2(&self.fins_rad);
-        let ignition = self.known.mission.ignition.outlook(
+        let fins_m2 = self.model.motor.air_scale() * self.model.fin_drag_area_m2(&self.fins_rad);
+        let ignition = self.model.mission.ignition.prediction(
             &column,
-            &self.known.mission.motor_curve,
+            &self.model.mission.motor_curve,
             height_m,
             vertical_m_s,
             fins_m2,
         );
         let lands_ahead = ignition.band.is_some()
-            || self.known.mission.ignition.lands_ahead(
+            || self.model.mission.ignition.lands_ahead(
                 &column,
-                &self.known.mission.motor_curve,
+                &self.model.mission.motor_curve,
                 height_m,
                 vertical_m_s,
                 fins_m2,
             );
-        let parachute = &self.known.airframe().parachute;
+        let parachute = &self.model.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
         // The speed after the fall from apogee so far, with drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let fallen_m = (self.apogee_m - state.position_m.z).max(0.0);
         let shed =
-            libm::exp(-2.0 * self.known.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
-        self.outlook = Outlook {
+            libm::exp(-2.0 * self.model.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
+        self.prediction = Prediction {
             ignition,
             commit_height_m: commit_height_m(
                 state.velocity_m_s.norm(),
@@ -249,16 +249,16 @@ impl Pilot {
     /// Moves through the phases up to apogee.
     fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
         let phase = table.mode().phase;
-        let Some(launch) = self.known.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
+        let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
         };
         let pressure_altitude_m = match &input.sensed {
             Sensed::Known(_) => None,
             Sensed::Measured(measured) => measured.pressure_altitude_m,
         };
-        let seen = AscentSeen {
+        let seen = AscentReadings {
             time_s: input.time_s,
-            frame_s: self.known.mission.estimator.frame_s,
+            frame_s: self.model.mission.estimator.frame_s,
             phase,
             axial_specific_force_m_s2: axial_m_s2(&input.sensed),
             pressure_altitude_m,
@@ -266,7 +266,7 @@ impl Pilot {
             booster_attached: input.booster_attached,
             separate_before_apogee_s: launch.separate_before_apogee_s,
         };
-        let Some(event) = self.ascent.look(&seen) else { return };
+        let Some(event) = self.ascent.update(&seen) else { return };
         if let Event::Apogee { .. } = event {
             self.apogee_m = estimate.state.position_m.z;
         }
@@ -290,17 +290,17 @@ impl Pilot {
             }
             Phase::AeroDescent => {
                 let soon = self
-                    .outlook
+                    .prediction
                     .ignition
                     .command_in_s
-                    .is_some_and(|in_s| in_s <= self.known.mission.ignition.arm_before_s);
+                    .is_some_and(|in_s| in_s <= self.model.mission.ignition.arm_before_s);
                 if soon {
                     self.happen(table, Event::LandArm, time_s);
                 }
             }
             Phase::LandArmed => self.consider_ignition(table, input, estimate),
             Phase::Ignition => {
-                if self.known.burning_s(time_s).is_some() {
+                if self.model.burning_s(time_s).is_some() {
                     self.happen(table, Event::ThrustConfirmed, time_s);
                 } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
                     && !table.mode().interlocks.no_light_latched
@@ -311,13 +311,13 @@ impl Pilot {
             _ => {}
         }
         if input.contact && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed) {
-            let burning_s = self.known.burning_s(time_s);
-            let mass = self.known.mass_now(burning_s);
-            let thrust_n = burning_s.map_or(0.0, |burning_s| self.known.burn().thrust_n(burning_s));
-            let thrust_below_weight = thrust_n < mass.mass_kg * self.known.mission.gravity_m_s2;
+            let burning_s = self.model.burning_s(time_s);
+            let mass = self.model.mass_now(burning_s);
+            let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
+            let thrust_below_weight = thrust_n < mass.mass_kg * self.model.mission.gravity_m_s2;
             self.happen(table, Event::Contact { thrust_below_weight }, time_s);
         }
-        if table.mode().motor == Motor::Burning && self.known.burn_is_over(time_s) {
+        if table.mode().motor == Motor::Burning && self.model.burn_is_over(time_s) {
             self.happen(table, Event::Burnout, time_s);
         }
     }
@@ -331,16 +331,16 @@ impl Pilot {
 
     /// Height of the feet, m.
     pub(super) fn feet_height_m(&self, estimate: &Estimate) -> f64 {
-        estimate.state.position_m.z - self.known.feet_below_cg_m(&self.known.mass.at(0.0))
+        estimate.state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0))
     }
 
     /// Height at which thrust, commanded at the next frame, would begin, m.
     pub(super) fn onset_m(&self, estimate: &Estimate) -> f64 {
-        self.outlook.ignition.onset_height_m - (self.outlook.height_m - self.feet_height_m(estimate))
+        self.prediction.ignition.onset_height_m - (self.prediction.height_m - self.feet_height_m(estimate))
     }
 
     pub(super) fn ignition_overdue_s(&self, estimate: &Estimate) -> Option<f64> {
-        self.outlook.ignition.overdue_s(self.onset_m(estimate))
+        self.prediction.ignition.overdue_s(self.onset_m(estimate))
     }
 
     /// The event that an abort is now, from the findings of the last frame, if there was one.
@@ -358,9 +358,9 @@ impl Pilot {
 
     /// Room to spare where the motor is another way down, and just enough where it is not.
     fn parachute_has_room(&self, gate_open: bool) -> bool {
-        let outlook = &self.outlook;
-        let enough_m = if gate_open { outlook.commit_height_m } else { outlook.filling_height_m() };
-        outlook.height_m > enough_m
+        let prediction = &self.prediction;
+        let enough_m = if gate_open { prediction.commit_height_m } else { prediction.filling_height_m() };
+        prediction.height_m > enough_m
     }
 
     fn gate_open(&mut self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> bool {
@@ -376,12 +376,12 @@ impl Pilot {
             vertical_speed_m_s: state.velocity_m_s.z,
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
             speed_m_s: state.velocity_m_s.norm(),
-            predicted_speed_m_s: self.outlook.predicted_speed_m_s,
+            predicted_speed_m_s: self.prediction.predicted_speed_m_s,
             // With one source left there is no disagreement; the estimator's health says whether that source is
             // reliable.
             height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
-            landing_feasible: self.outlook.ignition.band.is_some_and(|band| band.contains(onset_m)),
-            predicted_touchdown_x_m: self.outlook.touchdown_distance_m,
+            landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
+            predicted_touchdown_x_m: self.prediction.touchdown_distance_m,
             fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
             parachute_stowed: mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
@@ -391,7 +391,7 @@ impl Pilot {
 
     /// The first check that keeps the gate shut.
     pub(super) fn gate_shut_by(&self, found: &GateInput) -> Option<&'static str> {
-        let checks = gate_checks(&self.known.mission.gate, found);
+        let checks = gate_checks(&self.model.mission.gate, found);
         checks.iter().find(|check| !check.passed).map(|check| check.name)
     }
 
@@ -423,12 +423,12 @@ impl Pilot {
 
     fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
         let state = &estimate.state;
-        if self.known.mission.powered.space.is_some() {
-            let fins_m2 = self.known.largest_fin_drag_area_m2();
-            let situated = self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2);
+        if self.model.mission.powered.space.is_some() {
+            let fins_m2 = self.model.largest_fin_drag_area_m2();
+            let situated = self.model.powered_situation(estimate, situation, self.model.burn(), fins_m2);
             self.powered.plan(time_s, state, &situated, None);
         } else {
-            let (preferred, fallback) = self.known.situations_to_plan(estimate, situation, fins_rad);
+            let (preferred, fallback) = self.model.situations_to_plan(estimate, situation, fins_rad);
             self.powered.plan(time_s, state, &preferred, fallback.as_ref());
         }
         if self.powered.fin_share(time_s).is_none() {
@@ -438,16 +438,16 @@ impl Pilot {
 
     /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
     fn fin_share_of_band(&self, estimate: &Estimate, situation: &Burning) -> f64 {
-        let column = self.known.column(situation.density_kg_m3, self.known.mission.fin_soft_tilt_deg);
-        let sigmas = self.known.mission.fin_sigmas;
+        let column = self.model.column(situation.density_kg_m3, self.model.mission.fin_soft_tilt_deg);
+        let sigmas = self.model.mission.fin_sigmas;
         let [weak, strong] =
-            [-sigmas, sigmas].map(|sigmas| self.known.doubted_burn(situation.burning_s, sigmas));
+            [-sigmas, sigmas].map(|sigmas| self.model.doubted_burn(situation.burning_s, sigmas));
         column.fin_share(
             [&weak, &strong],
             situation.burning_s,
             estimate.state.velocity_m_s.z,
-            estimate.state.position_m.z - self.known.feet_below_cg_m(&situation.mass),
-            self.known.mission.fin_place,
+            estimate.state.position_m.z - self.model.feet_below_cg_m(&situation.mass),
+            self.model.mission.fin_place,
         )
     }
 
@@ -458,11 +458,11 @@ impl Pilot {
         situation: &Burning,
         fins_rad: &[f64; 4],
     ) -> [f64; 2] {
-        let fins_m2 = self.known.fin_drag_area_m2(fins_rad);
+        let fins_m2 = self.model.fin_drag_area_m2(fins_rad);
         let aim: Aim = self.powered.aim(
             time_s,
             &estimate.state,
-            &self.known.powered_situation(estimate, situation, self.known.burn(), fins_m2),
+            &self.model.powered_situation(estimate, situation, self.model.burn(), fins_m2),
         );
         self.turned_towards(&aim, estimate, situation)
     }
@@ -470,18 +470,18 @@ impl Pilot {
     /// Whether the thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the
     /// gimbal holds it upright until the thrust ends.
     fn balances(&self, mode: &Mode) -> bool {
-        self.known.mission.upright_after_contact && mode.phase == Phase::Touchdown
+        self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown
     }
 
     /// The gimbal's command that turns the nose as an aim wants.
     fn turned_towards(&mut self, aim: &Aim, estimate: &Estimate, situation: &Burning) -> [f64; 2] {
-        let thrust_n = self.known.burn().thrust_n(situation.burning_s);
+        let thrust_n = self.model.burn().thrust_n(situation.burning_s);
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
             thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2
         } else {
             0.0
         };
-        let limit_rad = self.known.airframe().gimbal.limit_rad();
+        let limit_rad = self.model.airframe().gimbal.limit_rad();
         self.aim_loop.command_rad(
             &estimate.state.world_from_body,
             &estimate.state.rate_rad_s,
@@ -499,7 +499,7 @@ impl Pilot {
         density_kg_m3: f64,
         burning: bool,
     ) -> [f64; 4] {
-        let fins = &self.known.airframe().fins;
+        let fins = &self.model.airframe().fins;
         // If no landing is steered for, the fins brake, fully open.
         let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
             && !mode.interlocks.landing_motor_inhibited;
@@ -511,31 +511,31 @@ impl Pilot {
                 _ => [fins.open_rad(); 4],
             };
         }
-        let largest_m2 = self.known.largest_fin_drag_area_m2();
+        let largest_m2 = self.model.largest_fin_drag_area_m2();
         let situation = DescentSituation {
             mass_kg: mass.mass_kg,
             inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
             air_density_kg_m3: density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            drag_area_m2: self.known.body_drag_area_m2() + self.known.fin_drag_area_m2(&self.fins_rad),
-            crossflow_area_m2: self.known.crossflow_area_m2(),
-            fin_restoring_m3: self.known.fin_drag_area_m2(&self.fins_rad)
+            drag_area_m2: self.model.body_drag_area_m2() + self.model.fin_drag_area_m2(&self.fins_rad),
+            crossflow_area_m2: self.model.crossflow_area_m2(),
+            fin_restoring_m3: self.model.fin_drag_area_m2(&self.fins_rad)
                 * (fins.station_m - mass.cg_station_m),
-            body_behind_cg_m: mass.cg_station_m - 0.5 * self.known.airframe().body.length_m,
-            time_to_go_s: self.outlook.ignition.command_in_s,
+            body_behind_cg_m: mass.cg_station_m - 0.5 * self.model.airframe().body.length_m,
+            time_to_go_s: self.prediction.ignition.command_in_s,
         };
         let demand =
-            self.known.mission.descent.demand(&estimate.state, &situation, self.known.mission.steered);
+            self.model.mission.descent.demand(&estimate.state, &situation, self.model.mission.steered);
         let (moments, drag_area_m2, min_rad) = if burning {
             // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
-        } else if self.known.mission.steered && !lies_across_the_air(estimate) {
+        } else if self.model.mission.steered && !lies_across_the_air(estimate) {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())
         } else {
             return [fins.open_rad(); 4];
         };
         let allocation = Allocation {
-            model: self.known.airframe().fin_model(),
+            model: self.model.airframe().fin_model(),
             arm_m: fins.station_m - mass.cg_station_m,
             range: OpeningRange { min_rad, max_rad: fins.open_rad() },
         };

@@ -201,7 +201,7 @@ impl Estimator {
         if let Some(range_m) = measurements.lidar_range_m {
             self.take_lidar(range_m, vehicle.lidar_behind_cg_m);
         }
-        self.feel_wind(vehicle);
+        self.update_wind(vehicle);
         self.guard();
         self.estimate()
     }

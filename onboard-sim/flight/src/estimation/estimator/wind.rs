@@ -63,7 +63,7 @@ fn felt_sideways(
 
 impl Estimator {
     /// Corrects the wind with one frame.
-    pub(super) fn feel_wind(&mut self, vehicle: &VehicleNow) {
+    pub(super) fn update_wind(&mut self, vehicle: &VehicleNow) {
         let through_air = self.velocity_through_air_m_s();
         let dynamic_pressure_pa = 0.5 * vehicle.air_density_kg_m3 * through_air.norm_squared();
         let felt = dynamic_pressure_pa > SMALLEST_DYNAMIC_PRESSURE_PA;

@@ -50,7 +50,7 @@ const CONTACT_LEAN_RAD: f64 = 0.0873;
 
 /// Factor on the cost of tilt when a plan tilts too far. It holds for a vehicle that is high, too: with its far leans an abort
 /// that lights the motor high comes down hard even in a world without errors.
-const UPRIGHT_DEARER: f64 = 8.0;
+const UPRIGHT_COST_FACTOR: f64 = 8.0;
 
 /// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one.
 const SOFT_M_S: f64 = -0.7;
@@ -59,7 +59,7 @@ const SOFT_M_S: f64 = -0.7;
 const HARD_M_S: f64 = -1.2;
 
 /// A plan that still tilts further than this is not flown, rad: its nose points below the horizon.
-const TILT_BELIEVED_RAD: f64 = 1.6;
+const PLAN_TILT_MAX_RAD: f64 = 1.6;
 
 /// Velocity along the nose at the plan's touchdown, m/s; minus infinity without a plan.
 fn ended_m_s(plan: &FreeTimeSolution) -> f64 {
@@ -209,7 +209,7 @@ impl PoweredGuidance {
         let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
         if tilts && !self.workspace.is_spent() {
             // A loop satisfies the equations, but no vehicle can fly it in air. Solve again with a higher cost of tilt.
-            problem.landing.state_weights[2] *= UPRIGHT_DEARER;
+            problem.landing.state_weights[2] *= UPRIGHT_COST_FACTOR;
             solve_free_time_into(problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
         }
     }
@@ -229,7 +229,7 @@ impl PoweredGuidance {
         let intervals =
             (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
         let step_s = horizon_s / intervals as f64;
-        let target_x_m = if situation.lands_here {
+        let target_x_m = if situation.lands_in_place {
             here_m(initial.x_m, along_m_s, horizon_s)
         } else {
             settings.homing.target_m(initial.x_m, along_m_s, horizon_s)
@@ -269,7 +269,7 @@ impl PoweredGuidance {
         let largest_tilt_rad = largest_tilt_rad(&self.trial);
         let usable = !solution.inputs_rad.is_empty()
             && solution.states.iter().all(PlanarState::is_finite)
-            && largest_tilt_rad < TILT_BELIEVED_RAD
+            && largest_tilt_rad < PLAN_TILT_MAX_RAD
             && solution.inputs_rad.iter().all(|input| input.is_finite());
         let level = match () {
             () if !usable => match &self.flown {
@@ -365,7 +365,7 @@ impl PoweredGuidance {
             return Aim::at(state.nose_in_world());
         }
         // Across the plane the vehicle homes to the pad while there is time, unless homing is off.
-        let homing_per_s2 = if situation.lands_here { 0.0 } else { self.settings.across_homing_per_s2 };
+        let homing_per_s2 = if situation.lands_in_place { 0.0 } else { self.settings.across_homing_per_s2 };
         let homing = homing_per_s2
             * ((left_s - HOMING_ENDS_S) / HOMING_ENDS_S).clamp(0.0, 1.0)
             * state.position_m.dot(&plane.across).clamp(-HOMING_MOST_M, HOMING_MOST_M);
@@ -447,7 +447,7 @@ mod tests {
             crossflow_area_m2: 0.062,
             fin_drag_area_m2: 0.0,
             gimbal_limit_rad: 5.0_f64.to_radians(),
-            lands_here: false,
+            lands_in_place: false,
             high,
         };
         let state = RigidState {

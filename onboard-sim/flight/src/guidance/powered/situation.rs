@@ -39,7 +39,7 @@ pub struct PoweredSituation<'a> {
     /// Largest gimbal angle, rad.
     pub gimbal_limit_rad: f64,
     /// After an abort: the vehicle lands on the ground below, not on the pad.
-    pub lands_here: bool,
+    pub lands_in_place: bool,
     /// High in the band of feasible heights or above it: more thrust has to be turned away than is easy.
     pub high: bool,
 }
@@ -287,7 +287,7 @@ mod tests {
             crossflow_area_m2: 0.05,
             fin_drag_area_m2: 0.01,
             gimbal_limit_rad: 0.1,
-            lands_here: false,
+            lands_in_place: false,
             high: false,
         };
         // 0.1 m above the ground and sinking at 0.5 m/s.

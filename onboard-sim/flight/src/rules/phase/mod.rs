@@ -142,7 +142,7 @@ pub struct Interlocks {
     /// The landing motor was commanded and gave no thrust in time.
     pub no_light_latched: bool,
     /// Aborted too low for the parachute, or with the landing motor lit, which has no cut-off: the vehicle lands on the ground below.
-    pub lands_here: bool,
+    pub lands_in_place: bool,
 }
 
 /// Phase, latches, countdown and motor: the whole state of the table.

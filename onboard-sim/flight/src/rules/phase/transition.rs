@@ -291,9 +291,9 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
             Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
         }
         // The lit motor cannot be stopped, and a parachute under thrust would burn or tangle. So the vehicle lands.
-        P::Ignition | P::Powered if locks.lands_here => Row::Refuse(Refusal::AlreadyAborted),
+        P::Ignition | P::Powered if locks.lands_in_place => Row::Refuse(Refusal::AlreadyAborted),
         P::Ignition | P::Powered => {
-            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
+            let interlocks = Interlocks { abort_latched: true, lands_in_place: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
         }
         P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
@@ -318,7 +318,7 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
         // it at. Of mk2 flights aborted here at a random moment 992 of 1,000 (`field`) and 903 of 999 (`real`) land; lit at once, 852
         // and 737 of them (seed 2001).
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
-            let interlocks = Interlocks { abort_latched: true, lands_here: true, ..locks };
+            let interlocks = Interlocks { abort_latched: true, lands_in_place: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
         }
         P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(
@@ -347,7 +347,7 @@ fn may_light(locks: Interlocks, row: impl FnOnce() -> Row) -> Row {
     match () {
         () if !locks.armed => Row::Refuse(Refusal::NotArmed),
         // An abort too low for the parachute lands on the motor.
-        () if locks.abort_latched && !locks.lands_here => Row::Refuse(Refusal::AbortLatched),
+        () if locks.abort_latched && !locks.lands_in_place => Row::Refuse(Refusal::AbortLatched),
         () if locks.landing_motor_inhibited => Row::Refuse(Refusal::LandingMotorInhibited),
         () => row(),
     }

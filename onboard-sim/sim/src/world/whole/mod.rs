@@ -454,7 +454,7 @@ impl World {
     }
 
     /// The drone lets the vehicle go.
-    pub fn let_go(&mut self) {
+    pub fn release(&mut self) {
         self.hanging = None;
     }
 

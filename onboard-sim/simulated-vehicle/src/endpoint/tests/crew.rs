@@ -3,7 +3,7 @@
 use flight::computer::crew::People;
 use flight::rules::operator::{Name, Operator, Role};
 use protocol::dialect::{TD_CREW_DATA, TdAct, TdHold};
-use protocol::hub::{Hub, News, Received};
+use protocol::hub::{Hub, LinkEvent, Received};
 use protocol::signing::{Key, Memory, Signing};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -143,8 +143,8 @@ impl Launch {
         let received = Received::Stream(0, frame.as_bytes().to_vec());
         for news in self.hub.take(0, received, Duration::ZERO, clock) {
             match news {
-                News::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle),
-                News::Rejected(frame, why) => self.endpoint.on_rejected(&frame, why),
+                LinkEvent::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle),
+                LinkEvent::Rejected(frame, why) => self.endpoint.on_rejected(&frame, why),
                 _ => {}
             }
         }

@@ -6,7 +6,7 @@ use protocol::dialect::{
     FILE_TRANSFER_PROTOCOL_DATA, MavParamError, MavParamType, PARAM_REQUEST_LIST_DATA,
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
-use protocol::ftp::download::{Download, Failure, News};
+use protocol::ftp::download::{Download, DownloadEvent, Failure};
 use protocol::ftp::packet::Refusal;
 use protocol::ftp::server::InMemory;
 use protocol::ftp::{Opcode, Packet};
@@ -280,7 +280,7 @@ impl Wire {
             }
             for frame in self.run(0.5 * FRAME_S) {
                 if let Some((_, packet)) = Packet::answer_in(&frame)
-                    && let Some(News::Piece { offset, data }) = download.take(&packet, now)
+                    && let Some(DownloadEvent::Piece { offset, data }) = download.take(&packet, now)
                 {
                     file[offset as usize..offset as usize + data.len()].copy_from_slice(&data);
                 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use protocol::command::{CommandSender, Resend};
 use protocol::dialect::{MavState, TdInterlock};
 use protocol::hub::line::SHARE;
-use protocol::hub::{Hub, News, Received};
+use protocol::hub::{Hub, LinkEvent, Received};
 use protocol::signing::{Key, Memory, Signing};
 
 use super::*;
@@ -150,7 +150,7 @@ impl Line {
         let ((now, clock), now_s) = (self.clock(), self.now_s());
         let bytes = self.up.arrived(now_s);
         for news in self.vehicle_hub.take(0, Received::Stream(0, bytes), now, clock) {
-            if let News::Frame(frame) = news {
+            if let LinkEvent::Frame(frame) = news {
                 self.endpoint.on_frame(0, &frame, &self.vehicle);
             }
         }
@@ -174,7 +174,7 @@ impl Line {
         let ((now, clock), now_s) = (self.clock(), self.now_s());
         let bytes = self.down.arrived(now_s);
         for news in self.station_hub.take(0, Received::Stream(0, bytes), now, clock) {
-            let News::Frame(frame) = news else { continue };
+            let LinkEvent::Frame(frame) = news else { continue };
             self.sender.on_heard(now);
             self.newest_s = self.newest_s.max(self.made_s[usize::from(frame.sequence())]);
             self.heard.push(frame.message_id());

@@ -42,7 +42,7 @@ impl Told {
 
     /// A frame in which the vehicle's own programme asks for something.
     pub(crate) fn request(&mut self, asked: Asked) -> Answer {
-        let Frame { events, mut answers } =
+        let VehicleStep { events, mut answers } =
             self.vehicle.step(&[Request::of_the_programme(asked)], &mut || Duration::ZERO);
         self.unread.extend(events);
         answers.remove(0)

@@ -146,8 +146,8 @@ fn asked_in(flight: &Sortie, asked: Asked, frames: usize) -> bool {
     let lit = flight.world().booster_thrust_n() > 0.0;
     let mut outputs = answered.commands.outputs;
     for _ in 0..=frames {
-        let lands_here = flight.computer().mode().interlocks.lands_here;
-        let stopped = accepted && !(lands_here && asked == Asked::Abort);
+        let lands_in_place = flight.computer().mode().interlocks.lands_in_place;
+        let stopped = accepted && !(lands_in_place && asked == Asked::Abort);
         assert!(!(stopped && outputs.lights()), "{asked:?} at {:?}: {outputs:?}", flight.computer().mode());
         outputs = flight.step().output.unwrap().commands.outputs;
     }
@@ -355,7 +355,7 @@ fn released_before_it_was_cleared_it_inhibits_the_motor_and_opens_the_parachute(
             assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
         }
         rocket.advance();
-        rocket.vehicle.sortie.world_mut().let_go();
+        rocket.vehicle.sortie.world_mut().release();
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown], "{asked:?}");
         assert!(said(&events, "RELEASED before it was cleared"));

@@ -362,7 +362,7 @@ fn an_abort_under_thrust_lands_and_never_opens_a_parachute() {
     let flight = flight_of("none", &[]);
     for phase in [Phase::Ignition, Phase::Powered] {
         let mut rocket = in_phase(&flight, phase);
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::LandHere);
+        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::LandInPlace);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
         let events = rocket.run_until(Vehicle::is_over);
         assert!(said(&events, "no cut-off exists; landing on the ground below"));

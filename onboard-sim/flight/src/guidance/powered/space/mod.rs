@@ -175,7 +175,7 @@ impl SpaceGuidance {
             stretch(&mut problem, to_s);
             let outcome = self.workspace.solve(&problem, Some(&self.found.start()));
             iterations += outcome.iterations;
-            if outcome.price < best.price {
+            if outcome.merit < best.merit {
                 self.trial.read(&self.workspace, &problem, time_s);
                 core::mem::swap(&mut self.trial, &mut self.found);
                 (best, final_time_s) = (outcome, to_s);
@@ -330,7 +330,7 @@ fn stretch(
         }
     }));
     let target_m = |place_m: f64, velocity_m_s: f64| {
-        if situation.lands_here {
+        if situation.lands_in_place {
             here_m(place_m, velocity_m_s, final_time_s)
         } else {
             settings.homing.target_m(place_m, velocity_m_s, final_time_s)

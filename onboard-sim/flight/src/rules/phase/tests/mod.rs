@@ -312,16 +312,16 @@ fn an_abort_or_a_disarm_before_the_lift_off_leaves_the_vehicle_on_its_pad_as_aft
 }
 
 #[test]
-fn after_an_abort_under_thrust_the_vehicle_lands_here_and_the_phase_stays() {
+fn after_an_abort_under_thrust_the_vehicle_lands_in_place_and_the_phase_stays() {
     let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
     assert_eq!(aborted.mode.phase, Phase::Powered);
-    assert!(aborted.mode.interlocks.lands_here && aborted.effects.is_empty());
+    assert!(aborted.mode.interlocks.lands_in_place && aborted.effects.is_empty());
     assert_eq!(transition(&aborted.mode, ABORT, 2.0).refusal, Some(Refusal::AlreadyAborted));
     let burns = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: true };
     let falls = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
-    assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_here);
+    assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_in_place);
     let lit = transition(&falls, Event::IgnitionGate { open: true }, 2.0);
-    assert!(lit.mode.phase == Phase::Ignition && lit.mode.interlocks.lands_here);
+    assert!(lit.mode.phase == Phase::Ignition && lit.mode.interlocks.lands_in_place);
     assert_eq!(lit.effects, Effects::of(&[Effect::IgniteLandingMotor]));
     let room = Event::AbortRequested { lifted_off: false, above_commit_height: true, gate_open: true };
     let chute = transition(&falls, room, 2.0).mode;
@@ -423,7 +423,7 @@ proptest! {
                 lit += 1;
                 let locks = mode.interlocks;
                 prop_assert!(locks.armed && locks.pin_out);
-                prop_assert!(!locks.landing_motor_inhibited && (!locks.abort_latched || locks.lands_here));
+                prop_assert!(!locks.landing_motor_inhibited && (!locks.abort_latched || locks.lands_in_place));
                 prop_assert!(mode.phase.in_descent());
                 prop_assert_eq!(event, Event::IgnitionGate { open: true });
                 prop_assert_eq!(answer.mode.phase, Phase::Ignition);

@@ -21,7 +21,7 @@ const FALL_MIN_M_S: f64 = 5.0;
 
 /// The forecast before ignition, renewed five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Outlook {
+pub struct Prediction {
     pub ignition: IgnitionOutlook,
     /// Height of the feet below which the parachute has no room to spare, m.
     pub commit_height_m: f64,
@@ -35,7 +35,7 @@ pub struct Outlook {
     pub touchdown_distance_m: f64,
 }
 
-impl Outlook {
+impl Prediction {
     /// Height of the feet below which the parachute does not fill before it reaches the ground, m.
     pub(super) fn filling_height_m(&self) -> f64 {
         self.commit_height_m / COMMIT_MARGIN
@@ -98,7 +98,7 @@ impl Pilot {
     /// `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {
         let estimate = self.estimate.as_ref()?;
-        let (known, state) = (&self.known, &estimate.state);
+        let (known, state) = (&self.model, &estimate.state);
         let column = known.column(self.density_kg_m3(estimate), known.mission.soft_tilt_deg);
         let fins_m2 = known.motor.air_scale() * known.largest_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
@@ -136,7 +136,7 @@ impl Pilot {
         } else {
             self.gate_shut_since_s = None;
         }
-        if !mode.phase.in_descent() || self.outlook.commit_height_m <= 0.0 {
+        if !mode.phase.in_descent() || self.prediction.commit_height_m <= 0.0 {
             return None;
         }
         let lasts = self.gate_shut_since_s.is_some_and(|since_s| {
@@ -145,16 +145,17 @@ impl Pilot {
         });
         let feet_m = self.feet_height_m(estimate);
         let decided_m = BEFORE_S * (-estimate.state.velocity_m_s.z).max(0.0);
-        let filling_m = self.outlook.filling_height_m();
-        let above_commit_m = feet_m - self.outlook.commit_height_m;
+        let filling_m = self.prediction.filling_height_m();
+        let above_commit_m = feet_m - self.prediction.commit_height_m;
         let hopeless = if above_commit_m > 0.0 {
             lasts && above_commit_m < decided_m
         } else {
             let last_room = feet_m - filling_m < decided_m;
             let overdue_s = self.ignition_overdue_s(estimate);
             let refused = overdue_s.is_some() && self.gate_shut_by(&found).is_some();
-            let outside = found.predicted_touchdown_x_m > self.known.mission.gate.fence_radius_m;
-            let too_low = self.outlook.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
+            let outside = found.predicted_touchdown_x_m > self.model.mission.gate.fence_radius_m;
+            let too_low =
+                self.prediction.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
             (lasts && (refused || last_room))
                 || (refused
                     && last_room
@@ -162,7 +163,7 @@ impl Pilot {
                 || too_low
         };
         // Any lower, the parachute reaches the ground before it is ejected.
-        let ejected = feet_m > filling_m - self.known.airframe().parachute.inflation_distance_m;
+        let ejected = feet_m > filling_m - self.model.airframe().parachute.inflation_distance_m;
         (hopeless && ejected).then_some(Event::GateShutForGood { parachute_fills: feet_m > filling_m })
     }
 
@@ -171,7 +172,7 @@ impl Pilot {
     /// The fence needs no margin: steering does not bring the vehicle back. From the commit height to ignition it has half a
     /// second, and the wind carries the predicted touchdown 0.3 to 1.8 m further out (1000 `harsh` flights).
     fn is_shut_by_what_lasts(&self, found: &GateInput) -> bool {
-        let limits = &self.known.mission.gate;
+        let limits = &self.model.mission.gate;
         let speed_error_m_s = (found.speed_m_s - found.predicted_speed_m_s).abs();
         !found.fins_confirmed
             || !found.estimator_healthy
@@ -181,7 +182,7 @@ impl Pilot {
             || found.predicted_touchdown_x_m > limits.fence_radius_m
             || found.height_disagreement_m > FAR_BEYOND * limits.height_disagreement_max_m
             || speed_error_m_s > FAR_BEYOND * limits.speed_error_max_fraction * found.predicted_speed_m_s
-            || !self.outlook.lands_ahead
+            || !self.prediction.lands_ahead
     }
 }
 

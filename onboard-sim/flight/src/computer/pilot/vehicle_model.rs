@@ -16,7 +16,7 @@ use crate::vehicle::rigid::RigidState;
 
 /// The vehicle as the pilot knows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Known {
+pub(super) struct VehicleModel {
     // What is skipped is a constant of the mission.
     #[serde(skip)]
     pub(super) mission: Mission,
@@ -34,10 +34,10 @@ pub(super) struct Burning {
     pub(super) mass: MassProperties,
     pub(super) density_kg_m3: f64,
     /// After an abort: land on the ground below, wherever the pad is.
-    pub(super) lands_here: bool,
+    pub(super) lands_in_place: bool,
 }
 
-impl Known {
+impl VehicleModel {
     pub(super) fn airframe(&self) -> &Airframe {
         &self.mission.airframe
     }
@@ -118,7 +118,8 @@ impl Known {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
         let density_kg_m3 = Air::at_height_m(self.mission.pad_altitude_m).density_kg_m3;
-        let burning = Burning { burning_s: 0.0, mass: self.mass.at(0.0), density_kg_m3, lands_here: false };
+        let burning =
+            Burning { burning_s: 0.0, mass: self.mass.at(0.0), density_kg_m3, lands_in_place: false };
         let fins_m2 = self.largest_fin_drag_area_m2();
         let situation = self.powered_situation(&estimate, &burning, self.burn(), fins_m2);
         PoweredGuidance::with_room(self.mission.powered, &state, &situation)
@@ -147,7 +148,7 @@ impl Known {
             crossflow_area_m2: self.crossflow_area_m2(),
             fin_drag_area_m2: self.motor.air_scale() * self.burning_fins(fin_drag_area_m2),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
-            lands_here: situation.lands_here,
+            lands_in_place: situation.lands_in_place,
             high: false,
         }
     }
@@ -177,7 +178,7 @@ struct Assumed<'a> {
     fin_share: f64,
 }
 
-impl Known {
+impl VehicleModel {
     /// The preferred situation to plan with, and a fallback for the case that its plan lands hard.
     pub(super) fn situations_to_plan<'a>(
         &'a self,
