@@ -63,7 +63,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
         let now = HOUR * hour + at;
         if frame % FRAMES_PER_HEARTBEAT == 0 {
             let beat = station.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-            endpoint.on_frame(0, &beat, &vehicle);
+            endpoint.on_frame(0, &beat, &vehicle.state());
         }
         let asked: &[Asked] = if at >= ON_THE_PAD && !armed && vehicle.phase() == Phase::PadIdle {
             armed = true;
@@ -73,7 +73,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
         };
         let own: Vec<Request> = asked.iter().copied().map(Request::of_the_programme).collect();
         drop(step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO));
-        for outgoing in endpoint.poll(&vehicle) {
+        for outgoing in endpoint.poll(&vehicle.state()) {
             drop(update(model, Msg::Frame(outgoing.frame), now));
         }
         if frame % FRAMES_PER_TICK == 0 {

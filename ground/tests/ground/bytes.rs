@@ -56,7 +56,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
         let now = Duration::from_secs_f64(vehicle.time_s());
         step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
         let mut msgs = Vec::new();
-        for leaving in endpoint.poll(&vehicle) {
+        for leaving in endpoint.poll(&vehicle.state()) {
             let frame = leaving.frame;
             let bytes = frame.as_bytes().len();
             msgs.extend([Msg::Frame(frame), Msg::Received { bytes, framing: FramerCounters::default() }]);
@@ -69,7 +69,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
             pace.mark_message(&msg, &model);
             for action in update(&mut model, msg, now) {
                 if let Action::Send(message) = action {
-                    endpoint.on_frame(0, &encoder.encode(&message), &vehicle);
+                    endpoint.on_frame(0, &encoder.encode(&message), &vehicle.state());
                 }
             }
         }

@@ -108,10 +108,10 @@ impl Pad {
         };
         if self.vehicle.time_s() - self.began_s <= now.as_secs_f64() {
             for frame in arrived(&mut self.up) {
-                self.endpoint.on_frame(0, &frame, &self.vehicle);
+                self.endpoint.on_frame(0, &frame, &self.vehicle.state());
             }
             step(&mut self.endpoint, &mut self.vehicle, &[], &mut || Duration::ZERO);
-            for leaving in self.endpoint.poll(&self.vehicle) {
+            for leaving in self.endpoint.poll(&self.vehicle.state()) {
                 if !matches!(self.lost, Some(Loss::Station | Loss::Downlink | Loss::Link)) {
                     self.down.push((now + self.delay, leaving.frame));
                 }

@@ -37,7 +37,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
     let mut heard = Vec::new();
     let mut stands_s = 0.0;
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {
-        let ready = rocket.phase().on_pad() && rocket.snapshot().checks_failed == 0;
+        let ready = rocket.phase().on_pad() && rocket.state().checks_failed() == 0;
         let own = if ready { vec![Asked::Arm, Asked::Start] } else { asks(&rocket).into_iter().collect() };
         let own: Vec<Request> = own.into_iter().map(Request::of_the_programme).collect();
         step(&mut endpoint, &mut rocket, &own, &mut || Duration::ZERO);
@@ -45,7 +45,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
             stands_s += 0.005;
         }
         let now = Duration::from_secs_f64(rocket.time_s());
-        heard.extend(endpoint.poll(&rocket).into_iter().map(|outgoing| (now, outgoing.frame)));
+        heard.extend(endpoint.poll(&rocket.state()).into_iter().map(|outgoing| (now, outgoing.frame)));
     }
     assert!(rocket.is_over(), "still {:?}", rocket.phase());
     heard
@@ -107,7 +107,7 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
     for (number, below_m) in [(0, 1_000.0), (1, 200.0), (2, 150.0)] {
         let flight = mk2(number, |rocket| {
             let falls = rocket.phase().in_descent();
-            let height_m = rocket.snapshot().descent.map_or(0.0, |descent| descent.height_m);
+            let height_m = rocket.state().airborne().map_or(0.0, |air| air.height_m());
             (falls && height_m < below_m).then_some(Asked::Abort)
         });
         let down = down_at(&flight);

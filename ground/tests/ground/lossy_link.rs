@@ -81,10 +81,10 @@ fn run(seed: u64) -> Run {
         let mut msgs = Vec::new();
         if vehicle.time_s() <= now.as_secs_f64() {
             for frame in up.arrived(now) {
-                endpoint.on_frame(0, &frame, &vehicle);
+                endpoint.on_frame(0, &frame, &vehicle.state());
             }
             step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
-            for leaving in endpoint.poll(&vehicle) {
+            for leaving in endpoint.poll(&vehicle.state()) {
                 down.send(leaving.frame, now);
             }
             if vehicle.aborted() {

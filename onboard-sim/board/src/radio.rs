@@ -2,21 +2,17 @@
 
 use alloc::vec::Vec;
 
-use flight::computer::crew::People;
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::Sensed;
-use flight::computer::{Computer, FRAME_S, Input, Output};
-use flight::rules::operator::Operator;
+use flight::computer::{Computer, Input, Output};
 use flight::rules::outputs::Line;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::mission::StateWeights;
 use flight_log::frame::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
 use protocol::frame::Framer;
 use protocol::mission::MissionHash;
 use vehicle_link::endpoint::{UplinkState, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
-use vehicle_link::snapshot::{self, BatteryFacts, InSpace, Snapshot};
-use vehicle_link::vehicle::{MissionName, Vehicle, VehicleKind};
+use vehicle_link::vehicle::{BatteryFacts, MissionName, VehicleKind, VehicleState};
 
 use crate::stream::{self, OnTheAir};
 
@@ -46,29 +42,16 @@ pub(crate) struct Crewed {
     endpoint: VehicleEndpoint,
     framer: Framer,
     silent_frames: u32,
-    vehicle: VehicleFacts,
+    name: MissionName,
+    sensors: SensorWatch,
+    parachute_ejected: bool,
     /// For the next frame.
     heard: UplinkState,
 }
 
-/// What is known of a vehicle beside its flight computer.
-struct VehicleFacts {
-    mission: Mission,
-    name: MissionName,
-    sensors: SensorWatch,
-    parachute_ejected: bool,
-}
-
-/// A vehicle after a frame.
-struct Flown<'a> {
-    vehicle: &'a VehicleFacts,
-    computer: &'a Computer,
-    input: &'a Input<'a>,
-}
-
 impl Crewed {
     /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml` its text.
-    pub(crate) fn new(kind: VehicleKind, on_the_air: &OnTheAir, mission: Mission, toml: &str) -> Self {
+    pub(crate) fn new(kind: VehicleKind, on_the_air: &OnTheAir, mission: &Mission, toml: &str) -> Self {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
         let endpoint = VehicleEndpoint::new(kind)
             .booted(on_the_air.boot_number)
@@ -85,12 +68,9 @@ impl Crewed {
             endpoint,
             framer: Framer::new(),
             silent_frames: 0,
-            vehicle: VehicleFacts {
-                mission,
-                name,
-                sensors: SensorWatch::default(),
-                parachute_ejected: false,
-            },
+            name,
+            sensors: SensorWatch::default(),
+            parachute_ejected: false,
         }
     }
 
@@ -110,11 +90,24 @@ impl Crewed {
         computer: &Computer,
         radio: &mut impl Radio,
     ) -> stream::Heard {
-        if let Sensed::Measured(measured) = &input.sensed {
-            self.vehicle.sensors.take(measured, input.frame);
-        }
-        self.vehicle.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
-        let flown = Flown { vehicle: &self.vehicle, computer, input };
+        let measured = match &input.sensed {
+            Sensed::Measured(measured) => Some(measured),
+            Sensed::Known(_) => None,
+        };
+        self.sensors.take(measured, input.frame);
+        self.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
+        let flown = VehicleState {
+            computer,
+            time_s: input.time_s,
+            name: &self.name,
+            operators: &[],
+            sensors: &self.sensors,
+            battery: input.battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
+            rehearsed: None,
+            parachute_ejected: self.parachute_ejected,
+            plan_took_s: 0.0,
+            judged: None,
+        };
         self.endpoint.on_answers(&output.answers, &flown);
         for news in &output.news {
             match news {
@@ -148,58 +141,5 @@ impl Crewed {
             commander: self.heard.commander.as_ref().map(commander_to_log),
             requests: self.heard.requests.iter().map(request_to_log).collect(),
         }
-    }
-}
-
-impl Vehicle for Flown<'_> {
-    fn computer(&self) -> &Computer {
-        self.computer
-    }
-
-    fn time_s(&self) -> f64 {
-        self.input.time_s
-    }
-
-    fn mission(&self) -> &MissionName {
-        &self.vehicle.name
-    }
-
-    fn operators(&self) -> &[Operator] {
-        &[]
-    }
-
-    fn people(&self) -> Option<People> {
-        None
-    }
-
-    fn weights(&self) -> StateWeights {
-        self.vehicle.mission.powered.weights
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        let Input { frame, time_s, gimbal_rad, fins_rad, battery_v, log, commander, .. } = *self.input;
-        let known = snapshot::Known {
-            computer: self.computer,
-            time_s,
-            deadline_s: FRAME_S,
-            judged: None,
-            people: None,
-            operators: &[],
-            commander,
-            mission: &self.vehicle.name,
-            log,
-        };
-        let seen = InSpace {
-            known,
-            mission: &self.vehicle.mission,
-            gimbal_rad,
-            fins_rad,
-            sensors: self.vehicle.sensors.facts(frame),
-            battery: battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
-            rehearsed: None,
-            parachute_ejected: self.vehicle.parachute_ejected,
-            took_s: 0.0,
-        };
-        seen.snapshot()
     }
 }

@@ -167,7 +167,7 @@ impl Flying {
         let mission = flight::vehicles::mission::from_toml(&begin.toml, "mission");
         let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start);
         let computer = RecordedComputer::started(&mission, &begin.start, controller);
-        let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, mission, &begin.toml));
+        let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, &mission, &begin.toml));
         Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })
     }
 }

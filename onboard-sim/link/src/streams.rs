@@ -20,7 +20,7 @@ use protocol::hub::line::SHARE;
 use protocol::identity::RADIO_BUDGET_BYTES_S;
 
 use crate::telemetry;
-use crate::vehicle::Vehicle;
+use crate::vehicle::VehicleState;
 
 /// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so
 /// that no second on the wire carries more.
@@ -494,8 +494,8 @@ pub(super) struct CheckReporter {
 
 impl CheckReporter {
     /// The message to send now.
-    pub(super) fn due(&mut self, vehicle: &dyn Vehicle, now_s: f64) -> Option<MavMessage> {
-        let check = vehicle.computer().pad_check();
+    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, now_s: f64) -> Option<MavMessage> {
+        let check = vehicle.computer.pad_check();
         let mode = vehicle.mode();
         let now = (check.run(), check.state());
         if check.state() == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
@@ -520,7 +520,7 @@ impl CheckReporter {
         self.found = if found > self.found { place + 1 } else { found };
         let often = check.is_running() || self.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
-        Some(telemetry::pad_check(check, place, vehicle.time_s()))
+        Some(telemetry::pad_check(check, place, vehicle.time_s))
     }
 }
 

@@ -16,10 +16,9 @@ use protocol::identity::{Address, NETWORK_BUDGET_BYTES_S};
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
-use crate::snapshot::Snapshot;
 use crate::stations::MAX_STATIONS;
 use crate::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, kept_free_bytes, share_bytes_s};
-use crate::vehicle::Vehicle;
+use crate::vehicle::VehicleState;
 use crate::{parameters, telemetry};
 
 /// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
@@ -197,8 +196,7 @@ impl Lane {
     pub(super) fn poll(
         &mut self,
         context: &Context,
-        vehicle: &dyn Vehicle,
-        snapshot: &mut Option<Snapshot>,
+        vehicle: &VehicleState<'_>,
         files: &mut FileService,
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
@@ -218,7 +216,7 @@ impl Lane {
             if due.frame_len > self.sent.room() {
                 break;
             }
-            self.send(due, context, vehicle, snapshot, &mut frames);
+            self.send(due, context, vehicle, &mut frames);
         }
         let answered_every_s = if slow { SLOW_ABORT_ANSWERED_S } else { ABORT_ANSWERED_S };
         if now_s - self.abort_answered_s >= answered_every_s
@@ -266,7 +264,7 @@ impl Lane {
             if due.frame_len > self.room_for_telemetry() || !self.is_line_free(now_s) {
                 break;
             }
-            self.send(due, context, vehicle, snapshot, &mut frames);
+            self.send(due, context, vehicle, &mut frames);
         }
         while self.requested.len() < MAX_REQUESTED
             && let Some(answer) = files.next_answer(&self.links)
@@ -326,17 +324,8 @@ impl Lane {
         self.room().min(self.telemetry_briefly.room())
     }
 
-    fn send(
-        &mut self,
-        due: &Due,
-        context: &Context,
-        vehicle: &dyn Vehicle,
-        snapshot: &mut Option<Snapshot>,
-        frames: &mut Vec<Frame>,
-    ) {
-        // In most frames nothing is due, so the state is only collected when needed.
-        let snapshot = snapshot.get_or_insert_with(|| vehicle.snapshot());
-        if let Some(message) = telemetry::message(due.message_id, snapshot, context.identity) {
+    fn send(&mut self, due: &Due, context: &Context, vehicle: &VehicleState<'_>, frames: &mut Vec<Frame>) {
+        if let Some(message) = telemetry::message(due.message_id, vehicle, context.identity) {
             let frame = self.encoder.encode(&message);
             // Vital messages do not count as recent telemetry: a change of phase must not delay a position.
             if !due.vital {
@@ -348,12 +337,13 @@ impl Lane {
     }
 
     /// The next requested message: single messages first, then the list of parameters.
-    fn next_requested(&mut self, vehicle: &dyn Vehicle) -> Option<MavMessage> {
+    fn next_requested(&mut self, vehicle: &VehicleState<'_>) -> Option<MavMessage> {
         if let Some(message) = self.requested.front() {
             return Some(message.clone());
         }
         self.next_parameter = self.next_parameter.filter(|place| *place < parameters::COUNT);
-        self.next_parameter.map(|place| parameters::value(place, &self.streams, &vehicle.weights()))
+        self.next_parameter
+            .map(|place| parameters::value(place, &self.streams, &vehicle.mission().powered.weights))
     }
 
     /// The frame, if it is not longer than this; a frame that is not sent uses no sequence number.

@@ -14,7 +14,7 @@ use protocol::mission::Expected;
 use super::VehicleEndpoint;
 use crate::commands::{Command, Unfit};
 use crate::stations::SAME_IDS_FOR_S;
-use crate::vehicle::Vehicle;
+use crate::vehicle::VehicleState;
 
 /// So long after a frame of another vehicle under our ids, s, a command must name the boot that it is meant for.
 const TWIN_FOR_S: f64 = 10.0;
@@ -43,7 +43,7 @@ impl VehicleEndpoint {
         request: &CommandRequest,
         asked: &Command,
         station: Station,
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) -> Option<Unfit> {
         let Command::Vehicle(asked) = asked else { return None };
         if !can_move(*asked) {
@@ -65,13 +65,13 @@ impl VehicleEndpoint {
             MeantBoot::Unreadable => {
                 return refused(denied, "parameter 7 is no boot number (0 for any boot)".to_owned());
             }
-            MeantBoot::Any if self.hears_twin(vehicle.time_s()) => {
+            MeantBoot::Any if self.hears_twin(vehicle.time_s) => {
                 let why = "another vehicle has these ids: name the boot that it is for in parameter 7";
                 return refused(not_now, why.to_owned());
             }
             MeantBoot::Any => {}
         }
-        let others = self.stations.same_ids(station, vehicle.time_s());
+        let others = self.stations.same_ids(station, vehicle.time_s);
         if others > 0 {
             let why = format!("{others} more under the ids {station} in the last {SAME_IDS_FOR_S} s");
             return refused(not_now, why);
@@ -92,9 +92,9 @@ fn can_move(asked: Asked) -> bool {
 }
 
 /// Why the station expects another mission; `None` if it expects this one or says nothing of it.
-pub fn why_other_mission(request: &CommandRequest, vehicle: &dyn Vehicle) -> Option<String> {
+pub fn why_other_mission(request: &CommandRequest, vehicle: &VehicleState<'_>) -> Option<String> {
     let [_, _, _, param4, param5, param6, _] = request.params;
-    let flies = vehicle.mission();
+    let flies = vehicle.name;
     match Expected::of_params([param4, param5, param6]) {
         Expected::Any => None,
         Expected::Hash(expected) if expected == flies.hash => None,

@@ -42,7 +42,7 @@ use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
 use crate::streams::{CheckReporter, Streams};
-use crate::vehicle::{Identity, Vehicle, VehicleKind};
+use crate::vehicle::{Identity, VehicleKind, VehicleState};
 use crate::{commands, telemetry};
 
 /// Most requested messages that may wait; more are refused for the moment.
@@ -196,20 +196,20 @@ impl VehicleEndpoint {
 
     /// Takes a frame that came in this way. The vehicle decides requests in its next frame ([`VehicleEndpoint::heard`],
     /// [`VehicleEndpoint::on_answers`]); answers come out of [`VehicleEndpoint::poll`].
-    pub fn on_frame(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &dyn Vehicle) {
+    pub fn on_frame(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &VehicleState<'_>) {
         if frame.source() == self.us {
-            self.note_twin(vehicle.time_s());
+            self.note_twin(vehicle.time_s);
             return;
         }
         let path = path.into();
         let link = path.link;
         if let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode() {
             if frame.source() == RADIO {
-                self.lane(link).on_radio(radio.txbuf, vehicle.time_s());
+                self.lane(link).on_radio(radio.txbuf, vehicle.time_s);
             }
             return;
         }
-        self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s());
+        self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s);
         if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
@@ -237,7 +237,7 @@ impl VehicleEndpoint {
                 if sync.tc1 == 0 && self.is_for_us(sync.target_system, sync.target_component) =>
             {
                 let answer = TIMESYNC_DATA {
-                    tc1: (1e9 * vehicle.time_s()) as i64,
+                    tc1: (1e9 * vehicle.time_s) as i64,
                     ts1: sync.ts1,
                     target_system: frame.source().system_id,
                     target_component: frame.source().component_id,
@@ -267,7 +267,7 @@ impl VehicleEndpoint {
     }
 
     /// Takes a copy of a frame, which had come in another way before.
-    pub fn on_copy(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &dyn Vehicle) {
+    pub fn on_copy(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &VehicleState<'_>) {
         self.stations.copied(frame, &sender_of(frame, path.into(), vehicle));
     }
 
@@ -290,15 +290,14 @@ impl VehicleEndpoint {
     }
 
     /// The frames to send now.
-    pub fn poll(&mut self, vehicle: &dyn Vehicle) -> Vec<Outgoing> {
-        self.now_s = vehicle.time_s();
+    pub fn poll(&mut self, vehicle: &VehicleState<'_>) -> Vec<Outgoing> {
+        self.now_s = vehicle.time_s;
         self.watch(vehicle.mode());
         self.watch_the_crew(vehicle);
         for words in self.warnings.counted(self.now_s) {
             self.say_aloud(Severity::Warning, &words);
         }
         let context = Context { now_s: self.now_s, identity: self.identity };
-        let mut snapshot = None;
         for message in self.stations.due(self.now_s) {
             for lane in &mut self.lanes {
                 lane.tell_of_uplink(message.clone());
@@ -312,7 +311,7 @@ impl VehicleEndpoint {
         }
         self.serve_files(vehicle);
         let Self { lanes, files, .. } = self;
-        lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, &mut snapshot, files)).collect()
+        lanes.iter_mut().flat_map(|lane| lane.poll(&context, vehicle, files)).collect()
     }
 
     /// Reports a change of state to the crew at once, with the two messages that carry it.
@@ -350,11 +349,11 @@ impl VehicleEndpoint {
     }
 
     /// Reports an ask, a confirmation, a tap and a take-over at once.
-    fn watch_the_crew(&mut self, vehicle: &dyn Vehicle) {
-        if vehicle.operators().is_empty() {
+    fn watch_the_crew(&mut self, vehicle: &VehicleState<'_>) {
+        if vehicle.operators.is_empty() {
             return;
         }
-        let memory = vehicle.computer().crew();
+        let memory = vehicle.computer.crew();
         let told = (memory.two_person, memory.held_by, self.stations.armed_by());
         if self.told_crew.replace(told) != Some(told) {
             self.hurry(TD_CREW_DATA::ID);
@@ -377,7 +376,7 @@ impl VehicleEndpoint {
         &mut self,
         path: impl Into<Path>,
         (request, by): (&CommandRequest, Option<Operator>),
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) {
         let path = path.into();
         let link = path.link;
@@ -415,9 +414,9 @@ impl VehicleEndpoint {
         &mut self,
         path: Path,
         (cancelled, by): (&CommandRequest, Option<Operator>),
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) {
-        if cancelled.is(MavCmd::MAV_CMD_TD_PAD_CHECK) && vehicle.computer().pad_check().is_running() {
+        if cancelled.is(MavCmd::MAV_CMD_TD_PAD_CHECK) && vehicle.computer.pad_check().is_running() {
             let key = by.map_or(0, |by| by.number);
             let station = self.stations.of(&Sender { address: cancelled.source, key, path });
             self.put(path.link, (cancelled, by, station), Asked::EndCheck, vehicle);
@@ -454,9 +453,9 @@ impl VehicleEndpoint {
         &self,
         station: Station,
         by: Option<Operator>,
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) -> Option<String> {
-        if !vehicle.operators().is_empty() && by.is_none() {
+        if !vehicle.operators.is_empty() && by.is_none() {
             return Some("only an operator with a key of their own sets rates".to_owned());
         }
         let armed_by =
@@ -501,7 +500,7 @@ impl VehicleEndpoint {
         link: usize,
         message_id: u32,
         of: u32,
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) -> (MavResult, Option<String>) {
         let identity = self.identity;
         let lane = self.lane(link);
@@ -517,7 +516,7 @@ impl VehicleEndpoint {
                 .map(|(_, message)| message)
                 .collect(),
             MESSAGE_INTERVAL_DATA::ID => vec![lane.streams.interval_of(of)],
-            _ => telemetry::message(message_id, &vehicle.snapshot(), identity).into_iter().collect(),
+            _ => telemetry::message(message_id, vehicle, identity).into_iter().collect(),
         };
         if messages.is_empty() {
             // One that this vehicle sends has no content now.
@@ -526,7 +525,7 @@ impl VehicleEndpoint {
                 MavMessage::MESSAGE_INTERVAL(interval) if interval.interval_us != 0
             );
             let of_crew = matches!(message_id, TD_CREW_DATA::ID | TD_OPERATOR_DATA::ID);
-            let result = if sends && !(of_crew && vehicle.operators().is_empty()) {
+            let result = if sends && !(of_crew && vehicle.operators.is_empty()) {
                 MavResult::MAV_RESULT_TEMPORARILY_REJECTED
             } else {
                 MavResult::MAV_RESULT_UNSUPPORTED
@@ -568,18 +567,18 @@ impl VehicleEndpoint {
 }
 
 /// The operator whose key has signed a frame.
-fn operator_of(frame: &Frame, vehicle: &dyn Vehicle) -> Option<Operator> {
-    vehicle.operators().iter().find(|operator| operator.number == frame.key_number()).copied()
+fn operator_of(frame: &Frame, vehicle: &VehicleState<'_>) -> Option<Operator> {
+    vehicle.operators.iter().find(|operator| operator.number == frame.key_number()).copied()
 }
 
 /// Who has sent a frame. Without operators the key number in a signature means nothing.
-fn sender_of(frame: &Frame, path: Path, vehicle: &dyn Vehicle) -> Sender {
-    let key = if vehicle.operators().is_empty() { 0 } else { frame.key_number() };
+fn sender_of(frame: &Frame, path: Path, vehicle: &VehicleState<'_>) -> Sender {
+    let key = if vehicle.operators.is_empty() { 0 } else { frame.key_number() };
     Sender { address: frame.source(), key, path }
 }
 
 /// Whether a forced disarm is an abort, as in the air. Other ground stations call it an emergency stop or a kill.
-fn means_abort(vehicle: &dyn Vehicle) -> bool {
+fn means_abort(vehicle: &VehicleState<'_>) -> bool {
     !(vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed))
 }
 

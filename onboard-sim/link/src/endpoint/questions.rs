@@ -22,11 +22,11 @@ use protocol::parameter::{ParamKey, ParamQuestion, ParamRequest, error_message};
 
 use super::{Path, VehicleEndpoint, operator_of, sender_of};
 use crate::parameters;
-use crate::vehicle::Vehicle;
+use crate::vehicle::VehicleState;
 
 impl VehicleEndpoint {
     /// Answers a question about parameters, files or lists; returns whether the frame was one.
-    pub(super) fn on_question(&mut self, path: Path, frame: &Frame, vehicle: &dyn Vehicle) -> bool {
+    pub(super) fn on_question(&mut self, path: Path, frame: &Frame, vehicle: &VehicleState<'_>) -> bool {
         let link = path.link;
         if let Some(request) = FileRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
@@ -50,7 +50,9 @@ impl VehicleEndpoint {
             ParamQuestion::Read(key) => {
                 let lane = self.lane(link);
                 let answer = match parameters::place_of(key) {
-                    Some(place) => parameters::value(place, &lane.streams, &vehicle.weights()),
+                    Some(place) => {
+                        parameters::value(place, &lane.streams, &vehicle.mission().powered.weights)
+                    }
                     None => error_message(key, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, asker),
                 };
                 lane.request(vec![answer]);
@@ -65,7 +67,7 @@ impl VehicleEndpoint {
                 let lane = self.lane(link);
                 let (answer, refusal) = match set {
                     Ok((place, refusal)) => {
-                        (parameters::value(place, &lane.streams, &vehicle.weights()), refusal)
+                        (parameters::value(place, &lane.streams, &vehicle.mission().powered.weights), refusal)
                     }
                     Err(refusal) => (error_message(ParamKey::Name(id), refusal.error, asker), Some(refusal)),
                 };
@@ -255,7 +257,7 @@ impl FileService {
 }
 
 /// Whether the vehicle gives out its log: it is disarmed, and on its pad or safe on the ground.
-pub fn gives_out_its_log(vehicle: &dyn Vehicle) -> bool {
+pub fn gives_out_its_log(vehicle: &VehicleState<'_>) -> bool {
     let phase = vehicle.phase();
     !vehicle.mode().interlocks.armed && (phase.on_pad() || matches!(phase, Phase::Touchdown | Phase::Safed))
 }
@@ -274,14 +276,14 @@ impl VehicleEndpoint {
         link: usize,
         request: &FileRequest,
         by: Option<Operator>,
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) {
         let forbidden = why_forbidden(by, vehicle);
         if forbidden.is_none() && request.packet.opcode == Opcode::OpenFileRo {
             self.separate(link);
         }
         let FileService { server, files } = &mut self.files;
-        let now = Duration::from_secs_f64(vehicle.time_s());
+        let now = Duration::from_secs_f64(vehicle.time_s);
         let taken = server.take(request, link, forbidden.is_none(), &**files, now);
         if let (Taken::NotNow, Some(why)) = (taken, forbidden) {
             self.say(Severity::Warning, &why);
@@ -289,7 +291,7 @@ impl VehicleEndpoint {
     }
 
     /// Continues with what takes long, and closes every file when the vehicle must not give them out any more.
-    pub(super) fn serve_files(&mut self, vehicle: &dyn Vehicle) {
+    pub(super) fn serve_files(&mut self, vehicle: &VehicleState<'_>) {
         let FileService { server, files } = &mut self.files;
         if gives_out_its_log(vehicle) {
             server.work(&mut **files);
@@ -300,8 +302,8 @@ impl VehicleEndpoint {
 }
 
 /// Why this client may not read now, if so.
-fn why_forbidden(by: Option<Operator>, vehicle: &dyn Vehicle) -> Option<String> {
-    if !vehicle.operators().is_empty() && by.is_none() {
+fn why_forbidden(by: Option<Operator>, vehicle: &VehicleState<'_>) -> Option<String> {
+    if !vehicle.operators.is_empty() && by.is_none() {
         return Some("log refused: only an operator with a key of their own fetches it".to_owned());
     }
     let armed = if vehicle.mode().interlocks.armed { ", armed" } else { "" };

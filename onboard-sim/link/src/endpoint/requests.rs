@@ -19,7 +19,7 @@ use protocol::identity::Address;
 
 use super::VehicleEndpoint;
 use crate::commands;
-use crate::vehicle::Vehicle;
+use crate::vehicle::VehicleState;
 
 /// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many aborts of no operator may
 /// wait beside them; one would do.
@@ -79,7 +79,7 @@ impl VehicleEndpoint {
         link: usize,
         (command, by, station): (&CommandRequest, Option<Operator>, Station),
         asked: Asked,
-        vehicle: &dyn Vehicle,
+        vehicle: &VehicleState<'_>,
     ) {
         // What moves something is done once, whatever arrives late; what stops is done every time.
         if may_move(asked) {
@@ -109,7 +109,7 @@ impl VehicleEndpoint {
         let uplink = if self.starts_by_itself {
             Uplink::NotNeeded
         } else {
-            self.stations.uplink(station, vehicle.time_s())
+            self.stations.uplink(station, vehicle.time_s)
         };
         let confirms = commands::confirmed_ask(command);
         let request = Request { asked, uplink, station: Some(station), by, confirms };
@@ -134,7 +134,7 @@ impl VehicleEndpoint {
 
     /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has just decided. A dead
     /// flight computer gives no answers, and its requests are dropped.
-    pub fn on_answers(&mut self, answers: &[Answer], vehicle: &dyn Vehicle) {
+    pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
             self.note_commander(&request, answer, vehicle);
@@ -147,7 +147,7 @@ impl VehicleEndpoint {
             if request.asked == Asked::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
             } else {
-                let asked = vehicle.computer().crew().two_person.waiting(vehicle.time_s());
+                let asked = vehicle.computer.crew().two_person.waiting(vehicle.time_s);
                 let asked = asked.filter(|_| answer.ending == Ending::Asked);
                 let answer = (result, asked.map(|ask| ask.number));
                 if may_move(request.asked) && command.number().is_some() {
@@ -161,14 +161,14 @@ impl VehicleEndpoint {
 
     /// The first station that armed it is in command: of two people the one who asked. A station that takes over is
     /// next.
-    fn note_commander(&mut self, request: &Request, answer: &Answer, vehicle: &dyn Vehicle) {
+    fn note_commander(&mut self, request: &Request, answer: &Answer, vehicle: &VehicleState<'_>) {
         let Some(station) = request.station.filter(|_| answer.ending == Ending::Accepted) else { return };
         let here = (station, request.by);
         match request.asked {
             Asked::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
-                let asked = vehicle.computer().crew().two_person.armed_by();
+                let asked = vehicle.computer.crew().two_person.armed_by();
                 let asked = asked
-                    .filter(|_| matches!(vehicle.people(), Some(People::Two { .. })))
+                    .filter(|_| matches!(vehicle.input().people, Some(People::Two { .. })))
                     .map(|ask| (ask.station, Some(ask.by)));
                 self.stations.set_commander(Some(asked.unwrap_or(here)));
             }

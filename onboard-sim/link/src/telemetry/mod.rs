@@ -5,13 +5,14 @@
 //!
 //! What is not modelled is sent as MAVLink's "unknown" and never invented.
 //!
-//! [`Motion`]: crate::snapshot::Motion
+//! [`Motion`]: crate::vehicle::Motion
 
 mod motion;
 mod ours;
 
 use alloc::vec::Vec;
 
+use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
 use mavlink::MessageData as _;
 use mavlink::types::CharArray;
@@ -34,47 +35,46 @@ use protocol::mission::MissionHash;
 
 pub(crate) use self::ours::pad_check;
 pub use self::ours::td_phase;
-use crate::snapshot::Snapshot;
-use crate::vehicle::{Identity, VehicleKind};
+use crate::vehicle::{Identity, VehicleKind, VehicleState};
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
 
 /// The message of this id in the current state, or `None` if the vehicle has no such message or no data for it.
-pub fn message(message_id: u32, snapshot: &Snapshot, identity: Identity) -> Option<MavMessage> {
+pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) -> Option<MavMessage> {
     match message_id {
-        HEARTBEAT_DATA::ID => Some(heartbeat(snapshot, identity.kind)),
-        SYS_STATUS_DATA::ID => Some(sys_status(snapshot)),
-        EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(snapshot)),
-        ATTITUDE_QUATERNION_DATA::ID => Some(attitude(snapshot)),
-        LOCAL_POSITION_NED_DATA::ID => Some(position(snapshot)),
-        VFR_HUD_DATA::ID => Some(vfr_hud(snapshot)),
-        CURRENT_MODE_DATA::ID => Some(current_mode(snapshot)),
+        HEARTBEAT_DATA::ID => Some(heartbeat(state, identity.kind)),
+        SYS_STATUS_DATA::ID => Some(sys_status(state)),
+        EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(state)),
+        ATTITUDE_QUATERNION_DATA::ID => Some(attitude(state)),
+        LOCAL_POSITION_NED_DATA::ID => Some(position(state)),
+        VFR_HUD_DATA::ID => Some(vfr_hud(state)),
+        CURRENT_MODE_DATA::ID => Some(current_mode(state)),
         AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(identity.uid)),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
-        ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(snapshot)),
-        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(snapshot, identity)),
-        TD_FINS_DATA::ID => Some(ours::fins(snapshot)),
-        TD_GIMBAL_DATA::ID => Some(ours::gimbal(snapshot)),
-        TD_CONTROLLER_DATA::ID => ours::controller(snapshot),
-        TD_TOUCHDOWN_PREDICTION_DATA::ID => ours::touchdown_prediction(snapshot),
-        TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(snapshot),
-        TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(snapshot),
-        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(snapshot)),
-        TD_CREW_DATA::ID => ours::crew(snapshot),
-        TD_OPERATOR_DATA::ID => ours::operator(snapshot),
+        ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(state)),
+        TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(state, identity)),
+        TD_FINS_DATA::ID => Some(ours::fins(state)),
+        TD_GIMBAL_DATA::ID => Some(ours::gimbal(state)),
+        TD_CONTROLLER_DATA::ID => ours::controller(state),
+        TD_TOUCHDOWN_PREDICTION_DATA::ID => ours::touchdown_prediction(state),
+        TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(state),
+        TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(state),
+        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(state)),
+        TD_CREW_DATA::ID => ours::crew(state),
+        TD_OPERATOR_DATA::ID => ours::operator(state),
         // It matters before the flight only, and there it costs no position.
-        TD_MISSION_DATA::ID => snapshot.phase.on_pad().then(|| ours::mission(snapshot)),
-        TD_DESCENT_DATA::ID => motion::descent(snapshot),
-        ESTIMATOR_STATUS_DATA::ID => motion::estimator(snapshot),
-        HIGHRES_IMU_DATA::ID => motion::imu(snapshot),
-        BATTERY_STATUS_DATA::ID => Some(battery(snapshot)),
-        STORAGE_INFORMATION_DATA::ID => storage(snapshot),
-        ATTITUDE_DATA::ID => Some(motion::attitude(snapshot)),
-        GLOBAL_POSITION_INT_DATA::ID => Some(motion::position(snapshot)),
-        HOME_POSITION_DATA::ID => Some(motion::home(snapshot)),
-        GPS_RAW_INT_DATA::ID => Some(motion::gps(snapshot)),
-        SYSTEM_TIME_DATA::ID => Some(motion::system_time(snapshot)),
+        TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state)),
+        TD_DESCENT_DATA::ID => motion::descent(state),
+        ESTIMATOR_STATUS_DATA::ID => motion::estimator(state),
+        HIGHRES_IMU_DATA::ID => motion::imu(state),
+        BATTERY_STATUS_DATA::ID => Some(battery(state)),
+        STORAGE_INFORMATION_DATA::ID => storage(state),
+        ATTITUDE_DATA::ID => Some(motion::attitude(state)),
+        GLOBAL_POSITION_INT_DATA::ID => Some(motion::position(state)),
+        HOME_POSITION_DATA::ID => Some(motion::home(state)),
+        GPS_RAW_INT_DATA::ID => Some(motion::gps(state)),
+        SYSTEM_TIME_DATA::ID => Some(motion::system_time(state)),
         _ => None,
     }
 }
@@ -93,21 +93,21 @@ pub fn available_modes() -> impl Iterator<Item = MavMessage> {
     })
 }
 
-fn heartbeat(snapshot: &Snapshot, kind: VehicleKind) -> MavMessage {
+fn heartbeat(state: &VehicleState<'_>, kind: VehicleKind) -> MavMessage {
     let mut base_mode =
         MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED;
     base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, kind == VehicleKind::Simulated);
-    base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, snapshot.interlocks.armed);
-    let system_status = match snapshot.phase {
-        _ if snapshot.interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
-        _ if snapshot.interlocks.no_light_latched => MavState::MAV_STATE_EMERGENCY,
+    base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, state.mode().interlocks.armed);
+    let system_status = match state.phase() {
+        _ if state.mode().interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
+        _ if state.mode().interlocks.no_light_latched => MavState::MAV_STATE_EMERGENCY,
         Phase::Safe => MavState::MAV_STATE_BOOT,
         Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => MavState::MAV_STATE_STANDBY,
         Phase::Chute => MavState::MAV_STATE_EMERGENCY,
         _ => MavState::MAV_STATE_ACTIVE,
     };
     MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-        custom_mode: u32::from(snapshot.phase.index()),
+        custom_mode: u32::from(state.phase().index()),
         mavtype: MavType::MAV_TYPE_ROCKET,
         autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
         base_mode,
@@ -116,23 +116,23 @@ fn heartbeat(snapshot: &Snapshot, kind: VehicleKind) -> MavMessage {
     })
 }
 
-fn sys_status(snapshot: &Snapshot) -> MavMessage {
-    let (sensors, silent) = motion::sensors(snapshot);
+fn sys_status(state: &VehicleState<'_>) -> MavMessage {
+    let (sensors, silent) = motion::sensors(state);
     let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
         | sensors
-        | present(snapshot);
-    let mut healthy = present - silent - failing(snapshot);
-    healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, snapshot.checks_failed == 0);
+        | present(state);
+    let mut healthy = present - silent - failing(state);
+    healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, state.checks_failed() == 0);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
         onboard_control_sensors_health: healthy,
-        load: (1000.0 * snapshot.solve_time_s / snapshot.deadline_s).clamp(0.0, 1000.0) as u16,
-        voltage_battery: millivolts(snapshot),
-        current_battery: centiamperes(snapshot),
-        battery_remaining: percent(snapshot),
+        load: (1000.0 * state.solve_time_s() / FRAME_S).clamp(0.0, 1000.0) as u16,
+        voltage_battery: millivolts(state),
+        current_battery: centiamperes(state),
+        battery_remaining: percent(state),
         // Explicitly empty: the generated default of a set of flags is its first flag.
         onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
         onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),
@@ -141,8 +141,8 @@ fn sys_status(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-fn extended_sys_state(snapshot: &Snapshot) -> MavMessage {
-    let landed_state = match snapshot.phase {
+fn extended_sys_state(state: &VehicleState<'_>) -> MavMessage {
+    let landed_state = match state.phase() {
         Phase::Safe | Phase::PadIdle | Phase::PadArmed | Phase::Touchdown | Phase::Safed => {
             MavLandedState::MAV_LANDED_STATE_ON_GROUND
         }
@@ -158,11 +158,11 @@ fn extended_sys_state(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-fn attitude(snapshot: &Snapshot) -> MavMessage {
-    let [q1, q2, q3, q4] = snapshot.motion.ned_from_body.map(|part| part as f32);
-    let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
+fn attitude(state: &VehicleState<'_>) -> MavMessage {
+    let [q1, q2, q3, q4] = state.motion().ned_from_body.map(|part| part as f32);
+    let [rollspeed, pitchspeed, yawspeed] = state.motion().rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(state.time_s),
         q1,
         q2,
         q3,
@@ -174,11 +174,11 @@ fn attitude(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-fn position(snapshot: &Snapshot) -> MavMessage {
-    let [x, y, z] = snapshot.motion.position_m.map(|metres| metres as f32);
-    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed| speed as f32);
+fn position(state: &VehicleState<'_>) -> MavMessage {
+    let [x, y, z] = state.motion().position_m.map(|metres| metres as f32);
+    let [vx, vy, vz] = state.motion().velocity_m_s.map(|speed| speed as f32);
     MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(state.time_s),
         x,
         y,
         z,
@@ -188,23 +188,23 @@ fn position(snapshot: &Snapshot) -> MavMessage {
     })
 }
 
-fn vfr_hud(snapshot: &Snapshot) -> MavMessage {
-    let motion = &snapshot.motion;
+fn vfr_hud(state: &VehicleState<'_>) -> MavMessage {
+    let motion = state.motion();
     let [north_m_s, east_m_s, down_m_s] = motion.velocity_m_s;
     MavMessage::VFR_HUD(VFR_HUD_DATA {
         airspeed: motion.airspeed_m_s as f32,
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
         // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the pad.
-        alt: (snapshot.pad_altitude_m - motion.position_m[2]) as f32,
+        alt: (state.mission().pad_altitude_m - motion.position_m[2]) as f32,
         climb: -down_m_s as f32,
         heading: libm::round(motion::heading_deg(&motion.ned_from_body)) as i16 % 360,
-        throttle: if snapshot.thrust_n > 0.0 { 100 } else { 0 },
+        throttle: if state.thrust_n() > 0.0 { 100 } else { 0 },
     })
 }
 
-fn current_mode(snapshot: &Snapshot) -> MavMessage {
+fn current_mode(state: &VehicleState<'_>) -> MavMessage {
     MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {
-        custom_mode: u32::from(snapshot.phase.index()),
+        custom_mode: u32::from(state.phase().index()),
         standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
         ..CURRENT_MODE_DATA::default()
     })
@@ -248,16 +248,17 @@ fn protocol_version() -> MavMessage {
 }
 
 /// Outputs 1 to 4 the fins (0 closed, 1 fully deployed), 5 and 6 the gimbal (-1 to 1, stop to stop).
-fn actuators(snapshot: &Snapshot) -> MavMessage {
+fn actuators(state: &VehicleState<'_>) -> MavMessage {
     let mut actuator = [0.0; 32];
-    for (output, angle_rad) in actuator.iter_mut().zip(snapshot.fins_rad.1) {
+    for (output, angle_rad) in actuator.iter_mut().zip(state.input().fins_rad) {
         *output = (angle_rad / core::f64::consts::FRAC_PI_2) as f32;
     }
-    for (output, (_, actual_rad)) in actuator[4..].iter_mut().zip(snapshot.gimbal_rad) {
-        *output = (actual_rad / snapshot.gimbal_limit_rad) as f32;
+    let limit_rad = state.mission().airframe.gimbal.limit_rad();
+    for (output, angle_rad) in actuator[4..].iter_mut().zip(state.input().gimbal_rad) {
+        *output = (angle_rad / limit_rad) as f32;
     }
     MavMessage::ACTUATOR_OUTPUT_STATUS(ACTUATOR_OUTPUT_STATUS_DATA {
-        time_usec: (1e6 * snapshot.time_s) as u64,
+        time_usec: (1e6 * state.time_s) as u64,
         active: 0b11_1111,
         actuator,
     })
@@ -286,49 +287,49 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 // Battery and storage.
 
 /// What SYS_STATUS says to be there.
-fn present(snapshot: &Snapshot) -> MavSysStatusSensor {
+fn present(state: &VehicleState<'_>) -> MavSysStatusSensor {
     let mut present = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
-    present.set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, snapshot.battery.is_some());
+    present.set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, state.battery.is_some());
     present
 }
 
 /// What of it fails: a log that does not run, and on the pad a battery below its limit.
-fn failing(snapshot: &Snapshot) -> MavSysStatusSensor {
+fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
     let mut failing = MavSysStatusSensor::empty();
-    failing.set(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING, !snapshot.log.running);
-    let checks = TdCheck::from_bits_truncate(snapshot.checks_failed);
+    failing.set(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING, !state.input().log.running);
+    let checks = TdCheck::from_bits_truncate(state.checks_failed());
     failing
         .set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, checks.contains(TdCheck::TD_CHECK_BATTERY));
     failing
 }
 
 /// mV; `UINT16_MAX`: not known.
-fn millivolts(snapshot: &Snapshot) -> u16 {
-    snapshot.battery.map_or(u16::MAX, |battery| libm::round(1000.0 * battery.volts) as u16)
+fn millivolts(state: &VehicleState<'_>) -> u16 {
+    state.battery.map_or(u16::MAX, |battery| libm::round(1000.0 * battery.volts) as u16)
 }
 
 /// cA; -1: not known.
-fn centiamperes(snapshot: &Snapshot) -> i16 {
-    let current_a = snapshot.battery.and_then(|battery| battery.current_a);
+fn centiamperes(state: &VehicleState<'_>) -> i16 {
+    let current_a = state.battery.and_then(|battery| battery.current_a);
     current_a.map_or(-1, |current_a| libm::round(100.0 * current_a) as i16)
 }
 
 /// Percent; -1: not known.
-fn percent(snapshot: &Snapshot) -> i8 {
-    let left = snapshot.battery.and_then(|battery| battery.left);
+fn percent(state: &VehicleState<'_>) -> i8 {
+    let left = state.battery.and_then(|battery| battery.left);
     left.map_or(-1, |left| libm::round(100.0 * left) as i8)
 }
 
-fn battery(snapshot: &Snapshot) -> MavMessage {
+fn battery(state: &VehicleState<'_>) -> MavMessage {
     let mut voltages = [u16::MAX; 10];
-    voltages[0] = millivolts(snapshot);
+    voltages[0] = millivolts(state);
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         temperature: i16::MAX,
         voltages,
-        current_battery: centiamperes(snapshot),
+        current_battery: centiamperes(state),
         current_consumed: -1,
         energy_consumed: -1,
-        battery_remaining: percent(snapshot),
+        battery_remaining: percent(state),
         // The generated default is the first flag.
         fault_bitmask: MavBatteryFault::empty(),
         ..BATTERY_STATUS_DATA::default()
@@ -336,12 +337,12 @@ fn battery(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// `None` if the operator chose to fly without a log. How large the storage is, and how fast, is not known: 0.
-fn storage(snapshot: &Snapshot) -> Option<MavMessage> {
-    let log = snapshot.log;
+fn storage(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let log = state.input().log;
     let has_storage = log.space_bytes != u64::MAX;
     has_storage.then(|| {
         MavMessage::STORAGE_INFORMATION(STORAGE_INFORMATION_DATA {
-            time_boot_ms: boot_ms(snapshot.time_s),
+            time_boot_ms: boot_ms(state.time_s),
             available_capacity: (log.space_bytes >> 10) as f32 / 1024.0,
             storage_id: 1,
             storage_count: 1,

@@ -3,6 +3,9 @@
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
+use flight::rules::outputs::Line;
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::StartPoint;
 use protocol::dialect::{
     ATTITUDE_DATA, ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA,
     GpsFixType, HIGHRES_IMU_DATA, HOME_POSITION_DATA, HighresImuUpdatedFlags, MavMessage, MavSysStatusSensor,
@@ -10,7 +13,7 @@ use protocol::dialect::{
 };
 
 use super::boot_ms;
-use crate::snapshot::{Booster, Chute, DescentFacts, Snapshot};
+use crate::vehicle::{Airborne, VehicleState};
 
 /// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees from upright) single
 /// precision cannot separate them.
@@ -51,11 +54,11 @@ pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
     if heading_deg < 0.0 { heading_deg + 360.0 } else { heading_deg }
 }
 
-pub(super) fn attitude(snapshot: &Snapshot) -> MavMessage {
-    let [roll, pitch, yaw] = roll_pitch_yaw_rad(&snapshot.motion.ned_from_body).map(|angle| angle as f32);
-    let [rollspeed, pitchspeed, yawspeed] = snapshot.motion.rate_rad_s.map(|rate| rate as f32);
+pub(super) fn attitude(state: &VehicleState<'_>) -> MavMessage {
+    let [roll, pitch, yaw] = roll_pitch_yaw_rad(&state.motion().ned_from_body).map(|angle| angle as f32);
+    let [rollspeed, pitchspeed, yawspeed] = state.motion().rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE(ATTITUDE_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(state.time_s),
         roll,
         pitch,
         yaw,
@@ -66,8 +69,8 @@ pub(super) fn attitude(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// Latitude and longitude, 1e-7 degrees, of a point at this distance north and east of the pad, m.
-fn degrees_e7(snapshot: &Snapshot, north_m: f64, east_m: f64) -> (i32, i32) {
-    let (latitude_deg, longitude_deg) = snapshot.site.at_deg(north_m, east_m);
+fn degrees_e7(state: &VehicleState<'_>, north_m: f64, east_m: f64) -> (i32, i32) {
+    let (latitude_deg, longitude_deg) = state.mission().site.at_deg(north_m, east_m);
     (libm::round(1e7 * latitude_deg) as i32, libm::round(1e7 * longitude_deg) as i32)
 }
 
@@ -75,30 +78,30 @@ fn millimetres(length_m: f64) -> i32 {
     libm::round(1000.0 * length_m) as i32
 }
 
-pub(super) fn position(snapshot: &Snapshot) -> MavMessage {
-    let [north_m, east_m, down_m] = snapshot.motion.position_m;
-    let [vx, vy, vz] = snapshot.motion.velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
-    let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
+pub(super) fn position(state: &VehicleState<'_>) -> MavMessage {
+    let [north_m, east_m, down_m] = state.motion().position_m;
+    let [vx, vy, vz] = state.motion().velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
+    let (lat, lon) = degrees_e7(state, north_m, east_m);
     MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(state.time_s),
         lat,
         lon,
-        alt: millimetres(snapshot.pad_altitude_m - down_m),
+        alt: millimetres(state.mission().pad_altitude_m - down_m),
         relative_alt: millimetres(-down_m),
         vx,
         vy,
         vz,
-        hdg: libm::round(100.0 * heading_deg(&snapshot.motion.ned_from_body)) as u16 % 36_000,
+        hdg: libm::round(100.0 * heading_deg(&state.motion().ned_from_body)) as u16 % 36_000,
     })
 }
 
 /// The pad. The slope of the ground and the approach direction are unknown.
-pub(super) fn home(snapshot: &Snapshot) -> MavMessage {
-    let (latitude, longitude) = degrees_e7(snapshot, 0.0, 0.0);
+pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
+    let (latitude, longitude) = degrees_e7(state, 0.0, 0.0);
     MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude,
         longitude,
-        altitude: millimetres(snapshot.pad_altitude_m),
+        altitude: millimetres(state.mission().pad_altitude_m),
         x: 0.0,
         y: 0.0,
         z: 0.0,
@@ -106,24 +109,24 @@ pub(super) fn home(snapshot: &Snapshot) -> MavMessage {
         approach_x: f32::NAN,
         approach_y: f32::NAN,
         approach_z: f32::NAN,
-        time_usec: (1e6 * snapshot.time_s) as u64,
+        time_usec: (1e6 * state.time_s) as u64,
     })
 }
 
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
 /// kept. A vehicle without sensors has no receiver.
-pub(super) fn gps(snapshot: &Snapshot) -> MavMessage {
-    let [north_m, east_m, down_m] = snapshot.motion.position_m;
-    let [north_m_s, east_m_s, _] = snapshot.motion.velocity_m_s;
-    let (lat, lon) = degrees_e7(snapshot, north_m, east_m);
+pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
+    let [north_m, east_m, down_m] = state.motion().position_m;
+    let [north_m_s, east_m_s, _] = state.motion().velocity_m_s;
+    let (lat, lon) = degrees_e7(state, north_m, east_m);
     let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
-    let fix_type = match &snapshot.sensors {
+    let fix_type = match state.sensors.last {
         None => GpsFixType::GPS_FIX_TYPE_NO_GPS,
-        Some(sensors) if sensors.gnss => GpsFixType::GPS_FIX_TYPE_3D_FIX,
+        Some(_) if state.sensors.gnss() => GpsFixType::GPS_FIX_TYPE_3D_FIX,
         Some(_) => GpsFixType::GPS_FIX_TYPE_NO_FIX,
     };
     let unknown = GPS_RAW_INT_DATA {
-        time_usec: (1e6 * snapshot.time_s) as u64,
+        time_usec: (1e6 * state.time_s) as u64,
         eph: u16::MAX,
         epv: u16::MAX,
         vel: u16::MAX,
@@ -136,7 +139,7 @@ pub(super) fn gps(snapshot: &Snapshot) -> MavMessage {
         GPS_RAW_INT_DATA {
             lat,
             lon,
-            alt: millimetres(snapshot.pad_altitude_m - down_m),
+            alt: millimetres(state.mission().pad_altitude_m - down_m),
             vel: libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16,
             cog: libm::round(100.0 * if course_deg < 0.0 { course_deg + 360.0 } else { course_deg }) as u16
                 % 36_000,
@@ -148,87 +151,100 @@ pub(super) fn gps(snapshot: &Snapshot) -> MavMessage {
 }
 
 /// No clock on board knows the time of day, so the field is zero, as the standard requires.
-pub(super) fn system_time(snapshot: &Snapshot) -> MavMessage {
-    MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(snapshot.time_s) })
+pub(super) fn system_time(state: &VehicleState<'_>) -> MavMessage {
+    MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(state.time_s) })
 }
 
 // Messages of the rocket in space only: descent, estimator, sensors.
 
 /// The sensors that exist, and those that are silent. The lidar works only close to the ground, so its silence means
 /// nothing.
-pub(super) fn sensors(snapshot: &Snapshot) -> (MavSysStatusSensor, MavSysStatusSensor) {
+pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysStatusSensor) {
     use MavSysStatusSensor as S;
     let mut silent = S::empty();
-    let Some(sensors) = &snapshot.sensors else { return (silent, silent) };
+    if state.sensors.last.is_none() {
+        return (silent, silent);
+    }
     let present = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
         | S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
         | S::MAV_SYS_STATUS_SENSOR_GPS
         | S::MAV_SYS_STATUS_SENSOR_LASER_POSITION;
-    silent.set(S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, !sensors.barometer);
-    silent.set(S::MAV_SYS_STATUS_SENSOR_GPS, !sensors.gnss);
+    silent.set(S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, !state.sensors.barometer());
+    silent.set(S::MAV_SYS_STATUS_SENSOR_GPS, !state.sensors.gnss());
     (present, silent)
 }
 
-pub(super) fn descent(snapshot: &Snapshot) -> Option<MavMessage> {
-    let descent = snapshot.descent.as_ref()?;
+pub(super) fn descent(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let air = state.airborne()?;
+    let phase = state.phase();
+    let pilot = state.computer.pilot();
+    let (prediction, motor) = (pilot.prediction(), pilot.motor());
+    let ignition = &prediction.ignition;
     let known = |value: Option<f64>| value.map_or(f32::NAN, |value| value as f32);
-    let [wind_x_m_s, wind_y_m_s] = descent.wind_m_s.map(|speed| speed as f32);
-    let [touchdown_x_m, touchdown_y_m] = descent.touchdown_m.map(|place| place as f32);
+    let touchdown_m = state.touchdown_m(&air);
+    let ascends = state.mission().start.at == StartPoint::Pad;
+    let apogee = pilot.apogee_ahead(phase);
+    // Zeros at the end of a message are not sent, so a descent costs nothing.
+    let on_the_way_up = |value: fn(ApogeeAhead) -> f64| {
+        if ascends && phase.before_apogee() { known(apogee.map(value)) } else { 0.0 }
+    };
     Some(MavMessage::TD_DESCENT(TD_DESCENT_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        height_m: descent.height_m as f32,
-        vertical_speed_m_s: descent.vertical_m_s as f32,
-        band_low_m: known(descent.band_m.map(|(low_m, _)| low_m)),
-        band_high_m: known(descent.band_m.map(|(_, high_m)| high_m)),
-        chosen_height_m: known(descent.chosen_m),
-        commit_height_m: descent.commit_height_m as f32,
-        time_to_ignition_s: known(descent.ignition_in_s),
-        wind_x_m_s,
-        wind_y_m_s,
-        drag_scale: descent.drag_scale as f32,
-        thrust_scale: descent.thrust_scale as f32,
-        touchdown_x_m,
-        touchdown_y_m,
-        chute: match descent.chute {
-            Chute::Stowed => TdChute::TD_CHUTE_STOWED,
-            Chute::Fired => TdChute::TD_CHUTE_FIRED,
-            Chute::Open => TdChute::TD_CHUTE_OPEN,
-        },
-        booster: booster(descent.ascent.map(|ascent| ascent.booster)),
-        apogee_m: on_the_way_up(descent, |apogee| apogee.height_m),
-        time_to_apogee_s: on_the_way_up(descent, |apogee| apogee.in_s),
+        time_boot_ms: boot_ms(state.time_s),
+        height_m: air.height_m() as f32,
+        vertical_speed_m_s: air.estimate.state.velocity_m_s.z as f32,
+        band_low_m: known(ignition.band.map(|band| band.low_m)),
+        band_high_m: known(ignition.band.map(|band| band.high_m)),
+        chosen_height_m: known(ignition.chosen_m),
+        commit_height_m: prediction.commit_height_m as f32,
+        time_to_ignition_s: known(ignition.command_in_s.filter(|_| phase.in_descent())),
+        // North is x, east is against y.
+        wind_x_m_s: air.estimate.wind_m_s.x as f32,
+        wind_y_m_s: -air.estimate.wind_m_s.y as f32,
+        drag_scale: motor.air_scale() as f32,
+        thrust_scale: motor.impulse_scale() as f32,
+        touchdown_x_m: touchdown_m.x as f32,
+        touchdown_y_m: -touchdown_m.y as f32,
+        chute: chute(state, &air),
+        booster: if ascends { booster(state, &air) } else { TdBooster::TD_BOOSTER_NONE },
+        apogee_m: on_the_way_up(|apogee| apogee.height_m),
+        time_to_apogee_s: on_the_way_up(|apogee| apogee.in_s),
     }))
 }
 
-fn booster(booster: Option<Booster>) -> TdBooster {
-    match booster {
-        None => TdBooster::TD_BOOSTER_NONE,
-        Some(Booster::Attached) => TdBooster::TD_BOOSTER_ATTACHED,
-        Some(Booster::Separating) => TdBooster::TD_BOOSTER_SEPARATING,
-        Some(Booster::Separated) => TdBooster::TD_BOOSTER_SEPARATED,
+fn chute(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdChute {
+    match state.phase() {
+        Phase::Chute if state.is_carried(air) => TdChute::TD_CHUTE_OPEN,
+        Phase::Chute => TdChute::TD_CHUTE_FIRED,
+        // Also on the ground, after a descent under it.
+        _ if state.parachute_ejected => TdChute::TD_CHUTE_OPEN,
+        _ => TdChute::TD_CHUTE_STOWED,
     }
 }
 
-/// A value of the apogee ahead. Zeros at the end of a message are not sent, so a descent costs nothing.
-fn on_the_way_up(descent: &DescentFacts, read: impl Fn(&ApogeeAhead) -> f64) -> f32 {
-    match descent.ascent.filter(|ascent| !ascent.over) {
-        None => 0.0,
-        Some(ascent) => ascent.apogee.as_ref().map_or(f32::NAN, |apogee| read(apogee) as f32),
+fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
+    let separating = state.computer.commands().outputs.is_on(Line::Separation);
+    match (air.flown.booster_attached, separating) {
+        (true, false) => TdBooster::TD_BOOSTER_ATTACHED,
+        (true, true) => TdBooster::TD_BOOSTER_SEPARATING,
+        (false, _) => TdBooster::TD_BOOSTER_SEPARATED,
     }
 }
 
 /// The outputs that are valid, by the estimator's own doubts; its test ratios are not kept and are sent as unknown.
-pub(super) fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
+pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
-    let estimator = snapshot.estimator.as_ref()?;
+    // Where the truth is the estimate there is no estimator to speak of.
+    state.sensors.last?;
+    let estimate = state.airborne()?.estimate;
+    let sigmas_m = &estimate.sigmas.position_m;
     let (velocity, horizontal, vertical) = (
         F::ESTIMATOR_VELOCITY_HORIZ | F::ESTIMATOR_VELOCITY_VERT,
         F::ESTIMATOR_POS_HORIZ_REL | F::ESTIMATOR_POS_HORIZ_ABS,
         F::ESTIMATOR_POS_VERT_ABS,
     );
     let mut flags = F::ESTIMATOR_ATTITUDE | velocity | horizontal | vertical;
-    match estimator.health {
+    match estimate.health {
         Health::Good => {}
         Health::Doubtful(Doubt::Restarted) => flags = F::empty(),
         Health::Doubtful(Doubt::Imu) => flags = F::ESTIMATOR_ACCEL_ERROR,
@@ -238,10 +254,10 @@ pub(super) fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
         Health::Doubtful(Doubt::Horizontal) => flags -= horizontal,
         Health::Doubtful(Doubt::Tilt) => flags -= F::ESTIMATOR_ATTITUDE,
     }
-    let lidar = snapshot.sensors.as_ref().is_some_and(|sensors| sensors.lidar);
+    let lidar = state.sensors.lidar();
     flags.set(F::ESTIMATOR_POS_VERT_AGL, lidar && flags.contains(vertical));
     Some(MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
-        time_usec: (1e6 * snapshot.time_s) as u64,
+        time_usec: (1e6 * state.time_s) as u64,
         flags,
         vel_ratio: f32::NAN,
         pos_horiz_ratio: f32::NAN,
@@ -249,34 +265,33 @@ pub(super) fn estimator(snapshot: &Snapshot) -> Option<MavMessage> {
         mag_ratio: f32::NAN,
         hagl_ratio: f32::NAN,
         tas_ratio: f32::NAN,
-        pos_horiz_accuracy: estimator.horizontal_sigma_m as f32,
-        pos_vert_accuracy: estimator.height_sigma_m as f32,
+        pos_horiz_accuracy: sigmas_m.xy().max() as f32,
+        pos_vert_accuracy: sigmas_m.z as f32,
     }))
 }
 
 /// There is no magnetometer and no thermometer: their fields are not marked as updated.
-pub(super) fn imu(snapshot: &Snapshot) -> Option<MavMessage> {
+pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
     use HighresImuUpdatedFlags as U;
-    let sensors = snapshot.sensors.as_ref()?;
+    let imu = state.sensors.last?.imu;
     let mut fields_updated = U::HIGHRES_IMU_UPDATED_XACC
         | U::HIGHRES_IMU_UPDATED_YACC
         | U::HIGHRES_IMU_UPDATED_ZACC
         | U::HIGHRES_IMU_UPDATED_XGYRO
         | U::HIGHRES_IMU_UPDATED_YGYRO
         | U::HIGHRES_IMU_UPDATED_ZGYRO;
-    fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, sensors.barometer);
-    let imu = &sensors.last.imu;
+    fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, state.sensors.barometer());
     let [xacc, yacc, zacc] = <[f64; 3]>::from(imu.specific_force_m_s2).map(|force| force as f32);
     let [xgyro, ygyro, zgyro] = <[f64; 3]>::from(imu.gyro_rad_s).map(|rate| rate as f32);
     Some(MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
-        time_usec: (1e6 * snapshot.time_s) as u64,
+        time_usec: (1e6 * state.time_s) as u64,
         xacc,
         yacc,
         zacc,
         xgyro,
         ygyro,
         zgyro,
-        pressure_alt: sensors.pressure_altitude_m as f32,
+        pressure_alt: state.sensors.pressure_altitude_m as f32,
         fields_updated,
         ..HIGHRES_IMU_DATA::default()
     }))

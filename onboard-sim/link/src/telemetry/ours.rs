@@ -1,11 +1,12 @@
 //! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew and check on the pad.
 
-use flight::computer::AbortEffect;
 use flight::computer::crew::People;
 use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
+use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
 use flight::rules::two_person::Act;
+use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::StartPoint;
 use mavlink::types::CharArray;
 use num_traits::FromPrimitive as _;
@@ -18,22 +19,24 @@ use protocol::dialect::{
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
-use crate::snapshot::{PATH_POINTS, Snapshot};
-use crate::vehicle::{Identity, VehicleKind};
+use crate::vehicle::{Identity, VehicleKind, VehicleState, violations};
 
-pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessage {
-    let seconds = snapshot.countdown_s.or(snapshot.since_zero_s.map(|since_s| -since_s));
-    let locks = snapshot.interlocks;
-    let (abort_effect, abort_impact_m_s) = td_abort_effect(snapshot.abort_effect);
+pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
+    let (mode, time_s) = (state.mode(), state.time_s);
+    let countdown_s = mode.countdown_remaining_s(time_s);
+    let seconds = countdown_s.or_else(|| state.since_zero_s().map(|since_s| -since_s));
+    let held = mode.held(time_s);
+    let last_hold_s = state.computer.last_hold_s().filter(|_| mode.countdown_end_s.is_some());
+    let (abort_effect, abort_impact_m_s) = td_abort_effect(state.computer.abort_effect());
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(time_s),
         countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
-        interlocks: interlocks(locks),
-        checks_failed: TdCheck::from_bits_truncate(snapshot.checks_failed),
-        pad_wait_s: snapshot.pad_wait_s.map_or(0, |s| libm::ceil(s) as u8),
-        approach_wait_s: snapshot.approach_wait_s.map_or(u16::MAX, |s| libm::ceil(s) as u16),
-        motor: td_motor(snapshot.motor),
-        hold: match snapshot.held {
+        interlocks: interlocks(mode.interlocks),
+        checks_failed: TdCheck::from_bits_truncate(state.checks_failed()),
+        pad_wait_s: mode.pad_wait_remaining_s(time_s).map_or(0, |s| libm::ceil(s) as u8),
+        approach_wait_s: mode.approach_wait_s(time_s).map_or(u16::MAX, |s| libm::ceil(s) as u16),
+        motor: td_motor(mode.motor_status(time_s)),
+        hold: match held {
             None => TdHold::TD_HOLD_NONE,
             Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
             Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
@@ -41,8 +44,8 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
             Some((HoldCause::StationDeaf, _)) => TdHold::TD_HOLD_STATION_DEAF,
             Some((HoldCause::LogFailed, _)) => TdHold::TD_HOLD_LOG_FAILED,
         },
-        hold_left_s: snapshot.held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
-        phase: td_phase(snapshot.phase),
+        hold_left_s: held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
+        phase: td_phase(mode.phase),
         abort_effect,
         abort_impact_m_s,
         boot_number: identity.boot_number,
@@ -51,8 +54,8 @@ pub(super) fn flight_status(snapshot: &Snapshot, identity: Identity) -> MavMessa
             VehicleKind::Simulated => TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
             VehicleKind::Real => TdVehicleFlag::empty(),
         },
-        latch: td_latch(snapshot.latch),
-        last_hold_ds: snapshot.last_hold_s.map_or(0, |s| libm::ceil(10.0 * s) as u8),
+        latch: td_latch(state.computer.latch()),
+        last_hold_ds: last_hold_s.map_or(0, |s| libm::ceil(10.0 * s) as u8),
     })
 }
 
@@ -122,41 +125,43 @@ pub fn td_phase(phase: Phase) -> TdPhase {
     }
 }
 
-pub(super) fn fins(snapshot: &Snapshot) -> MavMessage {
-    let (commanded, measured) = snapshot.fins_rad;
+pub(super) fn fins(state: &VehicleState<'_>) -> MavMessage {
     MavMessage::TD_FINS(TD_FINS_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        commanded: commanded.map(centidegrees),
-        measured: measured.map(centidegrees),
+        time_boot_ms: boot_ms(state.time_s),
+        commanded: state.computer.commands().fins_rad.map(centidegrees),
+        measured: state.input().fins_rad.map(centidegrees),
     })
 }
 
-pub(super) fn gimbal(snapshot: &Snapshot) -> MavMessage {
-    let [pitch, yaw] = snapshot.gimbal_rad;
+pub(super) fn gimbal(state: &VehicleState<'_>) -> MavMessage {
+    let [pitch_commanded, yaw_commanded] = state.computer.commands().gimbal_rad.map(centidegrees);
+    let [pitch_measured, yaw_measured] = state.input().gimbal_rad.map(centidegrees);
     MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        pitch_commanded: centidegrees(pitch.0),
-        pitch_measured: centidegrees(pitch.1),
-        yaw_commanded: centidegrees(yaw.0),
-        yaw_measured: centidegrees(yaw.1),
+        time_boot_ms: boot_ms(state.time_s),
+        pitch_commanded,
+        pitch_measured,
+        yaw_commanded,
+        yaw_measured,
     })
 }
 
-pub(super) fn controller(snapshot: &Snapshot) -> Option<MavMessage> {
-    let controller = snapshot.controller.as_ref()?;
+pub(super) fn controller(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let (tick, level, report) = state.controller()?;
+    let solve_time_s = state.solve_time_s();
+    let thrust_scale = state.airborne().map_or(1.0, |_| state.computer.pilot().motor().impulse_scale());
     let microseconds = |s: f64| libm::round(1e6 * s);
     Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        tick: controller.tick as u32,
-        cost: controller.cost as f32,
-        kkt_stationarity: controller.kkt_stationarity as f32,
-        kkt_feasibility: controller.kkt_feasibility as f32,
-        thrust_scale: snapshot.thrust_scale as f32,
-        solve_time_us: microseconds(snapshot.solve_time_s) as u32,
-        deadline_margin_us: microseconds(snapshot.deadline_s - snapshot.solve_time_s) as i32,
-        iterations: u16::try_from(controller.iterations).unwrap_or(u16::MAX),
-        level: td_level(controller.level),
-        solver_status: td_status(controller.status),
+        time_boot_ms: boot_ms(state.time_s),
+        tick: tick as u32,
+        cost: report.cost as f32,
+        kkt_stationarity: report.kkt_stationarity as f32,
+        kkt_feasibility: report.kkt_feasibility as f32,
+        thrust_scale: thrust_scale as f32,
+        solve_time_us: microseconds(solve_time_s) as u32,
+        deadline_margin_us: microseconds(FRAME_S - solve_time_s) as i32,
+        iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
+        level: td_level(level),
+        solver_status: td_status(report.status),
     }))
 }
 
@@ -185,40 +190,38 @@ fn td_status(status: nmpc::SolveStatus) -> TdSolverStatus {
     }
 }
 
-pub(super) fn touchdown_prediction(snapshot: &Snapshot) -> Option<MavMessage> {
-    let prediction = snapshot.prediction.as_ref()?;
-    let end = &prediction.state;
+pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let planned = state.planned()?;
+    let end = planned.end(state.mission().powered.landing_miss)?;
+    let violated = violations(&LandingVerdict::judge_plan(&state.limits(), &end));
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        time_to_go_ms: libm::round(1000.0 * prediction.time_to_go_s) as i32,
+        time_boot_ms: boot_ms(state.time_s),
+        time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s?) as i32,
         x_m: end.x_m as f32,
         altitude_m: end.z_m as f32,
         pitch_rad: end.theta_rad as f32,
         u_m_s: end.u_m_s as f32,
         w_m_s: end.w_m_s as f32,
         q_rad_s: end.q_rad_s as f32,
-        limits_violated: TdLimit::from_bits_truncate(prediction.violations),
+        limits_violated: TdLimit::from_bits_truncate(violated),
     }))
 }
 
-pub(super) fn predicted_path(snapshot: &Snapshot) -> Option<MavMessage> {
-    let path = snapshot.path.as_ref()?;
-    let along = path.points_m.map(|(along_m, _)| centimetres(along_m));
-    let altitude = path.points_m.map(|(_, up_m)| centimetres(up_m));
-    let [x, altitude]: [[i16; PATH_POINTS]; 2] = [along, altitude];
+pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let (points_m, count) = state.planned()?.path_from_the_east()?;
     Some(MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        x,
-        altitude,
-        count: path.count as u8,
+        time_boot_ms: boot_ms(state.time_s),
+        x: points_m.map(|(north_m, _)| centimetres(north_m)),
+        altitude: points_m.map(|(_, up_m)| centimetres(up_m)),
+        count: count as u8,
     }))
 }
 
-pub(super) fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
-    let judged = snapshot.judged.as_ref()?;
+pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let judged = state.judged.as_ref()?;
     let impact = &judged.impact;
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
+        time_boot_ms: boot_ms(state.time_s),
         contact_ms: boot_ms(impact.time_s),
         x_m: impact.state.x_m as f32,
         altitude_m: impact.state.z_m as f32,
@@ -231,8 +234,8 @@ pub(super) fn landing_verdict(snapshot: &Snapshot) -> Option<MavMessage> {
     }))
 }
 
-pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
-    let limits = &snapshot.limits;
+pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
+    let limits = state.limits();
     MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
         x_m: limits.x_m as f32,
         altitude_min_m: limits.altitude_min_m as f32,
@@ -241,47 +244,49 @@ pub(super) fn touchdown_limits(snapshot: &Snapshot) -> MavMessage {
         u_m_s: limits.u_m_s as f32,
         w_m_s: limits.w_m_s as f32,
         q_rad_s: limits.pitch_rate_rad_s as f32,
-        gimbal_limit_rad: snapshot.gimbal_limit_rad as f32,
+        gimbal_limit_rad: state.mission().airframe.gimbal.limit_rad() as f32,
     })
 }
 
 // Who commands, what is asked, and which mission flies.
 
-pub(super) fn mission(snapshot: &Snapshot) -> MavMessage {
-    let name = characters(&snapshot.mission.name);
-    let start = match snapshot.mission.start {
+pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
+    let name = characters(&state.name.name);
+    let start = match state.name.start {
         None => TdStart::TD_START_UNKNOWN,
         Some(StartPoint::Pad) => TdStart::TD_START_PAD,
         Some(StartPoint::Apogee) => TdStart::TD_START_APOGEE,
         Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
     };
-    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: snapshot.mission.hash.0, name, start })
+    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: state.name.hash.0, name, start })
 }
 
-pub(super) fn crew(snapshot: &Snapshot) -> Option<MavMessage> {
-    let crew = snapshot.crew.as_ref()?;
+pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let people = state.input().people?;
+    let crew = state.computer.crew();
+    let (ask, tap) = (crew.two_person.waiting(state.time_s), crew.two_person.tapping());
+    let commander = state.input().commander;
     let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
     let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
-    let commander = crew.commander.map(|(station, _)| station);
     Some(MavMessage::TD_CREW(TD_CREW_DATA {
-        time_boot_ms: boot_ms(snapshot.time_s),
-        ask_number: crew.ask.map_or(0, |(_, number, ..)| number),
-        ask_left_ms: crew.ask.map_or(0, |(.., left_s)| ms(left_s)),
-        tap_left_ms: crew.tap.map_or(0, |(_, left_s)| ms(left_s)),
-        people: match crew.people {
+        time_boot_ms: boot_ms(state.time_s),
+        ask_number: ask.map_or(0, |ask| ask.number),
+        ask_left_ms: ask.map_or(0, |ask| ms(ask.left_s(state.time_s))),
+        tap_left_ms: tap.map_or(0, |tap| ms(tap.left_s(state.time_s))),
+        people: match people {
             People::One => 1,
             People::Two { .. } => 2,
         },
-        act: match crew.ask.map(|(act, ..)| act) {
+        act: match ask.map(|ask| ask.act) {
             None => TdAct::TD_ACT_NONE,
             Some(Act::Arm) => TdAct::TD_ACT_ARM,
             Some(Act::Start) => TdAct::TD_ACT_START,
         },
-        asked_by: number(crew.ask.map(|(_, _, by, _)| by)),
-        tapped_by: number(crew.tap.map(|(by, _)| by)),
-        commanded_by: number(crew.commander.and_then(|(_, by)| by)),
-        commanding_system: commander.map_or(0, |station| station.system),
-        commanding_component: commander.map_or(0, |station| station.component),
+        asked_by: number(ask.map(|ask| ask.by)),
+        tapped_by: number(tap.map(|tap| tap.by)),
+        commanded_by: number(commander.and_then(|commander| commander.by)),
+        commanding_system: commander.map_or(0, |commander| commander.station.system),
+        commanding_component: commander.map_or(0, |commander| commander.station.component),
         held_by: number(crew.held_by),
     }))
 }
@@ -290,10 +295,10 @@ pub(super) fn crew(snapshot: &Snapshot) -> Option<MavMessage> {
 const TURNS_PER_S: f64 = 0.5;
 
 /// Each operator in turn.
-pub(super) fn operator(snapshot: &Snapshot) -> Option<MavMessage> {
-    let crew = snapshot.crew.as_ref()?;
-    let count = crew.operators.len().max(1);
-    let operator = crew.operators.get((TURNS_PER_S * snapshot.time_s) as usize % count)?;
+pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
+    state.input().people?;
+    let count = state.operators.len().max(1);
+    let operator = state.operators.get((TURNS_PER_S * state.time_s) as usize % count)?;
     let role = match operator.role {
         Role::Observer => TdRole::TD_ROLE_OBSERVER,
         Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,

@@ -21,7 +21,7 @@ pub fn step(
     requests.extend_from_slice(own);
     let VehicleStep { events, mut answers } = vehicle.step(&requests, stopwatch);
     let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
-    endpoint.on_answers(&answers, vehicle);
+    endpoint.on_answers(&answers, &vehicle.state());
     for event in &events {
         tell(endpoint, event);
     }

@@ -298,8 +298,8 @@ pub async fn fly_observed(
         let arrived = links.receive(vehicle.time_s());
         for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             match heard {
-                Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle),
-                Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle),
+                Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle.state()),
+                Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle.state()),
                 Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
             }
         }
@@ -325,7 +325,7 @@ pub async fn fly_observed(
             record(recorder, &vehicle, &events);
             offer.step(recorder, &vehicle, &mut endpoint);
         }
-        let leaving = endpoint.poll(&vehicle);
+        let leaving = endpoint.poll(&vehicle.state());
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {
             links.send(&outgoing, time_s);
         }

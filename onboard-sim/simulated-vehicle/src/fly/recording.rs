@@ -113,7 +113,7 @@ impl Offer {
     /// Goes on with it. If the log cannot be offered, it says why.
     pub(super) fn step(&mut self, recorder: &Recorder, vehicle: &Vehicle, endpoint: &mut VehicleEndpoint) {
         match self {
-            Self::NotYet if vehicle.is_over() && gives_out_its_log(vehicle) => {
+            Self::NotYet if vehicle.is_over() && gives_out_its_log(&vehicle.state()) => {
                 if recorder.mark_soon() {
                     *self = Self::Marked;
                 }

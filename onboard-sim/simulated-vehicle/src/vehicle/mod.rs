@@ -1,6 +1,6 @@
 //! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
 //!
-//! This module has the interface that the run loop uses; the radio takes a [`Snapshot`], and the log takes records.
+//! This module has the interface that the run loop uses; the radio takes a [`VehicleState`], and the log takes records.
 //!
 //! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
 
@@ -15,7 +15,7 @@ use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::rules::verdict::LandingVerdict;
-use flight::vehicle::mission::{StartPoint, StateWeights};
+use flight::vehicle::mission::StartPoint;
 use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
@@ -25,12 +25,7 @@ use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
 use vehicle_link::sensed::SensorWatch;
-pub use vehicle_link::snapshot::{
-    AscentFacts, BatteryFacts, Booster, Chute, ControllerFacts, CrewFacts, DescentFacts, EstimatorFacts,
-    Impact, Judged, Motion, PATH_POINTS, Path, Prediction, SensorFacts, Snapshot,
-};
-use vehicle_link::snapshot::{InSpace, Known};
-pub use vehicle_link::vehicle::MissionName;
+pub use vehicle_link::vehicle::{BatteryFacts, Impact, Judged, MissionName, VehicleState};
 
 use self::ground::Ground;
 
@@ -63,21 +58,12 @@ pub struct Vehicle {
     /// How many frames the flight computer has decided.
     frames_decided: u64,
     last: LastFrame,
-    servos: Servos,
-}
-
-/// Where the servos say that they are.
-#[derive(Debug, Clone, Copy)]
-struct Servos {
-    gimbal_rad: [f64; 2],
-    fins_rad: [f64; 4],
 }
 
 /// Times the flight computer, and keeps its frame.
 struct Watcher<'a> {
     stopwatch: &'a mut dyn FnMut() -> Duration,
     last: &'a mut LastFrame,
-    servos: &'a mut Servos,
 }
 
 impl Watch for Watcher<'_> {
@@ -86,7 +72,6 @@ impl Watch for Watcher<'_> {
     }
 
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
-        *self.servos = Servos { gimbal_rad: input.gimbal_rad, fins_rad: input.fins_rad };
         self.last.decided(input, output, computer);
     }
 }
@@ -106,7 +91,6 @@ impl Vehicle {
     /// # Errors
     /// The flight cannot be set up.
     pub fn on_the_pad(flight: &RocketFlight) -> Result<Self, SetUpError> {
-        let closed_rad = flight.recipe.mission.airframe.fins.closed_rad();
         Ok(Self {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             sensors: SensorWatch::default(),
@@ -123,7 +107,6 @@ impl Vehicle {
             computer_frame: None,
             frames_decided: 0,
             last: LastFrame::default(),
-            servos: Servos { gimbal_rad: [0.0; 2], fins_rad: [closed_rad; 4] },
         })
     }
 
@@ -183,7 +166,7 @@ impl Vehicle {
             people: self.people,
             requests,
         };
-        let mut watcher = Watcher { stopwatch, last: &mut self.last, servos: &mut self.servos };
+        let mut watcher = Watcher { stopwatch, last: &mut self.last };
         let Flown { output, took } = self.sortie.step_with(&outside, &mut watcher);
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
@@ -198,9 +181,7 @@ impl Vehicle {
         }
         let flying = self.computer().released_at_s().is_some();
         self.flown = flying && !released && !self.ground.is_over(self.sortie.computer());
-        if let Some(measured) = self.sortie.measured() {
-            self.sensors.take(measured, self.sortie.frame());
-        }
+        self.sensors.take(self.sortie.measured(), self.sortie.frame());
         events.extend(self.events_of_the_simulation(released));
         VehicleStep { events, answers }
     }
@@ -236,39 +217,24 @@ impl Vehicle {
         flight::computer::flight_time_s(self.sortie.frame())
     }
 
-    /// The state now.
-    pub fn snapshot(&self) -> Snapshot {
-        let sortie = &self.sortie;
-        let (world, battery) = (sortie.world(), sortie.battery());
-        let seen = InSpace {
-            known: self.known(),
-            mission: sortie.mission(),
-            gimbal_rad: self.servos.gimbal_rad,
-            fins_rad: self.servos.fins_rad,
-            sensors: self.sensors.facts(sortie.frame()),
+    /// The state now, as the radio sends it.
+    pub fn state(&self) -> VehicleState<'_> {
+        let (sortie, battery) = (&self.sortie, self.sortie.battery());
+        VehicleState {
+            computer: self.computer(),
+            time_s: self.time_s(),
+            name: &self.mission,
+            operators: &self.operators,
+            sensors: &self.sensors,
             battery: Some(BatteryFacts {
                 volts: battery.volts(),
                 current_a: Some(battery.current_a()),
                 left: Some(battery.charge()),
             }),
             rehearsed: sortie.rehearsed().map(|(_, report)| report),
-            parachute_ejected: world.parachute_ejected(),
-            took_s: self.took_s,
-        };
-        seen.snapshot()
-    }
-
-    fn known(&self) -> Known<'_> {
-        Known {
-            computer: self.computer(),
-            time_s: self.time_s(),
-            deadline_s: FRAME_S,
+            parachute_ejected: sortie.world().parachute_ejected(),
+            plan_took_s: self.took_s,
             judged: self.judged(),
-            people: self.people,
-            operators: &self.operators,
-            commander: self.commander,
-            mission: &self.mission,
-            log: self.log,
         }
     }
 
@@ -296,11 +262,6 @@ impl Vehicle {
         self.computer().arming_checks()
     }
 
-    /// Weights of the landing cost.
-    pub fn weights(&self) -> StateWeights {
-        self.sortie.mission().powered.weights
-    }
-
     /// The touchdown limits with the values found, once the landing is judged: those of the legs.
     pub fn judged(&self) -> Option<Judged> {
         self.ground.judged()
@@ -315,36 +276,6 @@ impl Vehicle {
     pub fn radio(&self) -> Radio {
         let radio = *self.sortie.radio();
         Radio { silent: radio.silent || self.sortie.computer_is_dead(), ..radio }
-    }
-}
-
-impl vehicle_link::vehicle::Vehicle for Vehicle {
-    fn computer(&self) -> &Computer {
-        Self::computer(self)
-    }
-
-    fn time_s(&self) -> f64 {
-        Self::time_s(self)
-    }
-
-    fn mission(&self) -> &MissionName {
-        Self::mission(self)
-    }
-
-    fn operators(&self) -> &[Operator] {
-        Self::operators(self)
-    }
-
-    fn people(&self) -> Option<People> {
-        Self::people(self)
-    }
-
-    fn weights(&self) -> StateWeights {
-        Self::weights(self)
-    }
-
-    fn snapshot(&self) -> Snapshot {
-        Self::snapshot(self)
     }
 }
 

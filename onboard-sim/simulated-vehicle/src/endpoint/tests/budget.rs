@@ -55,7 +55,7 @@ impl Wire {
         let mut sent = Vec::new();
         for frame in 0.. {
             for request in ask(frame) {
-                self.endpoint.on_command(0, (&request, None), &self.vehicle);
+                self.endpoint.on_command(0, (&request, None), &self.vehicle.state());
             }
             sent.extend(self.run(0.001).into_iter().map(|frame| (self.vehicle.time_s(), frame)));
             if self.vehicle.time_s() >= end_s {
@@ -135,7 +135,7 @@ fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
         let mut wire = new();
         assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
         wire.run_asked(5.0, flood);
-        wire.endpoint.on_command(0, (&from(255, 185, 1.0, 0.0), None), &wire.vehicle);
+        wire.endpoint.on_command(0, (&from(255, 185, 1.0, 0.0), None), &wire.vehicle.state());
         let aborted_at_s = wire.vehicle.time_s();
         let sent = wire.run_asked(3.0, |frame| {
             let mut asked = flood(frame);
@@ -255,7 +255,7 @@ impl Wire {
             params: [message_id as f32, interval_us, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(link, (&request, None), &self.vehicle);
+        self.endpoint.on_command(link, (&request, None), &self.vehicle.state());
         self.run_links(0.1)[link].iter().find_map(CommandAnswer::from_frame).unwrap().result
     }
 }

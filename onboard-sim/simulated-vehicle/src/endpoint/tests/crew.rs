@@ -143,7 +143,7 @@ impl Launch {
         let received = Received::Stream(0, frame.as_bytes().to_vec());
         for news in self.hub.take(0, received, Duration::ZERO, clock) {
             match news {
-                LinkEvent::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle),
+                LinkEvent::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle.state()),
                 LinkEvent::Rejected(frame, why) => self.endpoint.on_rejected(&frame, why),
                 _ => {}
             }

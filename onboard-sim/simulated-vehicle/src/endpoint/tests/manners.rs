@@ -19,7 +19,7 @@ impl Wire {
     /// The answer to a question with these bytes.
     fn question(&mut self, message_id: u32, payload: &[u8]) -> Vec<Frame> {
         let frame = self.ground.encode_payload(message_id, payload).unwrap();
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
         self.run(0.3)
     }
 }
@@ -117,7 +117,7 @@ fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
         assert_eq!(count(&wire.run(0.5), message_id), 1, "message {message_id}");
         assert_eq!(wire.ask(511, message_id as f32, 1e6).0, 0);
         assert!((4..=6).contains(&count(&wire.run(5.0), message_id)), "message {message_id} at 1 Hz");
@@ -129,13 +129,13 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     let mut wire = Wire::new();
     let request =
         CommandRequest { source: GROUND, target: VEHICLE, command: 410, params: [0.0; 7], confirmation: 0 };
-    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     let sent = wire.run(1.5);
     let home = find(&sent, |message| match message {
         MavMessage::HOME_POSITION(home) => Some((home.latitude, home.longitude, home.altitude)),
         _ => None,
     });
-    let site = wire.vehicle.snapshot().site;
+    let site = wire.vehicle.state().mission().site;
     assert_eq!(home, Some(((1e7 * site.latitude_deg) as i32, (1e7 * site.longitude_deg).round() as i32, 0)));
     // Released in the plane north of the pad, nose up: heading north.
     let heading = find(&sent, |message| match message {
@@ -143,15 +143,11 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
         _ => None,
     });
     assert_eq!(heading, Some(0));
-    let mut snapshot = wire.vehicle.snapshot();
-    let half_rad = 0.5 * 120f64.to_radians();
-    snapshot.motion.ned_from_body = [libm::cos(half_rad), 0.0, 0.0, libm::sin(half_rad)];
-    let turned = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, SIMULATED);
-    assert!(matches!(&turned, Some(MavMessage::VFR_HUD(hud)) if hud.heading == 120), "{turned:?}");
-    (snapshot.pad_altitude_m, snapshot.motion.position_m[2]) = (510.0, -40.0);
-    let high = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &snapshot, SIMULATED);
-    let above_sea =
-        matches!(&high, Some(MavMessage::VFR_HUD(hud)) if hud.alt.to_bits() == 550.0f32.to_bits());
+    let mut flight = crate::fly::load_flight("mk2").unwrap();
+    flight.recipe.mission.pad_altitude_m = 510.0;
+    let vehicle = Vehicle::on_the_pad(&flight).unwrap();
+    let high = vehicle_link::telemetry::message(VFR_HUD_DATA::ID, &vehicle.state(), SIMULATED);
+    let above_sea = matches!(&high, Some(MavMessage::VFR_HUD(hud)) if (hud.alt - 510.0).abs() < 1e-3);
     assert!(above_sea, "above mean sea level: {high:?}");
 }
 
@@ -196,7 +192,7 @@ impl Wire {
             ..COMMAND_LONG_DATA::default()
         };
         let frame = self.ground.encode(&MavMessage::COMMAND_LONG(command));
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
         self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
     }
 }
@@ -232,7 +228,7 @@ fn a_radio_s_report_from_another_address_thins_nothing() {
     let sent: usize = (0..10)
         .map(|_| {
             let full = wire.ground.encode(&report);
-            wire.endpoint.on_frame(0, &full, &wire.vehicle);
+            wire.endpoint.on_frame(0, &full, &wire.vehicle.state());
             wire.run(1.0).len()
         })
         .sum();
@@ -251,7 +247,7 @@ fn every_command_of_a_flood_is_answered_or_refused_and_no_flood_of_aborts_grows_
                 ..COMMAND_LONG_DATA::default()
             };
             let frame = sender.encode(&MavMessage::COMMAND_LONG(abort));
-            wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+            wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
         }
     }
     let heard = wire.endpoint.heard(wire.vehicle.time_s());
@@ -267,7 +263,7 @@ fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
     for command in 30_000..30_020 {
         let params = [0.0; 7];
         let request = CommandRequest { source: GROUND, target: VEHICLE, command, params, confirmation: 0 };
-        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
         answers.extend(wire.run(0.1).iter().filter_map(CommandAnswer::from_frame));
     }
     answers.extend(wire.run(0.5).iter().filter_map(CommandAnswer::from_frame));
@@ -316,10 +312,9 @@ fn the_version_announces_files_and_has_an_id_and_a_hash() {
         _ => None,
     });
     // It may have come with the answer.
-    let snapshot = wire.vehicle.snapshot();
     let now = vehicle_link::telemetry::message(
         AUTOPILOT_VERSION_DATA::ID,
-        &snapshot,
+        &wire.vehicle.state(),
         Identity { uid: 77, ..SIMULATED },
     );
     let Some(MavMessage::AUTOPILOT_VERSION(now)) = now else { panic!("it always has content") };
@@ -439,7 +434,7 @@ const ARM: u16 = 400;
 
 fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
     let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
-    wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
     let sent = wire.run(0.5);
     let kept = sent.iter().filter_map(|frame| match frame.decode() {
         Ok(MavMessage::TD_BOOK_KEPT(kept)) => Some(kept),
@@ -480,7 +475,7 @@ fn a_flood_of_ends_is_answered_within_the_budget() {
             ..TD_BOOK_HEAD_DATA::default()
         };
         let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
     }
     let sent = wire.run(1.0);
     let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
@@ -504,7 +499,7 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
         ..COMMAND_LONG_DATA::default()
     };
     let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(arm));
-    wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
     let sent = wire.run(0.5);
     let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
     assert_eq!((answers.len(), answers[0].command), (1, ARM));
@@ -553,7 +548,7 @@ proptest! {
             confirmation: 0,
         };
         let vehicle = rocket().of_mission("mk2", "the right one");
-        let why = vehicle_link::endpoint::meant::why_other_mission(&request, &vehicle);
+        let why = vehicle_link::endpoint::meant::why_other_mission(&request, &vehicle.state());
         prop_assert_eq!(why.is_none(), arms);
     }
 }

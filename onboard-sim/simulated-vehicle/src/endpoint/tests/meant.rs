@@ -94,7 +94,7 @@ impl Range {
         if self.frames.is_multiple_of(20) {
             let time_s = self.vehicle.time_s();
             for program in self.programs.iter_mut().filter(|program| program.speaks) {
-                self.endpoint.on_frame(program.path, &program.beat, &self.vehicle);
+                self.endpoint.on_frame(program.path, &program.beat, &self.vehicle.state());
                 program.heard_at_s = time_s;
             }
         }
@@ -112,7 +112,7 @@ impl Range {
 
     fn put(&mut self, program: usize, request: &CommandRequest) {
         let Program { path, by, .. } = self.programs[program];
-        self.endpoint.on_command(path, (request, by), &self.vehicle);
+        self.endpoint.on_command(path, (request, by), &self.vehicle.state());
     }
 
     /// The answer to a request, and what the vehicle said.
@@ -202,14 +202,14 @@ fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
 fn while_another_vehicle_under_our_ids_is_heard_a_command_must_name_its_boot() {
     let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
     let twin = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-    range.endpoint.on_frame(0, &twin, &range.vehicle);
+    range.endpoint.on_frame(0, &twin, &range.vehicle.state());
     let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[0].request(ARM, 1.0, 0, boot));
     let disarm = range.programs[0].request(ARM, 0.0, 0, 0.0);
     let (answer, words) = range.asks(0, &unnamed);
     assert_eq!(answer, NOT_NOW);
     assert!(words.contains("another vehicle has these ids"), "{words}");
     assert!(!range.vehicle.mode().interlocks.armed);
-    range.endpoint.on_frame(0, &twin, &range.vehicle);
+    range.endpoint.on_frame(0, &twin, &range.vehicle.state());
     assert_eq!(range.asks(0, &named).0, ACCEPTED);
     assert_eq!(range.asks(0, &disarm).0, ACCEPTED);
     assert_eq!(range.asks(0, &unnamed).0, ACCEPTED, "some seconds later");

@@ -61,7 +61,7 @@ fn frame(
 ) -> (Vec<VehicleEvent>, Vec<Outgoing>) {
     let own: Vec<Request> = own.iter().copied().map(Request::of_the_programme).collect();
     let (events, _) = step(endpoint, vehicle, &own, &mut || Duration::ZERO);
-    (events, endpoint.poll(vehicle))
+    (events, endpoint.poll(&vehicle.state()))
 }
 
 struct Wire {
@@ -102,7 +102,7 @@ impl Wire {
 
     fn beat(&mut self) {
         let beat = self.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-        self.endpoint.on_frame(0, &beat, &self.vehicle);
+        self.endpoint.on_frame(0, &beat, &self.vehicle.state());
     }
 
     /// Sends a command from a ground station that is heard.
@@ -125,7 +125,7 @@ impl Wire {
         let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
         bytes[28..30].copy_from_slice(&command.to_le_bytes());
         let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
         let sent = self.run(0.5);
         let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
         assert_eq!(answers.len(), 1, "one answer to one command");
@@ -230,7 +230,7 @@ fn a_command_for_somebody_else_is_left_alone() {
             ..COMMAND_LONG_DATA::default()
         };
         let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(command));
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
     }
     let sent = wire.run(0.5);
     assert_eq!(count(&sent, 77), 0);
@@ -261,7 +261,7 @@ fn intervals_can_be_set_within_the_budget_and_read_back() {
             },
             None,
         ),
-        &wire.vehicle,
+        &wire.vehicle.state(),
     );
     let interval = wire.run(0.5).iter().find_map(|frame| match frame.decode() {
         Ok(MavMessage::MESSAGE_INTERVAL(interval)) => Some(interval.interval_us),
@@ -280,10 +280,10 @@ fn every_phase_has_a_name_for_other_people_s_clients() {
         params: [AVAILABLE_MODES_DATA::ID as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     // A second request while the first still waits is refused for now, so that the queue stays bounded.
     for _ in 0..3 {
-        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     }
     // They use the room that telemetry leaves.
     let sent = wire.run(8.0);
@@ -328,7 +328,7 @@ fn a_flood_of_requests_does_not_silence_telemetry() {
             params: [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     }
     wire.run(2.0);
     assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 14, "8 Hz");
@@ -350,7 +350,7 @@ fn a_new_station_gets_the_limits() {
     let mut wire = Wire::new();
     wire.run(1.0);
     let beat = wire.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-    wire.endpoint.on_frame(0, &beat, &wire.vehicle);
+    wire.endpoint.on_frame(0, &beat, &wire.vehicle.state());
     let limits = wire.run(0.1).iter().find_map(|frame| match frame.decode() {
         Ok(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => Some(limits),
         _ => None,
@@ -364,7 +364,7 @@ fn time_is_told_to_those_who_ask_this_vehicle() {
     for (target_system, answered) in [(0, true), (1, true), (2, false)] {
         let sync = TIMESYNC_DATA { ts1: 77, target_system, ..TIMESYNC_DATA::default() };
         let frame = wire.ground.encode(&MavMessage::TIMESYNC(sync));
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
         assert_eq!(count(&wire.run(0.1), TIMESYNC_DATA::ID) == 1, answered, "target {target_system}");
     }
 }
@@ -380,7 +380,7 @@ proptest! {
         let mut wire = Wire::new();
         for (message_id, payload) in messages {
             if let Some(frame) = wire.ground.encode_payload(message_id, &payload) {
-                wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+                wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
             }
             wire.run(0.02);
         }

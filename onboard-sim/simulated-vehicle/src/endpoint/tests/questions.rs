@@ -32,7 +32,7 @@ fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
 impl Wire {
     fn tell(&mut self, message: &MavMessage) {
         let frame = self.ground.encode(message);
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
     fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
@@ -134,7 +134,7 @@ fn set_rates(wire: &mut Wire, station: Address) -> (u8, f32, String) {
         params: [TD_FINS_DATA::ID as f32, 500_000.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, (&request, None), &wire.vehicle);
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     let sent = wire.run(0.2);
     let answer = sent.iter().find_map(CommandAnswer::from_frame).unwrap();
     let (values, words) = wire.set("RATE_FINS", 1.0, MavParamType::MAV_PARAM_TYPE_REAL32);
@@ -156,7 +156,7 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
         params: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         confirmation: 0,
     };
-    wire.endpoint.on_command(0, (&again, None), &wire.vehicle);
+    wire.endpoint.on_command(0, (&again, None), &wire.vehicle.state());
     wire.run(0.2);
     assert_eq!(wire.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
     assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
@@ -236,7 +236,7 @@ fn versions_capabilities_and_the_mode_are_told_to_those_who_ask() {
             payload[30..32].copy_from_slice(&[1, 1]);
             wire.ground.encode_payload(COMMAND_LONG_DATA::ID, &payload).unwrap()
         };
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
         let sent = wire.run(0.5);
         assert_eq!(count(&sent, message_id), 1, "command {command} with {param1}");
         let results: Vec<u8> = sent.iter().filter_map(CommandAnswer::from_frame).map(|a| a.result).collect();
@@ -258,7 +258,7 @@ fn content(len: usize) -> Vec<u8> {
 impl Wire {
     fn ask_file(&mut self, packet: &Packet) {
         let frame = self.ground.encode(&packet.message(VEHICLE));
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
     /// The answers to one request, and what is said.

@@ -63,7 +63,7 @@ impl Airborne {
             let time_s = self.rocket.time_s();
             let uplink = std::mem::take(&mut self.uplink);
             for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
-                self.endpoint.on_frame(0, &frame, &self.rocket);
+                self.endpoint.on_frame(0, &frame, &self.rocket.state());
             }
             let (_, leaving) = frame(&mut self.rocket, &mut self.endpoint, &[]);
             let leaving = leaving.into_iter().map(|outgoing| outgoing.frame).collect();
@@ -86,7 +86,7 @@ impl Airborne {
             params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             confirmation: 0,
         };
-        self.endpoint.on_command(0, (&request, None), &self.rocket);
+        self.endpoint.on_command(0, (&request, None), &self.rocket.state());
         let sent = self.run(0.3);
         let found = sent
             .iter()
@@ -213,6 +213,7 @@ fn messages_that_are_off_can_be_requested_and_unknown_values_are_marked() {
 fn the_storage_is_told_while_there_is_one() {
     let mut airborne = Airborne::on_the_pad("none");
     airborne.rocket.set_log_state(LogState { running: true, space_bytes: 3 << 30 });
+    airborne.run(0.02);
     let MavMessage::STORAGE_INFORMATION(storage) = airborne.request(STORAGE_INFORMATION_DATA::ID) else {
         panic!("not the storage")
     };
@@ -305,8 +306,7 @@ fn its_map_position_is_at_the_pad_of_its_mission() {
     let MavMessage::GLOBAL_POSITION_INT(place) = airborne.request(GLOBAL_POSITION_INT_DATA::ID) else {
         panic!("not the position")
     };
-    let snapshot = airborne.rocket.snapshot();
-    let (latitude_deg, longitude_deg) = snapshot.site.at_deg(0.0, 0.0);
+    let (latitude_deg, longitude_deg) = airborne.rocket.state().mission().site.at_deg(0.0, 0.0);
     // Within a few hundred metres of the pad, some 200 m up; a degree is 111 km.
     assert!((f64::from(place.lat) * 1e-7 - latitude_deg).abs() < 5e-3, "{place:?}");
     assert!((f64::from(place.lon) * 1e-7 - longitude_deg).abs() < 5e-3, "{place:?}");

@@ -151,7 +151,7 @@ impl Line {
         let bytes = self.up.arrived(now_s);
         for news in self.vehicle_hub.take(0, Received::Stream(0, bytes), now, clock) {
             if let LinkEvent::Frame(frame) = news {
-                self.endpoint.on_frame(0, &frame, &self.vehicle);
+                self.endpoint.on_frame(0, &frame, &self.vehicle.state());
             }
         }
         let (_, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
@@ -273,7 +273,7 @@ fn a_radio_without_room_in_its_buffer_gets_a_quarter_and_all_of_it_again_later()
     let mut report = |wire: &mut Wire, txbuf| {
         let status = RADIO_STATUS_DATA { txbuf, ..RADIO_STATUS_DATA::default() };
         let frame = radio.encode(&MavMessage::RADIO_STATUS(status));
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle);
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
         wire.run(1.0)
     };
     for _ in 0..10 {

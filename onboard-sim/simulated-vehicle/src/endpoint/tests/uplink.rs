@@ -76,7 +76,7 @@ impl Pad {
         if self.beat_in == 0 {
             for station in self.speaking.clone() {
                 let beat = self.stations[station].encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-                self.endpoint.on_frame(0, &beat, &self.vehicle);
+                self.endpoint.on_frame(0, &beat, &self.vehicle.state());
             }
             self.beat_in = (0.1 / FRAME_S).round() as u32;
         }
@@ -103,7 +103,7 @@ impl Pad {
         });
         let frame = self.stations[station].encode(&message);
         self.sent.clear();
-        self.endpoint.on_frame(0, &frame, &self.vehicle);
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
     fn answers(&self) -> Vec<u8> {
@@ -237,7 +237,7 @@ fn a_station_that_hears_nothing_of_the_countdown_holds_it() {
     };
     for (station, counts) in [(OTHER, true), (CREW, false)] {
         let beat = pad.stations[station].encode(&MavMessage::HEARTBEAT(deaf.clone()));
-        pad.endpoint.on_frame(0, &beat, &pad.vehicle);
+        pad.endpoint.on_frame(0, &beat, &pad.vehicle.state());
         pad.run(0.05);
         assert_eq!(pad.counting(), counts, "the one that armed it is meant");
     }
@@ -339,7 +339,7 @@ fn a_running_check_can_be_cancelled() {
         COMMAND_CANCEL_DATA { command: MavCmd::MAV_CMD_TD_PAD_CHECK, target_system: 1, target_component: 1 };
     let cancel = pad.stations[CREW].encode(&MavMessage::COMMAND_CANCEL(cancel));
     pad.sent.clear();
-    pad.endpoint.on_frame(0, &cancel, &pad.vehicle);
+    pad.endpoint.on_frame(0, &cancel, &pad.vehicle.state());
     pad.run(0.3);
     assert_eq!(pad.answers(), [MavResult::MAV_RESULT_CANCELLED as u8]);
     assert!(!pad.vehicle.computer().pad_check().is_running());
@@ -404,7 +404,7 @@ fn every_station_is_told_how_it_is_heard_and_one_that_is_refused_learns_why() {
     let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated);
     let mut stranger = Encoder::new(SPARE);
     let beat = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-    let first = frames(endpoint.poll(&vehicle));
+    let first = frames(endpoint.poll(&vehicle.state()));
     let [told] = &uplinks(&first)[..] else { panic!("one message") };
     assert_eq!((told.target_system, told.target_component, told.accepted_age_ms), (0, 0, u16::MAX));
     endpoint.on_rejected(&beat, Rejection::Unsigned);
@@ -437,7 +437,7 @@ fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
     assert!(pad.vehicle.phase().in_descent());
     pad.tell(CREW, ABORT, 1.0);
     // The flight computer takes it at its next frame: until then nothing is latched and nothing acknowledged.
-    let before = frames(pad.endpoint.poll(&pad.vehicle));
+    let before = frames(pad.endpoint.poll(&pad.vehicle.state()));
     assert!(!pad.vehicle.aborted());
     assert!(before.iter().all(|frame| CommandAnswer::from_frame(frame).is_none()));
     pad.tell(CREW, ABORT, 1.0);

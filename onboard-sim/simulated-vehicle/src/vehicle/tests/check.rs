@@ -57,7 +57,7 @@ fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
     let mut rocket = on_the_pad("field", &["fin-stuck:1@pad+1"]);
     let since_s = rocket.time_s();
     rocket.run_until(|rocket| rocket.time_s() > since_s + 2.0);
-    assert_eq!(rocket.snapshot().checks_failed, 0, "{:?}", rocket.arming_checks());
+    assert_eq!(rocket.state().checks_failed(), 0, "{:?}", rocket.arming_checks());
     let events = checked(&mut rocket);
     assert_eq!(state(&rocket), CheckState::Failed);
     // Fin 2 is surface 3.
@@ -100,7 +100,7 @@ fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
     let refused = rocket.request(Asked::Arm);
     let reason = refused.reason.unwrap();
     assert!(reason.starts_with("battery: found 7.1") && reason.ends_with("at least 7.4 V"), "{reason}");
-    let battery = rocket.snapshot().battery.unwrap();
+    let battery = rocket.state().battery.unwrap();
     let left = battery.left.is_some_and(|left| (left - 0.08).abs() < 0.01);
     assert!(left && (7.0..7.4).contains(&battery.volts), "{battery:?}");
 }
@@ -131,11 +131,11 @@ fn every_other_request_ends_it_and_an_arming_waits_for_the_surfaces() {
         let mut rocket = on_the_pad("none", &[]);
         rocket.request(Asked::Check);
         rocket.run_until(|rocket| rocket.computer().commands().gimbal_rad[0] > 0.1);
-        assert!(rocket.snapshot().checks_failed != 0, "not ready meanwhile");
+        assert!(rocket.state().checks_failed() != 0, "not ready meanwhile");
         let answer = rocket.request(asked);
         assert_eq!(state(&rocket), CheckState::Stopped, "{asked:?}");
         assert!(rests(&rocket), "{asked:?}");
-        assert!(!rocket.snapshot().interlocks.armed, "{asked:?}");
+        assert!(!rocket.mode().interlocks.armed, "{asked:?}");
         if asked == Asked::Arm {
             assert_eq!(answer.ending, Ending::NotNow);
             assert!(answer.reason.unwrap().starts_with("a check of the vehicle ran"));

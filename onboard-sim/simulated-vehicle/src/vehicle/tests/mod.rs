@@ -11,6 +11,19 @@ use flight::computer::crew::{Answer, Asked, Request};
 use flight::rules::phase::Phase;
 
 use super::*;
+use mavlink::MessageData as _;
+use protocol::dialect::{MavMessage, TD_DESCENT_DATA, TdBooster};
+use vehicle_link::telemetry;
+use vehicle_link::vehicle::{Identity, VehicleKind};
+
+/// What the crew is sent of the descent.
+fn descent(vehicle: &Vehicle) -> TD_DESCENT_DATA {
+    let identity = Identity { kind: VehicleKind::Simulated, boot_number: 1, uid: 0 };
+    match telemetry::message(TD_DESCENT_DATA::ID, &vehicle.state(), identity) {
+        Some(MavMessage::TD_DESCENT(descent)) => descent,
+        other => panic!("{other:?} instead of the descent"),
+    }
+}
 
 /// A vehicle, and what it has told that no test has read yet.
 pub(crate) struct Told {
@@ -33,6 +46,10 @@ impl DerefMut for Told {
 }
 
 impl Told {
+    fn descent(&self) -> TD_DESCENT_DATA {
+        descent(self)
+    }
+
     /// A vehicle whose pin is out and whose log runs.
     pub(crate) fn of(mut vehicle: Vehicle) -> Self {
         vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
@@ -71,7 +88,7 @@ impl Told {
 
     /// Armed and started as far as it takes.
     fn run_to(mut self, phase: Phase) -> Self {
-        self.run_until(|vehicle| vehicle.snapshot().checks_failed == 0 && vehicle.phase() == Phase::PadIdle);
+        self.run_until(|vehicle| vehicle.state().checks_failed() == 0 && vehicle.phase() == Phase::PadIdle);
         if phase == Phase::PadIdle {
             return self;
         }

@@ -59,23 +59,23 @@ fn from_the_pad_it_passes_every_phase_and_lands() {
 #[test]
 fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
     let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(Phase::Boost);
-    let ascent = |rocket: &Vehicle| rocket.snapshot().descent.unwrap().ascent.unwrap();
-    rocket.run_until(|rocket| rocket.snapshot().descent.is_some());
-    assert_eq!((ascent(&rocket).booster, ascent(&rocket).apogee), (Booster::Attached, None));
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::SafeOnPad, "it has not lifted off");
+    rocket.run_until(|rocket| rocket.state().airborne().is_some());
+    assert!(rocket.descent().booster == TdBooster::TD_BOOSTER_ATTACHED && rocket.descent().apogee_m.is_nan());
+    assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad, "it has not lifted off");
     rocket.run_until(|rocket| rocket.phase() == Phase::Coast);
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
-    let told = ascent(&rocket).apogee.unwrap();
-    let began_s = rocket.snapshot().since_zero_s.unwrap();
-    rocket.run_until(|rocket| ascent(rocket).booster == Booster::Separated);
+    assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteAtApogee);
+    let told = rocket.descent();
+    let began_s = rocket.state().since_zero_s().unwrap();
+    rocket.run_until(|rocket| descent(rocket).booster == TdBooster::TD_BOOSTER_SEPARATED);
     rocket.run_until(|rocket| !rocket.phase().before_apogee());
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteNow, "from the first frame on");
+    assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteNow, "from the first frame on");
     let reached_m = rocket.sortie.world().state().position_m.z;
-    assert!((told.height_m - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
-    let took_s = rocket.snapshot().since_zero_s.unwrap() - began_s;
-    assert!((told.in_s - took_s).abs() < 0.05 * took_s, "{told:?}, {took_s}");
+    assert!((f64::from(told.apogee_m) - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
+    let took_s = rocket.state().since_zero_s().unwrap() - began_s;
+    assert!((f64::from(told.time_to_apogee_s) - took_s).abs() < 0.05 * took_s, "{told:?}, {took_s}");
     rocket.advance();
-    assert!(ascent(&rocket).over && ascent(&rocket).apogee.is_none());
+    let over = rocket.descent();
+    assert!(over.apogee_m.abs() < 1e-9 && over.time_to_apogee_s.abs() < 1e-9, "{over:?}");
 }
 
 #[test]
@@ -86,9 +86,9 @@ fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
     for words in ["LIFT-OFF", "burnt out at"] {
         let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(Phase::Boost);
         events_until(&mut rocket, words);
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteAtApogee);
+        assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteAtApogee);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
-        assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+        assert!(rocket.mode().interlocks.landing_motor_inhibited);
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events).last(), Some(&Phase::Touchdown));
         assert!(phases(&events).contains(&Phase::Chute) && !phases(&events).contains(&Phase::Ignition));
@@ -104,15 +104,16 @@ fn an_abort_or_a_disarm_before_the_lift_off_switches_the_igniter_off_and_says_th
         let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(Phase::Boost);
         rocket.advance();
         assert!(rocket.computer().commands().outputs.is_on(Line::AscentIgniter));
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::SafeOnPad);
+        assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad);
         assert_eq!(rocket.request(asked).ending, Ending::Accepted);
         assert_eq!(rocket.computer().commands().outputs, Outputs::NONE);
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::PadIdle]);
         assert!(said(&events, "the motor may still light") && said(&events, "keep away for 60 s"));
-        let after = rocket.snapshot();
+        let after = *rocket.mode();
         assert!(after.interlocks.abort_latched && !after.interlocks.armed);
-        assert!((58.0..60.0).contains(&after.pad_wait_s.unwrap()), "{:?}", after.pad_wait_s);
+        let pad_wait_s = after.pad_wait_remaining_s(rocket.time_s());
+        assert!((58.0..60.0).contains(&pad_wait_s.unwrap()), "{pad_wait_s:?}");
         for _ in 0..1_000 {
             rocket.advance();
         }
@@ -196,7 +197,7 @@ fn an_ascent_motor_that_does_not_light_leaves_an_aborted_vehicle_on_its_pad() {
     let (rocket, events) = flown(from(StartPoint::Pad, "field", &["ascent-no-light@0"]));
     assert_eq!(phases(&events), [Phase::PadArmed, Phase::Boost, Phase::PadIdle]);
     assert!(said(&events, "no lift-off within 3 s") && said(&events, "keep away for 60 s"));
-    let after = rocket.snapshot();
+    let after = *rocket.mode();
     assert!(
         after.interlocks.abort_latched && after.interlocks.landing_motor_inhibited && !after.interlocks.armed
     );
@@ -212,7 +213,7 @@ fn a_booster_that_does_not_separate_inhibits_the_motor_and_opens_the_parachute()
         [Phase::PadArmed, Phase::Boost, Phase::Coast, Phase::Chute, Phase::Touchdown]
     );
     assert!(said(&events, "the booster has not separated"));
-    assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+    assert!(rocket.mode().interlocks.landing_motor_inhibited);
     let world = rocket.sortie.world();
     assert!(world.booster_attached() && world.thrust_begins_s().is_none());
     let impact_m_s = world.touchdown().unwrap().vertical_m_s;
@@ -302,7 +303,7 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
         let seen = phases(&events);
         assert!(said(&events, "LIFT-OFF without a countdown"), "{asked:?}: {seen:?}");
         assert!(seen.contains(&way_down), "{asked:?}: {seen:?}");
-        let inhibited = rocket.snapshot().interlocks.abort_latched;
+        let inhibited = rocket.mode().interlocks.abort_latched;
         assert_eq!(inhibited, way_down == Phase::Chute, "{asked:?}");
         let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
         assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
@@ -359,7 +360,7 @@ fn released_before_it_was_cleared_it_inhibits_the_motor_and_opens_the_parachute(
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown], "{asked:?}");
         assert!(said(&events, "RELEASED before it was cleared"));
-        assert!(rocket.snapshot().interlocks.landing_motor_inhibited);
+        assert!(rocket.mode().interlocks.landing_motor_inhibited);
         let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
         assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
     }
@@ -374,7 +375,7 @@ fn an_abort_while_it_hangs_inhibits_the_motor_and_stays_on_the_drone() {
         rocket.advance();
     }
     assert_eq!(rocket.phase(), Phase::PadIdle);
-    assert!(rocket.sortie.world().hangs() && rocket.snapshot().interlocks.landing_motor_inhibited);
+    assert!(rocket.sortie.world().hangs() && rocket.mode().interlocks.landing_motor_inhibited);
 }
 
 /// A held countdown does not let a drone's pilot clear the release: nothing falls by itself.
@@ -399,8 +400,8 @@ fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
     assert!(!said(&events, "LIFT-OFF"));
     let events = rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
     assert!(said(&events, "the flight computer has restarted: DISARMED"), "{events:?}");
-    let snapshot = rocket.snapshot();
-    assert!(!snapshot.interlocks.armed && snapshot.countdown_s.is_none(), "{snapshot:?}");
+    let mode = *rocket.mode();
+    assert!(!mode.interlocks.armed && mode.countdown_end_s.is_none(), "{mode:?}");
     rocket.run_until(|rocket| rocket.arming_checks().iter().all(|check| check.passed));
     rocket.request(Asked::Arm);
     rocket.request(Asked::Start);

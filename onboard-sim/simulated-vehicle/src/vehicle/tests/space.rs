@@ -4,6 +4,7 @@ use campaign::tally;
 use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::rules::phase::MotorStatus;
+use protocol::dialect::TdChute;
 use protocol::log::record::Record;
 use sim::dispersion::Dispersion;
 
@@ -73,7 +74,7 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
     assert!((1e-6..0.01).contains(&found.rotation_rad_s), "{found:?}");
     assert!((1e-4..0.2).contains(&found.speed_m_s), "{found:?}");
     assert!((1e-6..0.02).contains(&found.tilt_rad), "{found:?}");
-    assert_eq!(rocket.snapshot().checks_failed, 0, "{:?}", rocket.arming_checks());
+    assert_eq!(rocket.state().checks_failed(), 0, "{:?}", rocket.arming_checks());
     rocket.set_log_state(LogState { running: false, space_bytes: 0 });
     let refused = rocket.request(Asked::Arm);
     assert!(refused.reason.unwrap().starts_with("log: found not running"));
@@ -88,7 +89,7 @@ fn every_built_in_mission_is_ready_on_its_pad() {
         let flight = load_flight(name).unwrap();
         let mut rocket = rocket_of(&flight);
         rocket.run_until(|rocket| rocket.time_s() > 10.0);
-        assert_eq!(rocket.snapshot().checks_failed, 0, "{name}: {:?}", rocket.arming_checks());
+        assert_eq!(rocket.state().checks_failed(), 0, "{name}: {:?}", rocket.arming_checks());
     }
 }
 
@@ -113,10 +114,10 @@ fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
 fn telemetry_is_the_estimate_in_north_east_down() {
     let flight = flight_of("none", &[]);
     let mut rocket = in_phase(&flight, Phase::Powered);
-    rocket.run_until(|rocket| rocket.snapshot().prediction.is_some());
-    let snapshot = rocket.snapshot();
+    rocket.run_until(|rocket| rocket.state().planned().is_some());
+    let state = rocket.state();
     let world = rocket.sortie.world();
-    let (truth, motion) = (world.state(), &snapshot.motion);
+    let (truth, motion) = (world.state(), state.motion());
     let close = |found: f64, should: f64| assert!((found - should).abs() < 1e-9, "{found}, not {should}");
     close(motion.position_m[0], truth.position_m.x);
     close(motion.position_m[1], -truth.position_m.y);
@@ -130,13 +131,14 @@ fn telemetry_is_the_estimate_in_north_east_down() {
     close(nose_ned[0], nose.x);
     close(nose_ned[1], -nose.y);
     close(nose_ned[2], -nose.z);
-    let descent = snapshot.descent.unwrap();
-    close(descent.vertical_m_s, truth.velocity_m_s.z);
-    assert!(descent.ignition_in_s.is_none() && descent.band_m.is_some());
-    assert!(snapshot.path.is_some_and(|path| path.count > 2));
-    let prediction = snapshot.prediction.unwrap();
-    assert!((0.5..6.0).contains(&prediction.time_to_go_s), "{prediction:?}");
-    assert!(prediction.state.u_m_s.abs() < 1.0 && prediction.state.w_m_s.abs() < 1.0, "{prediction:?}");
+    let descent = rocket.descent();
+    assert!((f64::from(descent.vertical_speed_m_s) - truth.velocity_m_s.z).abs() < 1e-5, "{descent:?}");
+    assert!(descent.time_to_ignition_s.is_nan() && !descent.band_low_m.is_nan());
+    let planned = state.planned().unwrap();
+    assert!(planned.path_from_the_east::<12>().is_some_and(|(_, count)| count > 2));
+    let (time_to_go_s, end) = (planned.time_to_go_s.unwrap(), planned.end(0.0).unwrap());
+    assert!((0.5..6.0).contains(&time_to_go_s), "{time_to_go_s}");
+    assert!(end.u_m_s.abs() < 1.0 && end.w_m_s.abs() < 1.0, "{end:?}");
 }
 
 #[test]
@@ -144,13 +146,13 @@ fn the_countdown_to_ignition_runs_down_to_it() {
     // In still air with everything known: what a gust or a better estimate changes in the last second is no error of
     // the countdown.
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::LandArmed);
-    let announced = rocket.snapshot().descent.unwrap();
-    let (band, chosen_m) = (announced.band_m.unwrap(), announced.chosen_m.unwrap());
-    assert!(band.0 < chosen_m && chosen_m < band.1, "{announced:?}");
-    let left_s = |rocket: &Vehicle| rocket.snapshot().descent.and_then(|descent| descent.ignition_in_s);
-    assert!((2.0..3.1).contains(&left_s(&rocket).unwrap()), "{announced:?}");
-    rocket.run_until(|rocket| left_s(rocket).is_some_and(|left_s| left_s <= 1.0));
-    let at_s = rocket.time_s() + left_s(&rocket).unwrap();
+    let announced = rocket.descent();
+    let chosen_m = announced.chosen_height_m;
+    assert!(announced.band_low_m < chosen_m && chosen_m < announced.band_high_m, "{announced:?}");
+    let left_s = |rocket: &Vehicle| f64::from(descent(rocket).time_to_ignition_s);
+    assert!((2.0..3.1).contains(&left_s(&rocket)), "{announced:?}");
+    rocket.run_until(|rocket| left_s(rocket) <= 1.0);
+    let at_s = rocket.time_s() + left_s(&rocket);
     rocket.run_until(|rocket| rocket.phase() == Phase::Ignition);
     assert!((rocket.time_s() - at_s).abs() < 0.1, "{} s, announced {at_s} s", rocket.time_s());
 }
@@ -202,12 +204,12 @@ fn the_crew_sees_where_the_servos_say_that_they_are() {
     let mut apart = 0;
     for _ in 0..200 {
         rocket.advance();
-        let seen = rocket.snapshot();
+        let seen = *rocket.state().input();
         let frame = rocket.computer_frame.clone().unwrap();
-        assert_eq!((seen.fins_rad.1.to_vec(), rocket.computer_records().len()), (frame.input.fins_rad, 1));
-        assert_eq!(seen.gimbal_rad.map(|(_, told_rad)| told_rad).to_vec(), frame.input.gimbal_rad);
+        assert_eq!((seen.fins_rad.to_vec(), rocket.computer_records().len()), (frame.input.fins_rad, 1));
+        assert_eq!(seen.gimbal_rad.to_vec(), frame.input.gimbal_rad);
         let bits = |angles: [f64; 4]| angles.map(f64::to_bits);
-        apart += u64::from(bits(seen.fins_rad.1) != bits(rocket.sortie.world().fins_rad()));
+        apart += u64::from(bits(seen.fins_rad) != bits(rocket.sortie.world().fins_rad()));
     }
     assert!(apart > 100, "{apart} frames");
 }
@@ -254,9 +256,9 @@ fn wait(rocket: &mut Told, duration_s: f64) -> Vec<VehicleEvent> {
 fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
     let (mut rocket, events) = flown(&flight_of("field", &[]));
     assert!(said(&events, "burn-out: motor hot for 60 s"), "{events:?}");
-    let landed = rocket.snapshot();
-    assert_eq!((landed.phase, landed.motor), (Phase::Touchdown, MotorStatus::Hot));
-    let wait_s = landed.approach_wait_s.unwrap();
+    let (landed, motor) = (*rocket.mode(), rocket.mode().motor_status(rocket.time_s()));
+    assert_eq!((landed.phase, motor), (Phase::Touchdown, MotorStatus::Hot));
+    let wait_s = landed.approach_wait_s(rocket.time_s()).unwrap();
     assert!((45.0..=60.0).contains(&wait_s), "{wait_s}");
     let stood_s = rocket.time_s() - rocket.judged().unwrap().impact.time_s;
     assert!((1.0..5.0).contains(&stood_s), "the flight is over {stood_s} s after the touchdown");
@@ -265,7 +267,7 @@ fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
     let events = wait(&mut rocket, 0.2);
     assert_eq!(phases(&events), [Phase::Safed]);
     assert!(said(&events, "burnt out and cooled"), "{events:?}");
-    assert_eq!((rocket.snapshot().motor, rocket.is_over()), (MotorStatus::Burnt, true));
+    assert_eq!((rocket.mode().motor_status(rocket.time_s()), rocket.is_over()), (MotorStatus::Burnt, true));
 }
 
 #[test]
@@ -273,16 +275,22 @@ fn a_motor_that_was_not_lit_or_did_not_light_is_live_until_its_pin_is_back() {
     for faults in [&["abort@descent+1"][..], &["no-light@apogee"]] {
         let (mut rocket, events) = flown(&flight_of("none", faults));
         assert!(said(&events, "LIVE MOTOR: do not approach for 60 s"), "{faults:?}: {events:?}");
-        let landed = rocket.snapshot();
-        assert_eq!((landed.phase, landed.motor), (Phase::Touchdown, MotorStatus::Live), "{faults:?}");
-        assert!((50.0..60.0).contains(&landed.approach_wait_s.unwrap()), "{faults:?}");
+        let (landed, motor) = (*rocket.mode(), rocket.mode().motor_status(rocket.time_s()));
+        assert_eq!((landed.phase, motor), (Phase::Touchdown, MotorStatus::Live), "{faults:?}");
+        assert!((50.0..60.0).contains(&landed.approach_wait_s(rocket.time_s()).unwrap()), "{faults:?}");
         // Too soon: its time has to pass all the same.
         rocket.set_pin_out(false);
         wait(&mut rocket, 20.0);
-        assert_eq!((rocket.phase(), rocket.snapshot().motor), (Phase::Touchdown, MotorStatus::PinIn));
+        assert_eq!(
+            (rocket.phase(), rocket.mode().motor_status(rocket.time_s())),
+            (Phase::Touchdown, MotorStatus::PinIn)
+        );
         rocket.set_pin_out(true);
         assert!(said(&wait(&mut rocket, 200.0), "LIVE MOTOR: the wait is over"));
-        assert_eq!((rocket.phase(), rocket.snapshot().motor), (Phase::Touchdown, MotorStatus::Live));
+        assert_eq!(
+            (rocket.phase(), rocket.mode().motor_status(rocket.time_s())),
+            (Phase::Touchdown, MotorStatus::Live)
+        );
         rocket.set_pin_out(false);
         assert_eq!(phases(&wait(&mut rocket, 0.1)), [Phase::Safed]);
     }
@@ -296,11 +304,15 @@ fn an_abort_on_the_pad_disarms_latches_and_lets_nothing_go() {
     for phase in [Phase::PadIdle, Phase::PadArmed] {
         let mut rocket = in_phase(&flight, phase);
         rocket.request(Asked::Start);
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::SafeOnPad);
+        assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
-        let after = rocket.snapshot();
+        let after = *rocket.mode();
         assert!(!after.interlocks.armed && after.interlocks.landing_motor_inhibited);
-        assert_eq!((after.pad_wait_s, after.abort_effect), (Some(60.0), AbortEffect::None));
+        let abort_effect = rocket.computer().abort_effect();
+        assert_eq!(
+            (after.pad_wait_remaining_s(rocket.time_s()), abort_effect),
+            (Some(60.0), AbortEffect::None)
+        );
         for _ in 0..2_000 {
             rocket.advance();
         }
@@ -315,8 +327,8 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
     let flight = flight_of("field", &[]);
     for phase in [Phase::Deploy, Phase::AeroDescent, Phase::LandArmed] {
         let mut rocket = in_phase(&flight, phase);
-        rocket.run_until(|rocket| rocket.snapshot().abort_effect == AbortEffect::ChuteNow);
-        assert_eq!(rocket.snapshot().descent.unwrap().chute, Chute::Stowed);
+        rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::ChuteNow);
+        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_STOWED);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown]);
@@ -325,7 +337,7 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
         let judged = rocket.judged().unwrap();
         assert!(!judged.landed, "under the parachute it is not a landing");
         assert!(judged.impact.state.u_m_s.abs() < 10.0, "{judged:?}");
-        assert_eq!(rocket.snapshot().descent.unwrap().chute, Chute::Open);
+        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_OPEN);
     }
 }
 
@@ -335,10 +347,11 @@ fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
     let flight = flight_of("none", &[]);
     let mut rocket = in_phase(&flight, Phase::LandArmed);
     let below_commit = |rocket: &Vehicle| {
-        rocket.snapshot().descent.is_some_and(|descent| descent.height_m < descent.commit_height_m)
+        let descent = descent(rocket);
+        descent.height_m < descent.commit_height_m
     };
     rocket.run_until(below_commit);
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::ChuteNow);
+    assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteNow);
     assert_eq!(rocket.phase(), Phase::LandArmed);
     assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
@@ -348,7 +361,7 @@ fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
     assert!(found_m_s < 10.0, "{found_m_s} m/s");
 
     let mut rocket = in_phase(&flight, Phase::LandArmed);
-    rocket.run_until(|rocket| rocket.snapshot().abort_effect == AbortEffect::Burn);
+    rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::Burn);
     assert_eq!(rocket.phase(), Phase::LandArmed);
     assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
@@ -362,7 +375,7 @@ fn an_abort_under_thrust_lands_and_never_opens_a_parachute() {
     let flight = flight_of("none", &[]);
     for phase in [Phase::Ignition, Phase::Powered] {
         let mut rocket = in_phase(&flight, phase);
-        assert_eq!(rocket.snapshot().abort_effect, AbortEffect::LandInPlace);
+        assert_eq!(rocket.computer().abort_effect(), AbortEffect::LandInPlace);
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
         let events = rocket.run_until(Vehicle::is_over);
         assert!(said(&events, "no cut-off exists; landing on the ground below"));
@@ -376,8 +389,8 @@ fn an_abort_under_thrust_lands_and_never_opens_a_parachute() {
 fn without_light_an_abort_is_a_fall() {
     let flight = flight_of("none", &["no-light@0"]);
     let mut rocket = in_phase(&flight, Phase::Ignition);
-    rocket.run_until(|rocket| rocket.snapshot().interlocks.no_light_latched);
-    let AbortEffect::Impact { m_s } = rocket.snapshot().abort_effect else { panic!("it does not burn") };
+    rocket.run_until(|rocket| rocket.mode().interlocks.no_light_latched);
+    let AbortEffect::Impact { m_s } = rocket.computer().abort_effect() else { panic!("it does not burn") };
     assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
     assert!(said(&events, "the landing motor has not lit") && !said(&events, "landing on the ground"));
@@ -395,7 +408,7 @@ fn on_the_ground_there_is_nothing_to_abort_and_in_the_air_nothing_to_arm() {
         assert!(answer.reason.unwrap().contains("AERO_DESCENT"));
     }
     rocket.run_until(|rocket| rocket.phase() == Phase::Touchdown);
-    assert_eq!(rocket.snapshot().abort_effect, AbortEffect::None);
+    assert_eq!(rocket.computer().abort_effect(), AbortEffect::None);
     let answer = rocket.request(Asked::Abort);
     assert_eq!(answer.ending, Ending::Failed);
     assert!(answer.reason.unwrap().contains("on the ground"));
