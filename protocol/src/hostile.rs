@@ -11,7 +11,6 @@ use crate::command::{CommandAnswer, CommandRequest, CommandSender};
 use crate::dialect::MavMessage;
 use crate::frame::{Encoder, Frame, Framer};
 use crate::ftp::download::Download;
-use crate::ftp::part::Part;
 use crate::ftp::server::{NoFiles, Server};
 use crate::ftp::{FileRequest, Packet};
 use crate::hub::{Hub, LinkEvent, Received};
@@ -68,7 +67,7 @@ pub fn frames(data: &[u8]) {
     let mut texts = Reassembler::new();
     let mut stats = LinkStats::new();
     let mut sender = CommandSender::new(0);
-    let (mut files, mut download) = (Server::default(), Download::new(None, None, 0));
+    let (mut files, mut download) = (Server::default(), Download::new(None, 0));
     let mut rest = data;
     let mut now = Duration::ZERO;
     while let [len, tail @ ..] = rest {
@@ -202,6 +201,5 @@ fn every_decoder(frame: &Frame) {
     let _ = ParamRequest::from_frame(frame);
     if let Some(request) = FileRequest::from_frame(frame) {
         Encoder::new(GROUND).encode(&request.packet.message(request.source));
-        let _ = Part::from_text(request.packet.path());
     }
 }

@@ -8,7 +8,6 @@ use proptest::prelude::*;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::ftp::download::{Download, DownloadEvent, Failure};
-use protocol::ftp::part::Part;
 use protocol::ftp::server::{InMemory, Server};
 use protocol::ftp::{DATA_LEN, FileRequest, Packet, crc};
 use protocol::identity::{GROUND, VEHICLE};
@@ -104,9 +103,9 @@ struct World {
     down: Line,
     up: Line,
     encoders: (Encoder, Encoder),
-    written: Vec<u8>,
+    /// With the checksum of the file that it is to become.
+    written: (u32, Vec<u8>),
     begun_fresh: u32,
-    pieces: usize,
     open: bool,
 }
 
@@ -125,9 +124,8 @@ impl World {
             down: Line::new(settings),
             up: Line::new(settings),
             encoders: (Encoder::new(VEHICLE), Encoder::new(GROUND)),
-            written: Vec::new(),
+            written: (0, Vec::new()),
             begun_fresh: 0,
-            pieces: 0,
             open: true,
         }
     }
@@ -155,12 +153,17 @@ impl World {
         for frame in heard {
             let (target, packet) = Packet::answer_in(&frame).unwrap();
             assert_eq!(target, GROUND);
-            let news = download.take(&packet, now);
-            self.write(news);
-        }
-        if download.is_whole() {
-            let news = download.compare(crc::continued(0, &self.written));
-            self.write(news);
+            match download.take(&packet, now) {
+                Some(DownloadEvent::Opened { crc }) => {
+                    if self.written.0 != crc {
+                        self.begun_fresh += 1;
+                        self.written = (crc, Vec::new());
+                    }
+                    download.resume(self.written.1.len() as u32);
+                }
+                Some(DownloadEvent::Data(data)) => self.written.1.extend(data),
+                None => {}
+            }
         }
         for packet in download.poll(now) {
             let frame = self.encoders.1.encode(&packet.message(VEHICLE));
@@ -168,18 +171,8 @@ impl World {
         }
     }
 
-    fn write(&mut self, news: Option<DownloadEvent>) {
-        match news {
-            Some(DownloadEvent::Begins { fresh: true }) => {
-                self.begun_fresh += 1;
-                self.written = vec![0; self.file.len()];
-            }
-            Some(DownloadEvent::Piece { offset, data }) => {
-                self.pieces += 1;
-                self.written[offset as usize..offset as usize + data.len()].copy_from_slice(&data);
-            }
-            Some(DownloadEvent::Begins { fresh: false }) | None => {}
-        }
+    fn is_whole(&self) -> bool {
+        self.written == (crc::continued(0, &self.file), self.file.clone())
     }
 
     fn run(&mut self, download: &mut Download, most_s: f64) -> Option<Result<(), Failure>> {
@@ -195,30 +188,23 @@ const RADIO: LineSettings =
     LineSettings { bytes_s: 5760.0, latency_s: 0.05, loss: 0.3, double: 0.0, late: (0.0, 0.0) };
 
 /// Ten megabytes over 57,600 baud with 30 % loss both ways; the ground's process is killed five times, and begins
-/// again with what its last memory says.
+/// again with what is on disk.
 #[test]
 fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five_times() {
     const LEN: usize = 10_000_000;
     let mut world = World::new(LEN, RADIO, 1);
-    let mut memory: Option<String> = None;
     for life in 0_u16..=5 {
-        let kept = memory.as_deref().map(|text| Part::from_text(text).unwrap());
-        let mut download = Download::new(Some("flight.mcap"), kept, 1000 * life);
+        let mut download = Download::new(Some("flight.mcap"), 1000 * life);
         if life == 5 {
             assert_eq!(world.run(&mut download, 10_000.0), Some(Ok(())));
             break;
         }
-        // Its memory is written once a second; the kill comes at any time.
-        for _ in 0..400 + 10 * life {
-            assert_eq!(world.run(&mut download, 1.0), None);
-            memory = download.part().map(|part| part.to_text()).or(memory);
-        }
-        world.run(&mut download, 0.73);
+        assert_eq!(world.run(&mut download, 400.0 + 10.0 * f64::from(life)), None);
         for _ in 0..400 {
             world.step(None);
         }
     }
-    assert!(world.written == world.file, "the file is another");
+    assert!(world.is_whole(), "the file is another");
     assert_eq!(world.begun_fresh, 1, "it began at zero more than once");
     // What the line can carry of files: whole frames, of which 30 % are lost.
     let carried_bytes =
@@ -231,15 +217,18 @@ fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five
 
 #[test]
 fn a_slow_line_and_a_quick_one_are_filled_as_well() {
-    for (bytes_s, latency_s, len) in
-        [(2000.0, 0.25, 300_000), (5760.0, 0.3, 600_000), (100_000.0, 0.01, 4_000_000)]
-    {
+    for (bytes_s, latency_s, len) in [
+        (2000.0, 0.25, 300_000),
+        (5760.0, 0.05, 1_000_000),
+        (5760.0, 0.3, 600_000),
+        (100_000.0, 0.01, 4_000_000),
+    ] {
         for loss in [0.0, 0.1, 0.3] {
             let settings = LineSettings { bytes_s, latency_s, loss, ..RADIO };
             let mut world = World::new(len, settings, 7);
-            let mut download = Download::new(None, None, 0);
+            let mut download = Download::new(None, 0);
             assert_eq!(world.run(&mut download, 10_000.0), Some(Ok(())));
-            assert!(world.written == world.file);
+            assert!(world.is_whole());
             let share = len as f64 / (world.now_s * bytes_s * (1.0 - loss)) * 266.0 / 239.0;
             println!("{bytes_s} B/s, latency {latency_s} s, loss {loss}: {:.1} %", 100.0 * share);
             assert!(share >= 0.8, "{bytes_s} B/s, latency {latency_s} s, loss {loss}: {share}");
@@ -250,20 +239,20 @@ fn a_slow_line_and_a_quick_one_are_filled_as_well() {
 #[test]
 fn a_line_that_is_dead_is_given_up_and_a_refusal_is_told() {
     let mut world = World::new(1000, LineSettings { loss: 1.0, ..RADIO }, 3);
-    let mut download = Download::new(None, None, 0);
+    let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Err(Failure::NoAnswer)));
     let mut world = World { open: false, ..World::new(1000, RADIO, 3) };
-    let mut download = Download::new(None, None, 0);
+    let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Err(Failure::NotNow)));
     let mut world = World::new(1000, RADIO, 3);
-    let mut download = Download::new(Some("other.mcap"), None, 0);
+    let mut download = Download::new(Some("other.mcap"), 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Err(Failure::NoSuchFile)));
 }
 
 #[test]
 fn a_vehicle_that_arms_during_the_download_ends_it() {
     let mut world = World::new(1_000_000, RADIO, 4);
-    let mut download = Download::new(None, None, 0);
+    let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 20.0), None);
     world.open = false;
     world.server.close_all();
@@ -275,33 +264,21 @@ fn a_vehicle_that_arms_during_the_download_ends_it() {
 fn what_was_kept_of_another_file_is_thrown_away() {
     let settings = LineSettings { loss: 0.0, ..RADIO };
     let mut world = World::new(50_000, settings, 5);
-    let mut download = Download::new(None, None, 0);
-    world.run(&mut download, 5.0);
-    let part = download.part().unwrap();
-    assert!(part.have.bytes() > 10_000);
-    for kept in [Part { crc: Some(1), ..part.clone() }, Part { len: 50_001, ..part.clone() }] {
-        let mut world = World::new(50_000, settings, 5);
-        let mut download = Download::new(None, Some(kept), 0);
-        assert_eq!(world.run(&mut download, 100.0), Some(Ok(())));
-        assert_eq!(world.begun_fresh, 1);
-        assert!(world.written == world.file);
-    }
-    // The pieces of the same file are damaged on the ground's disk: the checksum finds it, and all is fetched again.
-    let mut world = World::new(50_000, settings, 5);
-    world.written = vec![0xEE; 50_000];
-    let mut download = Download::new(None, Some(part), 0);
+    world.written = (1, vec![0; 10_000]);
+    let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Ok(())));
-    assert!(world.written == world.file);
+    assert!(world.is_whole());
+    assert_eq!(world.begun_fresh, 1);
 }
 
 #[test]
 fn a_session_that_the_vehicle_has_closed_is_opened_again() {
     let mut world = World::new(200_000, RADIO, 6);
-    let mut download = Download::new(None, None, 0);
+    let mut download = Download::new(None, 0);
     world.run(&mut download, 20.0);
     world.server.close_all();
     assert_eq!(world.run(&mut download, 1000.0), Some(Ok(())));
-    assert!(world.written == world.file);
+    assert!(world.is_whole());
     assert_eq!(world.begun_fresh, 1);
 }
 
@@ -323,7 +300,7 @@ fn a_log_keeps_no_content_of_a_file_and_every_frame() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever the line does, the file arrives whole, and no piece is written twice.
+    /// Whatever the line does, the file arrives whole.
     #[test]
     fn any_line_that_carries_something_carries_the_file(
         (seed, len) in (any::<u64>(), 1_usize..40_000),
@@ -334,15 +311,12 @@ proptest! {
     ) {
         let settings = LineSettings { bytes_s, latency_s, loss, double, late: (late, late_s) };
         let mut world = World::new(len, settings, seed);
-        let mut kept = None;
         for (life, kill_s) in kills.iter().enumerate() {
-            let mut download = Download::new(None, kept.clone(), (seed >> life) as u16);
+            let mut download = Download::new(None, (seed >> life) as u16);
             world.run(&mut download, *kill_s);
-            kept = download.part().or(kept);
         }
-        let mut download = Download::new(None, kept, seed as u16);
+        let mut download = Download::new(None, seed as u16);
         prop_assert_eq!(world.run(&mut download, 2000.0), Some(Ok(())));
-        prop_assert!(world.written == world.file);
-        prop_assert!(world.pieces <= (kills.len() + 2) * len.div_ceil(DATA_LEN));
+        prop_assert!(world.is_whole());
     }
 }

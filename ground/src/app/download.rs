@@ -5,8 +5,7 @@
 
 use std::fs::File;
 use std::io;
-use std::io::{IsTerminal as _, Read as _, Write as _};
-use std::os::unix::fs::FileExt as _;
+use std::io::{IsTerminal as _, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
@@ -16,7 +15,6 @@ use anyhow::Context as _;
 use protocol::dialect::MavMessage;
 use protocol::frame::Frame;
 use protocol::ftp::download::{Download, DownloadEvent, Progress};
-use protocol::ftp::part::Part;
 use protocol::ftp::{Packet, crc};
 use protocol::identity::Address;
 use tokio::time::{MissedTickBehavior, interval};
@@ -29,9 +27,6 @@ use crate::cli::Cli;
 use crate::exit::Exit;
 use crate::update::Msg;
 
-/// How often the pieces that have arrived are remembered on disk.
-const REMEMBER_EVERY: Duration = Duration::from_secs(2);
-
 /// A download that is running.
 pub(super) struct Downloading {
     download: Download,
@@ -39,11 +34,9 @@ pub(super) struct Downloading {
     vehicle: Address,
     folder: PathBuf,
     keeper: Option<Keeper>,
-    /// The checksum, or the name, was asked for.
-    summing: bool,
+    /// The thread was asked to finish the file.
     finishing: bool,
-    remembered_at: Duration,
-    /// Tenths of the file that were told.
+    /// Tenths of the file that were reported.
     tenths: u32,
 }
 
@@ -69,14 +62,12 @@ impl Downloading {
         // Another number every millisecond.
         let first_sequence = (unix_ns >> 20) as u16;
         Self {
-            download: Download::new(name, None, first_sequence),
+            download: Download::new(name, first_sequence),
             us,
             vehicle,
             folder,
             keeper: None,
-            summing: false,
             finishing: false,
-            remembered_at: Duration::ZERO,
             tenths: 0,
         }
     }
@@ -94,97 +85,51 @@ impl Downloading {
         if target != self.us || frame.source() != self.vehicle {
             return Ok(());
         }
-        let news = self.download.take(&packet, now);
-        self.open()?;
-        self.write(news)
+        match self.download.take(&packet, now) {
+            Some(DownloadEvent::Opened { crc }) => self.open(crc)?,
+            Some(DownloadEvent::Data(data)) => {
+                if let Some(keeper) = &self.keeper {
+                    keeper.order(Order::Write(data))?;
+                }
+            }
+            None => {}
+        }
+        Ok(())
     }
 
     /// Goes on: what to send, and what there is to say.
     pub(super) fn poll(&mut self, now: Duration) -> (Vec<MavMessage>, Option<Word>) {
         let packets = self.download.poll(now);
         let messages = packets.iter().map(|packet| packet.message(self.vehicle)).collect();
-        let word = self.go_on(now).unwrap_or_else(|error| Some(Word::Failed(error)));
+        let word = self.go_on().unwrap_or_else(|error| Some(Word::Failed(error)));
         (messages, word)
     }
 
-    /// Stops, for a program that ends: waits until what has arrived is on disk and remembered.
+    /// Stops, for a program that ends: waits until what has arrived is written.
     pub(super) fn stop(mut self) {
-        // If the disk does not keep up, the next download fetches more.
-        let _ = self.remember();
         if let Some(keeper) = self.keeper.take() {
             keeper.close();
         }
     }
 
-    /// Remembers what is there, so that the next download goes on with it.
-    fn remember(&self) -> anyhow::Result<()> {
-        if let (Some(part), Some(keeper)) = (self.download.part(), &self.keeper) {
-            keeper.order(Order::Remember(Box::new(part.clone())))?;
+    fn go_on(&mut self) -> anyhow::Result<Option<Word>> {
+        let ended = self.download.ended().transpose()?;
+        let Some(keeper) = &self.keeper else { return Ok(None) };
+        if let Some(finished) = keeper.finished() {
+            return finished.map(|path| Some(Word::Done(path)));
         }
-        Ok(())
+        if ended.is_some() && !std::mem::replace(&mut self.finishing, true) {
+            keeper.order(Order::Finish)?;
+        }
+        Ok(self.next_tenth().map(Word::Goes))
     }
 
-    fn go_on(&mut self, now: Duration) -> anyhow::Result<Option<Word>> {
-        self.open()?;
-        while let Some(told) = self.keeper.as_ref().and_then(Keeper::told) {
-            match told {
-                Told::Sum(sum) => {
-                    self.summing = false;
-                    let news = self.download.compare(sum);
-                    self.write(news)?;
-                }
-                Told::Finished(path) => return Ok(Some(Word::Done(path))),
-                Told::Failed(error) => return Err(error),
-            }
-        }
-        if now.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
-            self.remembered_at = now;
-            self.remember()?;
-        }
-        let Some(keeper) = &self.keeper else {
-            return self.download.ended().transpose().map(|_| None).map_err(Into::into);
-        };
-        match self.download.ended() {
-            Some(Ok(())) => {
-                if !std::mem::replace(&mut self.finishing, true) {
-                    keeper.order(Order::Finish)?;
-                }
-                Ok(None)
-            }
-            Some(Err(failure)) => anyhow::bail!(failure),
-            None => {
-                if self.download.is_whole() && !std::mem::replace(&mut self.summing, true) {
-                    keeper.order(Order::Sum)?;
-                }
-                Ok(self.next_tenth().map(Word::Goes))
-            }
-        }
-    }
-
-    /// Opens the files once the name is known.
-    fn open(&mut self) -> anyhow::Result<()> {
-        if self.keeper.is_none()
-            && self.download.ended().is_none()
-            && let Some(name) = self.download.name()
-        {
-            let (kept, part) = Kept::open(&self.folder, self.vehicle.system_id, name)?;
-            self.keeper = Some(Keeper::start(kept)?);
-            if let Some(part) = part {
-                self.download.keep(part);
-            }
-        }
-        Ok(())
-    }
-
-    fn write(&self, news: Option<DownloadEvent>) -> anyhow::Result<()> {
-        let Some(keeper) = &self.keeper else { return Ok(()) };
-        match news {
-            Some(DownloadEvent::Begins { fresh: true }) => keeper.order(Order::BeginAgain)?,
-            Some(DownloadEvent::Piece { offset, data }) => {
-                keeper.order(Order::Write { offset, piece: data })?;
-            }
-            Some(DownloadEvent::Begins { fresh: false }) | None => {}
-        }
+    /// The vehicle has opened its file: goes on with what is here of it.
+    fn open(&mut self, crc: u32) -> anyhow::Result<()> {
+        let name = self.download.name().unwrap_or_default();
+        let (kept, bytes) = Kept::open(&self.folder, self.vehicle.system_id, name, crc)?;
+        self.keeper = Some(Keeper::start(kept)?);
+        self.download.resume(bytes);
         Ok(())
     }
 
@@ -317,37 +262,24 @@ impl Shown {
 
 /// Most orders that may wait: about a minute of pieces of a radio.
 const MAX_WAITING: usize = 1024;
-/// Most that the thread has to say: two checksums, and how it ended.
-const MAX_TOLD: usize = 4;
 
 enum Order {
-    BeginAgain,
-    Write { offset: u32, piece: Vec<u8> },
-    Remember(Box<Part>),
-    Sum,
+    /// The next bytes of the file.
+    Write(Vec<u8>),
+    /// The file is whole.
     Finish,
-}
-
-/// What the thread says.
-#[derive(Debug)]
-pub(super) enum Told {
-    /// The checksum of all pieces.
-    Sum(u32),
-    /// The log has its name.
-    Finished(PathBuf),
-    Failed(anyhow::Error),
 }
 
 /// The disk does not keep up: what has arrived is lost.
 #[derive(Debug, thiserror::Error)]
 #[error("the disk does not keep up with the link; the next download goes on with what is there")]
-pub(super) struct Behind;
+struct Behind;
 
-/// A handle to the thread. Without it the thread does what it was told, and ends.
+/// A handle to the thread. Without it the thread carries out its orders, and ends.
 #[derive(Debug)]
-pub(super) struct Keeper {
+struct Keeper {
     orders: SyncSender<Order>,
-    told: Receiver<Told>,
+    finished: Receiver<anyhow::Result<PathBuf>>,
     thread: JoinHandle<()>,
 }
 
@@ -356,22 +288,25 @@ impl Keeper {
     ///
     /// # Errors
     /// No thread can be started.
-    pub(super) fn start(kept: Kept) -> io::Result<Self> {
+    fn start(kept: Kept) -> io::Result<Self> {
         let (orders, inbox) = sync_channel(MAX_WAITING);
-        let (tell, told) = sync_channel(MAX_TOLD);
-        let thread = std::thread::Builder::new()
-            .name("download".to_owned())
-            .spawn(move || serve(kept, &inbox, &tell))?;
-        Ok(Self { orders, told, thread })
+        let (finish, finished) = sync_channel(1);
+        let thread = std::thread::Builder::new().name("download".to_owned()).spawn(move || {
+            if let Some(ended) = serve(kept, &inbox).transpose() {
+                // The download may have been stopped.
+                let _ = finish.send(ended);
+            }
+        })?;
+        Ok(Self { orders, finished, thread })
     }
 
-    /// What the thread has said since.
-    pub(super) fn told(&self) -> Option<Told> {
-        self.told.try_recv().ok()
+    /// How the thread has ended: where the log is, or why it failed.
+    fn finished(&self) -> Option<anyhow::Result<PathBuf>> {
+        self.finished.try_recv().ok()
     }
 
-    /// Waits until everything is on disk, for a program that ends.
-    pub(super) fn close(self) {
+    /// Waits until everything is written.
+    fn close(self) {
         drop(self.orders);
         // A panic was printed already.
         let _ = self.thread.join();
@@ -387,51 +322,38 @@ impl Keeper {
     }
 }
 
-fn serve(mut kept: Kept, inbox: &Receiver<Order>, tell: &SyncSender<Told>) {
+/// Carries out orders until the log has its name, or nobody gives any more.
+fn serve(mut kept: Kept, inbox: &Receiver<Order>) -> anyhow::Result<Option<PathBuf>> {
     while let Ok(order) = inbox.recv() {
-        let done = match order {
-            Order::BeginAgain => kept.begin_again().map(|()| None),
-            Order::Write { offset, piece } => kept.write(offset, &piece).map(|()| None),
-            Order::Remember(part) => kept.remember(&part).map(|()| None),
-            Order::Sum => kept.checksum().map(|sum| Some(Told::Sum(sum))),
-            Order::Finish => {
-                // The download may have ended.
-                let _ = tell.send(kept.finish().map_or_else(Told::Failed, Told::Finished));
-                return;
-            }
-        };
-        match done {
-            Ok(None) => {}
-            Ok(Some(told)) => drop(tell.send(told)),
-            Err(error) => {
-                let _ = tell.send(Told::Failed(error.into()));
-                return;
-            }
+        match order {
+            Order::Write(data) => kept.file.write_all(&data)?,
+            Order::Finish => return kept.finish().map(Some),
         }
     }
+    Ok(None)
 }
 
-// The files of a download: the pieces that have arrived (`.part`), what is remembered of them (`.part.txt`), and the
-// log once it is whole. An existing log is never overwritten.
+// The files of a download: the beginning of the log that has arrived, with the checksum of the whole in its name
+// (`.1A2B3C4D.part`), and the log once it is whole. An existing log is never overwritten.
 
 /// Bytes read at once for a checksum.
 const READ_AT_ONCE: usize = 256 * 1024;
 
 /// The files of one download.
 #[derive(Debug)]
-pub(super) struct Kept {
+struct Kept {
     whole: PathBuf,
-    pieces: PathBuf,
-    memory: PathBuf,
+    beginning: PathBuf,
     file: File,
+    crc: u32,
 }
 
 impl Kept {
-    /// Opens the files of the vehicle's log of this name, and returns what is remembered of an earlier download.
+    /// Opens the file for the vehicle's log of this name and checksum, and returns how much an earlier download has left.
     ///
     /// # Errors
     /// The log is here already, or a file cannot be made.
-    pub(super) fn open(folder: &Path, vehicle: u8, name: &str) -> anyhow::Result<(Self, Option<Part>)> {
+    fn open(folder: &Path, vehicle: u8, name: &str, crc: u32) -> anyhow::Result<(Self, u32)> {
         // The name comes over the air: it must not lead out of the folder.
         let is_plain = |letter: &char| letter.is_ascii_alphanumeric() || "._-".contains(*letter);
         let plain: String = name.chars().filter(is_plain).collect();
@@ -441,81 +363,50 @@ impl Kept {
             "{} is here already; it is not overwritten",
             whole.display()
         );
-        let beside = |extension: &str| {
-            let mut name = whole.clone().into_os_string();
-            name.push(extension);
-            PathBuf::from(name)
-        };
-        let (pieces, memory) = (beside(".part"), beside(".part.txt"));
-        let part = std::fs::read_to_string(&memory).ok().and_then(|text| Part::from_text(&text).ok());
-        // Without its pieces the memory is of no use.
-        let part = part.filter(|_| pieces.exists());
-        let file = File::options()
-            .create(true)
-            .truncate(false)
-            .read(true)
-            .write(true)
-            .open(&pieces)
-            .with_context(|| format!("opening {}", pieces.display()))?;
-        Ok((Self { whole, pieces, memory, file }, part))
-    }
-
-    /// Nothing of what was written is of this file.
-    pub(super) fn begin_again(&mut self) -> std::io::Result<()> {
-        self.file.set_len(0)
-    }
-
-    pub(super) fn write(&mut self, offset: u32, piece: &[u8]) -> std::io::Result<()> {
-        self.file.write_all_at(piece, u64::from(offset))
-    }
-
-    /// Remembers what is there: first the pieces reach the disk, then the memory of them replaces the old one at once.
-    pub(super) fn remember(&mut self, part: &Part) -> std::io::Result<()> {
-        self.file.sync_data()?;
-        let mut new = self.memory.clone().into_os_string();
-        new.push(".new");
-        let mut file = File::create(&new)?;
-        file.write_all(part.to_text().as_bytes())?;
-        file.sync_data()?;
-        std::fs::rename(new, &self.memory)
-    }
-
-    /// The checksum of all pieces.
-    pub(super) fn checksum(&self) -> std::io::Result<u32> {
-        let mut file = File::open(&self.pieces)?;
-        let (mut sum, mut piece) = (0, vec![0; READ_AT_ONCE]);
-        loop {
-            let read = file.read(&mut piece)?;
-            if read == 0 {
-                return Ok(sum);
-            }
-            sum = crc::continued(sum, &piece[..read]);
-        }
+        let beginning = folder.join(format!("vehicle{vehicle}-{plain}.{crc:08X}.part"));
+        let opened = File::options().create(true).read(true).append(true).open(&beginning);
+        let file = opened.with_context(|| format!("opening {}", beginning.display()))?;
+        let bytes = u32::try_from(file.metadata()?.len())?;
+        Ok((Self { whole, beginning, file, crc }, bytes))
     }
 
     /// The log is whole: gives it its name.
     ///
     /// # Errors
-    /// There is a file of this name by now, or the disk fails.
-    pub(super) fn finish(self) -> anyhow::Result<PathBuf> {
-        let Self { whole, pieces, memory, file } = self;
+    /// It is not what the vehicle has, there is a file of this name by now, or the disk fails.
+    fn finish(self) -> anyhow::Result<PathBuf> {
+        let Self { whole, beginning, mut file, crc } = self;
+        if checksum(&mut file)? != crc {
+            std::fs::remove_file(&beginning)?;
+            anyhow::bail!("what arrived is not what the vehicle has: the checksums differ; fetch it again");
+        }
         file.sync_all()?;
         // A link fails if the name is taken; a rename would overwrite.
-        if std::fs::hard_link(&pieces, &whole).is_ok() {
-            std::fs::remove_file(&pieces)?;
+        if std::fs::hard_link(&beginning, &whole).is_ok() {
+            std::fs::remove_file(&beginning)?;
         } else {
             // Some file systems have no such links.
             anyhow::ensure!(
                 whole.symlink_metadata().is_err(),
                 "{} is here by now; the download is in {}",
                 whole.display(),
-                pieces.display()
+                beginning.display()
             );
-            std::fs::rename(&pieces, &whole)?;
+            std::fs::rename(&beginning, &whole)?;
         }
-        // The memory of a download that is over is of no use; if it stays, the next one ignores it.
-        let _ = std::fs::remove_file(memory);
         Ok(whole)
+    }
+}
+
+fn checksum(file: &mut File) -> io::Result<u32> {
+    file.rewind()?;
+    let (mut sum, mut piece) = (0, vec![0; READ_AT_ONCE]);
+    loop {
+        let read = file.read(&mut piece)?;
+        if read == 0 {
+            return Ok(sum);
+        }
+        sum = crc::continued(sum, &piece[..read]);
     }
 }
 
@@ -527,50 +418,61 @@ mod keeper_tests {
     #[test]
     fn a_disk_that_hangs_fails_the_download_and_holds_nothing_up() {
         let (orders, _inbox) = sync_channel(2);
-        let (_tell, told) = sync_channel(1);
+        let (_finish, finished) = sync_channel(1);
         let thread = std::thread::Builder::new().name("idle".to_owned()).spawn(|| {}).unwrap();
-        let keeper = Keeper { orders, told, thread };
-        let write = |offset| keeper.order(Order::Write { offset, piece: vec![1] });
-        assert!(write(0).is_ok() && write(1).is_ok());
-        assert!(write(2).unwrap_err().to_string().contains("does not keep up"));
+        let keeper = Keeper { orders, finished, thread };
+        let write = || keeper.order(Order::Write(vec![1]));
+        assert!(write().is_ok() && write().is_ok());
+        assert!(write().is_err());
     }
 }
 
 #[cfg(test)]
 mod kept_tests {
     use super::*;
-    use protocol::ftp::ranges::Ranges;
+
+    const CRC: u32 = 0x5;
+
+    fn open(folder: &Path, crc: u32) -> anyhow::Result<(Kept, u32)> {
+        Kept::open(folder, 1, "../flight.mcap", crc)
+    }
 
     #[test]
-    fn pieces_and_memory_survive_and_become_a_log_that_is_never_overwritten() {
+    fn the_beginning_survives_and_becomes_a_log_that_is_never_overwritten() {
         let folder = tempfile::tempdir().unwrap();
-        let (mut kept, part) = Kept::open(folder.path(), 1, "../flight.mcap").unwrap();
-        assert_eq!(part, None);
-        kept.write(3, b"defg").unwrap();
-        let mut have = Ranges::default();
-        have.add(3..7);
-        let part = Part { path: "/log/flight.mcap".to_owned(), len: 7, crc: Some(5), have };
-        kept.remember(&part).unwrap();
+        let crc = crc::continued(0, b"abcdefg");
+        let (mut kept, bytes) = open(folder.path(), crc).unwrap();
+        assert_eq!(bytes, 0);
+        kept.file.write_all(b"abc").unwrap();
         drop(kept);
-        let (mut kept, found) = Kept::open(folder.path(), 1, "../flight.mcap").unwrap();
-        assert_eq!(found, Some(part));
-        kept.write(0, b"abc").unwrap();
-        assert_eq!(kept.checksum().unwrap(), crc::continued(0, b"abcdefg"));
+        assert_eq!(open(folder.path(), CRC).unwrap().1, 0, "another log of this name");
+        let (mut kept, bytes) = open(folder.path(), crc).unwrap();
+        assert_eq!(bytes, 3);
+        kept.file.write_all(b"defg").unwrap();
         let whole = kept.finish().unwrap();
         assert_eq!(whole, folder.path().join("vehicle1-..flight.mcap"));
         assert_eq!(std::fs::read(&whole).unwrap(), b"abcdefg");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        let refused = Kept::open(folder.path(), 1, "../flight.mcap").unwrap_err();
+        let refused = open(folder.path(), crc).unwrap_err();
         assert!(refused.to_string().contains("is here already"), "{refused}");
     }
 
     #[test]
     fn a_log_that_appears_meanwhile_stays() {
         let folder = tempfile::tempdir().unwrap();
-        let (mut kept, _) = Kept::open(folder.path(), 1, "flight.mcap").unwrap();
-        kept.write(0, b"new").unwrap();
-        std::fs::write(folder.path().join("vehicle1-flight.mcap"), "old").unwrap();
+        let (mut kept, _) = open(folder.path(), crc::continued(0, b"new")).unwrap();
+        kept.file.write_all(b"new").unwrap();
+        let whole = folder.path().join("vehicle1-..flight.mcap");
+        std::fs::write(&whole, "old").unwrap();
         assert!(kept.finish().is_err());
-        assert_eq!(std::fs::read(folder.path().join("vehicle1-flight.mcap")).unwrap(), b"old");
+        assert_eq!(std::fs::read(whole).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_log_that_is_not_the_vehicle_s_gets_no_name_and_is_fetched_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut kept, _) = open(folder.path(), CRC).unwrap();
+        kept.file.write_all(b"damaged").unwrap();
+        assert!(kept.finish().is_err());
+        assert_eq!(open(folder.path(), CRC).unwrap().1, 0);
     }
 }

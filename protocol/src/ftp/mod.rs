@@ -2,10 +2,8 @@
 //!
 //! * [`packet`]: the packets, and the frames that carry them;
 //! * [`server`]: the vehicle's side; everything that writes is refused;
-//! * [`download`]: the ground's side: bursts first, then the pieces that were lost; it continues where an earlier
-//!   process was stopped;
-//! * [`ranges`]: which bytes are there;
-//! * [`part`]: what is remembered of an unfinished download;
+//! * [`download`]: the ground's side: it asks for some pieces at once, and again for those that were lost; it continues
+//!   where an earlier process was stopped;
 //! * [`crc`]: the checksum of a whole file.
 //!
 //! A log is fetched after the flight, and recording goes on meanwhile. The recorder sets a mark; what was written up to it does
@@ -18,8 +16,6 @@
 
 pub mod download;
 pub mod packet;
-pub mod part;
-pub mod ranges;
 pub mod server;
 
 pub use packet::{DATA_LEN, FileRequest, Opcode, Packet};

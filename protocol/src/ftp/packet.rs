@@ -125,7 +125,6 @@ impl Refusal {
         match (bytes.first().copied().unwrap_or(1), errno) {
             (1, _) => Self::Fail,
             (FAIL_ERRNO, EBUSY) => Self::Busy,
-            // Older vehicles had no error of its own for this.
             (FAIL_ERRNO, ENOENT) | (10, _) => Self::FileNotFound,
             (3, _) => Self::InvalidDataSize,
             (4, _) => Self::InvalidSession,
@@ -195,6 +194,11 @@ impl Packet {
     /// Why a request was refused; `None` if this is no refusal.
     pub fn refusal(&self) -> Option<Refusal> {
         (self.opcode == Opcode::Nak).then(|| Refusal::from_bytes(&self.data))
+    }
+
+    /// Whether that packet is the answer to this request.
+    pub fn is_answered_by(&self, answer: &Self) -> bool {
+        answer.asked == self.opcode && answer.sequence == self.sequence.wrapping_add(1)
     }
 
     /// A path in a request, without the zeros behind it; bytes that are no UTF-8 name no file.

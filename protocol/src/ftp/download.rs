@@ -1,29 +1,29 @@
 //! The side of MAVLink FTP that fetches a file.
 //!
-//! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and pieces of the file come
-//! out as [`DownloadEvent`]. The caller writes them, keeps [`Download::part`] beside them, and computes the checksum of the
-//! whole file when it is there. A download that begins with such a [`Part`] asks for nothing that is there already.
+//! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and the file comes out in order
+//! as [`DownloadEvent`]s. The caller writes it, says with [`Download::resume`] how much of it is there from before, and
+//! compares the checksum of the whole file in the end.
 
-mod pieces;
-
-use alloc::collections::VecDeque;
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use self::pieces::Pieces;
 use super::LOG_DIRECTORY;
 use super::packet::{DATA_LEN, Opcode, Packet, Refusal};
-use super::part::Part;
-use super::ranges::Ranges;
 
-/// A request that is not answered for this long is sent again.
+/// A request that is not answered for this long is sent again; all requests to read, when none was answered.
 const ASK_AGAIN: Duration = Duration::from_millis(900);
 /// A vehicle that has said nothing about files for this long is given up.
 const GIVE_UP: Duration = Duration::from_secs(30);
 /// Requests to close the file before it is left to the vehicle to close it.
 const CLOSE_TRIES: u32 = 3;
+/// Most pieces that are asked for at once. A line of 57,600 baud carries them in 1.5 s, so it has something to carry
+/// while a lost request is noticed.
+const MAX_WAITING: usize = 32;
+/// Pieces this far behind the first one that is missing are not asked for, bytes: they wait in memory.
+const AHEAD: u32 = 1024 * DATA_LEN as u32;
 /// The rate is a mean over this many seconds.
 const RATE_OVER_S: usize = 10;
 /// A listing ends here, so that a vehicle that lists without end fills no memory: a flight every minute for a week.
@@ -42,8 +42,6 @@ pub enum Failure {
     NoSuchFile,
     #[error("the vehicle does not give out its log now: it is armed or in flight")]
     NotNow,
-    #[error("what arrived is not what the vehicle has: the checksums differ, twice")]
-    Damaged,
     #[error("the vehicle refused: {0:?}")]
     Refused(Refusal),
 }
@@ -51,10 +49,10 @@ pub enum Failure {
 /// What a packet has brought.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DownloadEvent {
-    /// The file is open. If nothing of it was kept (`fresh`), what was written before is not of this file.
-    Begins { fresh: bool },
-    /// A piece of the file.
-    Piece { offset: u32, data: Vec<u8> },
+    /// The file is open: the caller resumes with what it has of the file with this checksum.
+    Opened { crc: u32 },
+    /// The next bytes of the file.
+    Data(Vec<u8>),
 }
 
 /// How far a download is.
@@ -74,8 +72,6 @@ enum Phase {
     /// Asks for the checksum of the whole file.
     Summing,
     Reading,
-    /// All is there; the caller computes the checksum.
-    Comparing,
     Closing,
     Over(Option<Failure>),
 }
@@ -97,16 +93,17 @@ pub struct Download {
     listed: Vec<String>,
     path: Option<String>,
     asked: Option<Asked>,
-    kept: Option<Part>,
     session: u8,
     len: u32,
     crc: Option<u32>,
-    have: Ranges,
+    /// The beginning of the file that is there.
     bytes: u32,
-    pieces: Pieces,
+    /// Pieces behind a gap, by their offsets.
+    ahead: BTreeMap<u32, Vec<u8>>,
+    /// Requests to read, in the order in which they were sent.
+    waiting: VecDeque<Packet>,
+    repeated_at: Duration,
     heard_at: Option<Duration>,
-    /// The checksums have differed once.
-    again: bool,
     /// Bytes at the last whole seconds.
     rate: VecDeque<(Duration, u32)>,
 }
@@ -114,34 +111,36 @@ pub struct Download {
 impl Download {
     /// A download of the file of this name, or of the newest. `first_sequence` should differ from that of an earlier
     /// process.
-    pub fn new(name: Option<&str>, kept: Option<Part>, first_sequence: u16) -> Self {
+    pub fn new(name: Option<&str>, first_sequence: u16) -> Self {
         Self {
             phase: if name.is_some() { Phase::Opening } else { Phase::Listing },
             sequence: first_sequence,
             listed: Vec::new(),
             path: name.map(|name| format!("{LOG_DIRECTORY}/{name}")),
             asked: None,
-            kept,
             session: 0,
             len: 0,
             crc: None,
-            have: Ranges::default(),
             bytes: 0,
-            pieces: Pieces::default(),
+            ahead: BTreeMap::new(),
+            waiting: VecDeque::new(),
+            repeated_at: Duration::ZERO,
             heard_at: None,
-            again: false,
             rate: VecDeque::new(),
         }
-    }
-
-    /// Continues with what is kept of a file, once its name is known.
-    pub fn keep(&mut self, part: Part) {
-        self.kept = Some(part);
     }
 
     /// The name of the file, once it is known.
     pub fn name(&self) -> Option<&str> {
         self.path.as_deref().and_then(|path| path.rsplit('/').next())
+    }
+
+    /// Goes on behind these first bytes of the file that was opened.
+    pub fn resume(&mut self, bytes: u32) {
+        if self.phase == Phase::Reading && bytes <= self.len {
+            self.bytes = bytes;
+            self.close_if_whole();
+        }
     }
 
     /// How it has ended, if it has.
@@ -152,46 +151,19 @@ impl Download {
         }
     }
 
-    /// Whether all of the file is there, and the caller has to compare its checksum.
-    pub fn is_whole(&self) -> bool {
-        self.phase == Phase::Comparing
-    }
-
-    /// What to remember, once the file is open.
-    pub fn part(&self) -> Option<Part> {
-        let path = self.path.clone().filter(|_| matches!(self.phase, Phase::Reading | Phase::Comparing))?;
-        Some(Part { path, len: self.len, crc: self.crc, have: self.have.clone() })
-    }
-
     /// How far it is; `None` before the file is open.
     pub fn progress(&self) -> Option<Progress> {
-        (self.len > 0).then(|| {
+        self.crc.map(|_| {
             let bytes_s = match (self.rate.front(), self.rate.back()) {
                 (Some((from, before)), Some((to, after))) if to > from => {
                     f64::from(after.saturating_sub(*before)) / to.saturating_sub(*from).as_secs_f64()
                 }
                 _ => 0.0,
             };
-            let left_s = (bytes_s > 0.0).then(|| f64::from(self.len - self.bytes) / bytes_s);
-            Progress { bytes: self.bytes, len: self.len, bytes_s, left_s }
+            let bytes = self.arrived();
+            let left_s = (bytes_s > 0.0).then(|| f64::from(self.len - bytes) / bytes_s);
+            Progress { bytes, len: self.len, bytes_s, left_s }
         })
-    }
-
-    /// Takes the checksum of what was written.
-    pub fn compare(&mut self, crc: u32) -> Option<DownloadEvent> {
-        if self.phase != Phase::Comparing {
-            return None;
-        }
-        if self.crc.is_none_or(|expected| expected == crc) {
-            self.turn_to(Phase::Closing);
-            return None;
-        }
-        if core::mem::replace(&mut self.again, true) {
-            self.phase = Phase::Over(Some(Failure::Damaged));
-            return None;
-        }
-        self.begin(Ranges::default());
-        Some(DownloadEvent::Begins { fresh: true })
     }
 
     /// Takes an answer of the vehicle.
@@ -199,12 +171,10 @@ impl Download {
         if self.ended().is_some() {
             return None;
         }
-        if matches!(packet.asked, Opcode::ReadFile | Opcode::BurstReadFile) {
+        if packet.asked == Opcode::ReadFile {
             return self.take_piece(packet, now);
         }
-        let expected = self.asked.as_ref().is_some_and(|asked| {
-            asked.packet.opcode == packet.asked && asked.packet.sequence.wrapping_add(1) == packet.sequence
-        });
+        let expected = self.asked.as_ref().is_some_and(|asked| asked.packet.is_answered_by(packet));
         if !expected {
             return None;
         }
@@ -219,41 +189,34 @@ impl Download {
                 if self.listed.len() > MAX_LISTED {
                     self.phase = Phase::Over(Some(Failure::TooManyFiles));
                 }
-                None
             }
             (Phase::Listing, Some(Refusal::EndOfFile)) => {
                 let newest = self.listed.iter().rev().find_map(|entry| entry.strip_prefix('F'));
                 match newest.and_then(|entry| entry.split('\t').next()) {
                     Some(name) => {
                         self.path = Some(format!("{LOG_DIRECTORY}/{name}"));
-                        self.turn_to(Phase::Opening);
+                        self.phase = Phase::Opening;
                     }
                     None => self.phase = Phase::Over(Some(Failure::NoFiles)),
                 }
-                None
             }
             (Phase::Opening, None) => {
+                let len = packet.number().unwrap_or(0);
+                if self.len != len {
+                    (self.len, self.crc) = (len, None);
+                }
                 self.session = packet.session;
-                self.len = packet.number().unwrap_or(0);
-                self.turn_to(Phase::Summing);
-                None
+                self.phase = Phase::Summing;
             }
-            (Phase::Summing, None) => self.opened(packet.number()),
-            // A vehicle that computes no checksums: the lengths have to do.
-            (Phase::Summing, Some(Refusal::UnknownCommand)) => self.opened(None),
-            (Phase::Closing, _) => {
-                self.phase = Phase::Over(None);
-                None
-            }
-            (_, Some(why)) => {
-                self.refused(why);
-                None
-            }
-            (_, None) => None,
+            (Phase::Summing, None) => return self.opened(packet.number().unwrap_or(0)),
+            (Phase::Closing, _) => self.phase = Phase::Over(None),
+            (_, Some(why)) => self.refused(why),
+            (_, None) => {}
         }
+        None
     }
 
-    /// What to send now; to be called often, also without any news.
+    /// What to send now; to be called often, also when nothing has arrived.
     pub fn poll(&mut self, now: Duration) -> Vec<Packet> {
         let heard_at = *self.heard_at.get_or_insert(now);
         if self.ended().is_none() && now.saturating_sub(heard_at) >= GIVE_UP {
@@ -262,17 +225,12 @@ impl Download {
         }
         self.measure(now);
         match self.phase {
-            Phase::Comparing | Phase::Over(_) => Vec::new(),
-            Phase::Reading => self.pieces.poll(&self.have, self.len, self.session, &mut self.sequence, now),
+            Phase::Over(_) => Vec::new(),
+            Phase::Reading => self.read(now.saturating_sub(heard_at), now),
             Phase::Listing | Phase::Opening | Phase::Summing | Phase::Closing => {
                 self.ask(now).into_iter().collect()
             }
         }
-    }
-
-    fn turn_to(&mut self, phase: Phase) {
-        self.phase = phase;
-        self.asked = None;
     }
 
     fn ask(&mut self, now: Duration) -> Option<Packet> {
@@ -302,27 +260,50 @@ impl Download {
         Some(asked.packet.clone())
     }
 
-    /// The file is open: continues with what is kept of it, if it is the same file.
-    fn opened(&mut self, crc: Option<u32>) -> Option<DownloadEvent> {
-        let path = self.path.clone()?;
-        // A session that was opened again goes on with what is there.
-        let so_far = (self.bytes > 0).then(|| core::mem::take(&mut self.have));
-        let so_far = so_far.map(|have| Part { path: path.clone(), len: self.len, crc: self.crc, have });
-        let kept = so_far.or_else(|| self.kept.take());
-        let same = |part: &Part| part.path == path && part.len == self.len && part.crc == crc;
-        let kept = kept.filter(same).filter(|part| part.have.iter().all(|range| range.end <= part.len));
-        self.crc = crc;
-        let fresh = kept.is_none();
-        self.begin(kept.map(|part| part.have).unwrap_or_default());
-        Some(DownloadEvent::Begins { fresh })
+    /// Asks for the first pieces that are missing.
+    fn read(&mut self, silent: Duration, now: Duration) -> Vec<Packet> {
+        let mut packets = Vec::new();
+        if silent >= ASK_AGAIN && now.saturating_sub(self.repeated_at) >= ASK_AGAIN {
+            self.repeated_at = now;
+            // The same requests: the vehicle answers one that waits there once.
+            packets.extend(self.waiting.iter().cloned());
+        }
+        let end = self.len.min(self.bytes.saturating_add(AHEAD));
+        let mut offset = self.bytes;
+        while offset < end && self.waiting.len() < MAX_WAITING {
+            let size = (self.len - offset).min(DATA_LEN as u32);
+            let is_asked = self.waiting.iter().any(|request| request.offset == offset);
+            if !is_asked && !self.ahead.contains_key(&offset) {
+                let request = Packet::request(self.sequence, self.session, Opcode::ReadFile, offset, "");
+                let request = Packet { size: size as u8, ..request };
+                self.sequence = self.sequence.wrapping_add(1);
+                self.waiting.push_back(request.clone());
+                packets.push(request);
+            }
+            offset += size;
+        }
+        packets
     }
 
-    fn begin(&mut self, have: Ranges) {
-        self.bytes = have.bytes();
-        self.have = have;
+    /// The file is open, perhaps again: goes on if it is the same one.
+    fn opened(&mut self, crc: u32) -> Option<DownloadEvent> {
+        self.phase = Phase::Reading;
+        self.waiting.clear();
+        if self.crc == Some(crc) {
+            return None;
+        }
+        self.crc = Some(crc);
+        self.bytes = 0;
+        self.ahead.clear();
         self.rate.clear();
-        self.pieces = Pieces::default();
-        self.turn_to(if self.bytes == self.len { Phase::Comparing } else { Phase::Reading });
+        self.close_if_whole();
+        Some(DownloadEvent::Opened { crc })
+    }
+
+    fn close_if_whole(&mut self) {
+        if self.bytes == self.len {
+            self.phase = Phase::Closing;
+        }
     }
 
     fn take_piece(&mut self, packet: &Packet, now: Duration) -> Option<DownloadEvent> {
@@ -332,13 +313,7 @@ impl Download {
         match packet.refusal() {
             Some(Refusal::InvalidSession) => {
                 self.heard_at = Some(now);
-                self.turn_to(Phase::Opening);
-                return None;
-            }
-            // The end of a burst that began at the end.
-            Some(Refusal::EndOfFile) => {
-                self.heard_at = Some(now);
-                self.pieces.on_end(packet);
+                self.phase = Phase::Opening;
                 return None;
             }
             Some(why) => {
@@ -347,24 +322,25 @@ impl Download {
             }
             None => {}
         }
-        let end = packet.offset.checked_add(packet.data.len() as u32).filter(|end| *end <= self.len)?;
-        if packet.opcode != Opcode::Ack || packet.data.is_empty() || packet.data.len() > DATA_LEN {
-            return None;
-        }
-        let range = packet.offset..end;
-        let known = self.have.contains(&range);
-        self.pieces.on_piece(packet, &range, known, now);
-        let added = self.have.add(range);
-        if added == 0 {
-            return None;
-        }
-        // Only news keep the download alive: a vehicle that repeats itself for ever is given up.
+        let is_this = |request: &Packet| {
+            request.offset == packet.offset && usize::from(request.size) == packet.data.len()
+        };
+        let place = self.waiting.iter().position(is_this)?;
+        // Only a new piece keeps the download alive: a vehicle that repeats itself for ever is given up.
         self.heard_at = Some(now);
-        self.bytes += added;
-        if self.bytes == self.len {
-            self.turn_to(Phase::Comparing);
+        let request = self.waiting.remove(place)?;
+        if request.is_answered_by(packet) {
+            // The vehicle answers in order: what was asked for earlier is lost.
+            self.waiting.drain(..place);
         }
-        Some(DownloadEvent::Piece { offset: packet.offset, data: packet.data.clone() })
+        self.ahead.insert(packet.offset, packet.data.clone());
+        let mut data = Vec::new();
+        while let Some(piece) = self.ahead.remove(&self.bytes) {
+            self.bytes += piece.len() as u32;
+            data.extend(piece);
+        }
+        self.close_if_whole();
+        (!data.is_empty()).then_some(DownloadEvent::Data(data))
     }
 
     fn refused(&mut self, why: Refusal) {
@@ -376,11 +352,16 @@ impl Download {
         }));
     }
 
+    /// Bytes that have arrived.
+    fn arrived(&self) -> u32 {
+        self.bytes + self.ahead.values().map(|piece| piece.len() as u32).sum::<u32>()
+    }
+
     fn measure(&mut self, now: Duration) {
         let due =
             self.rate.back().is_none_or(|(last, _)| now.saturating_sub(*last) >= Duration::from_secs(1));
         if due && self.phase == Phase::Reading {
-            self.rate.push_back((now, self.bytes));
+            self.rate.push_back((now, self.arrived()));
             if self.rate.len() > RATE_OVER_S {
                 self.rate.pop_front();
             }
@@ -394,7 +375,7 @@ mod tests {
 
     #[test]
     fn a_listing_without_end_is_given_up() {
-        let mut download = Download::new(None, None, 0);
+        let mut download = Download::new(None, 0);
         for _ in 0..MAX_LISTED {
             for packet in download.poll(Duration::ZERO) {
                 download.take(&packet.ack(b"Fone\t1\0Ftwo\t2\0"), Duration::ZERO);
@@ -402,5 +383,19 @@ mod tests {
         }
         assert_eq!(download.ended(), Some(Err(Failure::TooManyFiles)));
         assert!(download.listed.len() <= MAX_LISTED + 2);
+    }
+
+    #[test]
+    fn the_last_bytes_of_the_longest_possible_file_are_asked_for() {
+        let mut download = Download::new(Some("flight.mcap"), 0);
+        for _ in 0..2 {
+            for packet in download.poll(Duration::ZERO) {
+                download.take(&packet.ack(&u32::MAX.to_le_bytes()), Duration::ZERO);
+            }
+        }
+        download.resume(u32::MAX - 5);
+        let asked = download.poll(Duration::ZERO);
+        assert_eq!(asked.len(), 1, "{asked:?}");
+        assert_eq!((asked[0].offset, asked[0].size), (u32::MAX - 5, 5));
     }
 }
