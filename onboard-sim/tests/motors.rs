@@ -131,20 +131,13 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
 }
 
 #[test]
-fn what_cannot_land_gets_no_card_but_the_bound_and_the_nearest() {
+fn what_cannot_land_gets_no_card_but_the_reason() {
     let directory = tempfile::tempdir().unwrap();
     let refused = run(directory.path(), &["card", "--mission", "mk2", "--motor", "H42", "--mass", "3.1"]);
     assert_eq!(refused.status.code(), Some(1));
     let words = stderr(&refused);
-    for expected in [
-        "error: Cesaroni H42 (built in): no landing exists at 3.100 kg; it would land at 2.",
-        "  bound: ",
-        "  nearest mass on this motor: 2.",
-        "kg more than that",
-        "AT H45W at 3.100 kg, scatter 1.1",
-    ] {
-        assert!(words.contains(expected), "{expected} in\n{words}");
-    }
+    let expected = "error: Cesaroni H42 (built in): no landing exists at 3.100 kg; it would land at 2.";
+    assert!(words.contains(expected) && words.contains("`onboard-sim motors` ranks"), "{words}");
     let overlap = F10.replace("0.31 22.806", "0.1 22.806");
     fs::write(directory.path().join("bad.eng"), overlap).unwrap();
     let broken = run(directory.path(), &["card", "--mission", "mini-f10", "--motor", "bad.eng"]);

@@ -181,7 +181,6 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
     let order = Order {
         team: &team,
         motor: &motor,
-        others: &[],
         mass_kg: None,
         winds: &[Day { wind_m_s: 4.0, recipe: windy.clone() }],
         flights,

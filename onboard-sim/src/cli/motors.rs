@@ -147,7 +147,6 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let order = Order {
         team: &team,
         motor: &motor,
-        others: &found,
         mass_kg: arguments.mass,
         winds: &days,
         flights: Flights {

@@ -4,15 +4,13 @@ use core::fmt::{self, Write};
 
 use serde::Serialize;
 
-use super::choice::Obstacle;
 use super::ranking::{Flown, Landing, Ranked};
 use super::source::Candidate;
 
-/// Up to this many motors without a landing are listed one by one if not all are asked for.
+/// Motors without a landing that are listed if not all are asked for.
 const FEW: usize = 20;
 
-/// The ranking as text. Motors without a landing are listed with their reasons if `all` are asked for or there are few;
-/// otherwise they are counted by reason.
+/// The ranking as text. Motors without a landing are listed with their reasons, all of them or the first few.
 pub fn text(ranking: &[Ranked], all: bool) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
@@ -51,19 +49,12 @@ fn write_text(ranking: &[Ranked], all: bool, out: &mut String) -> fmt::Result {
         return Ok(());
     }
     writeln!(out, "{}{others} of {} motors cannot be landed on:", gap(&landings), ranking.len())?;
-    if all || others <= FEW {
-        for ranked in ranking {
-            if let Some((name, origin, reason)) = without_a_landing(ranked) {
-                writeln!(out, "  {:<28} {reason} ({origin})", cut(&name))?;
-            }
-        }
-        return Ok(());
+    let shown = if all { others } else { FEW };
+    for (name, origin, reason) in ranking.iter().filter_map(without_a_landing).take(shown) {
+        writeln!(out, "  {:<28} {reason} ({origin})", cut(&name))?;
     }
-    for kind in KINDS {
-        let count = ranking.iter().filter(|ranked| kind_of(ranked) == Some(kind)).count();
-        if count > 0 {
-            writeln!(out, "{count:>6} {kind}")?;
-        }
+    if shown >= others {
+        return Ok(());
     }
     writeln!(out, "  (--all lists each with its reason; so does the file of --csv)")
 }
@@ -109,30 +100,6 @@ fn without_a_landing(ranked: &Ranked) -> Option<(String, &str, String)> {
             Some((unusable.name.clone(), &unusable.origin, unusable.reason.clone()))
         }
     }
-}
-
-const KINDS: [&str; 6] = [
-    "do not fit the tube or the body",
-    "are never stronger than the weight",
-    "have no landing at a mass that can be had",
-    "need a higher start",
-    "make no sound vehicle",
-    "have a file or an entry that cannot be used",
-];
-
-fn kind_of(ranked: &Ranked) -> Option<&'static str> {
-    let place = match ranked {
-        Ranked::Lands(_) => return None,
-        Ranked::Refused(_, refusal) => match refusal.obstacle {
-            Obstacle::Diameter { .. } | Obstacle::Length { .. } => 0,
-            Obstacle::Thrust { .. } => 1,
-            Obstacle::Mass { .. } => 2,
-            Obstacle::Height { .. } => 3,
-            Obstacle::Unsound(_) => 4,
-        },
-        Ranked::Unusable(_) => 5,
-    };
-    Some(KINDS[place])
 }
 
 /// A row of the CSV; what a motor does not have is empty.
