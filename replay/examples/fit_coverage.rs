@@ -22,8 +22,8 @@ fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {
         let reported_rad = flight.world().gimbal_feedback_rad();
         let reported = (std::env::var("REPORTED").is_ok()).then_some(reported_rad);
         let computer = flight.computer();
-        if let (Some(input), Some(believed)) = (computer.flown(), flight.pilot().estimate()) {
-            trace.push(&input, computer.commands(), computer.mode().phase, believed, reported);
+        if let (Some(input), Some(estimate)) = (computer.flown(), flight.pilot().estimate()) {
+            trace.push(&input, computer.commands(), computer.mode().phase, estimate, reported);
         }
         if !flight.goes_on() {
             return Ok((trace, flight));

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, ensure};
+use campaign::run::threads;
 
 use crate::info::Completeness;
 use crate::log::{Cut, Gap, Recording};
@@ -49,7 +50,7 @@ impl Outcome {
     }
 }
 
-/// Passes text on without what steers a terminal: whatever a log or a file name holds, it is only shown.
+/// Passes text on without what steers a terminal: text of a log or a file name is only shown.
 pub(crate) struct Shown<W> {
     output: W,
     /// The first byte of a character that may be a control character.
@@ -190,9 +191,9 @@ pub(crate) fn warn_of_cut(file: &str, cut: Option<&Cut>) {
     }
 }
 
-/// How many work at the same time: as many as asked for, or as there are processors.
-pub(crate) fn jobs(asked: Option<NonZeroUsize>) -> NonZeroUsize {
-    asked.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN)
+/// Does work on so many threads, or on as many as there are processors.
+pub(crate) fn in_pool<R: Send>(jobs: Option<NonZeroUsize>, work: impl FnOnce() -> R + Send) -> Result<R> {
+    Ok(threads(jobs.map(NonZeroUsize::get)).context("cannot start threads")?.install(work))
 }
 
 /// Shows progress about twenty times on a terminal, elsewhere only at the end.

@@ -1,6 +1,6 @@
 //! Open loop: runs the controller alone on the recorded inputs, with other settings.
 //!
-//! Every tick gets its recorded input, so the vehicle moves as it did in flight, whatever is commanded now. The answer
+//! Every tick gets its recorded input, so the vehicle moves as it did in flight, for any command. The answer
 //! is what the controller *would have commanded*, beside what it did command. What *would have happened* is a question
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
@@ -393,10 +393,14 @@ impl Args {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;
-        answer(|output| match () {
-            () if self.json => print_json(&report, output),
-            () if self.csv => print_evaluate_csv(&report, output),
-            () => print_evaluate(&report, output),
+        answer(|output| {
+            if self.json {
+                print_json(&report, output)
+            } else if self.csv {
+                print_evaluate_csv(&report, output)
+            } else {
+                print_evaluate(&report, output)
+            }
         })?;
         Ok(Outcome::Given)
     }

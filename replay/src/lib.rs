@@ -9,7 +9,7 @@
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
-//!   holds a season of flights against a baseline, and proves the books of ground stations.
+//!   holds a regression suite of flights against a baseline, and proves the books of ground stations.
 //! * [`settings`]: other settings for a recorded flight, named as in its mission.
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
 //! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop), with one setting
@@ -37,7 +37,6 @@ pub mod recover;
 pub mod refly;
 pub mod report;
 pub mod settings;
-mod several;
 pub mod table;
 pub mod verify;
 
@@ -96,7 +95,7 @@ enum Command {
     /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
     #[command(
-        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 2040\n  replay verify logs --baseline baseline.json --junit=season.xml\n  replay verify --book ground.mcap vehicle.mcap"
+        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 2040\n  replay verify logs --baseline baseline.json --junit=suite.xml\n  replay verify --book ground.mcap vehicle.mcap"
     )]
     Verify(verify::Args),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.

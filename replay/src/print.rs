@@ -145,7 +145,7 @@ pub(crate) fn verdict_rows<'a>(
 }
 
 /// A file for JUnit XML: before the work, so that nothing is done for a file that may not be written. An existing file is
-/// kept, whatever it holds; a pipe or a device has nothing to keep.
+/// kept, with any content; a pipe or a device has nothing to keep.
 pub(crate) fn junit_file(path: &Path) -> Result<NewFile> {
     if std::fs::metadata(path).is_ok_and(|found| found.is_file()) {
         refuse_existing(path)?;

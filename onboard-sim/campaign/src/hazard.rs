@@ -195,7 +195,7 @@ pub struct Radius {
 
 impl Radius {
     /// The radius of distances, m; `None` without any. The ends are order statistics: how many of n flights come down inside
-    /// the true radius is binomial (W. J. Conover, Practical Nonparametric Statistics, section 3.2), whatever the
+    /// the true radius is binomial (W. J. Conover, Practical Nonparametric Statistics, section 3.2), for any
     /// distribution of the distances.
     pub fn of(mut distances_m: Vec<f64>) -> Option<Self> {
         distances_m.sort_by(f64::total_cmp);
@@ -238,7 +238,7 @@ pub struct Flights {
 /// A way of which the farthest flight of the survey comes down at this share of the farthest of all is one of the widest.
 const NEARLY: f64 = 0.9;
 
-/// [`study`] of each recipe. `done` is told how many flights of all are flown, of about how many.
+/// [`study`] of each recipe. `done` gets how many flights of all are flown, of about how many.
 ///
 /// # Errors
 /// A flight cannot be set up.
@@ -257,7 +257,7 @@ pub fn studies(
     of_each.collect()
 }
 
-/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` is told how many flights are flown,
+/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` gets how many flights are flown,
 /// of how many: before the widest ways are known, of one of them.
 ///
 /// # Errors
@@ -493,7 +493,7 @@ fn fallen_m(
     [place_m.x, place_m.y]
 }
 
-/// What a national association asks for, whatever the flights say.
+/// What a national association asks for, for any result of the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rule {
     /// Least distance of people from the pad, feet.

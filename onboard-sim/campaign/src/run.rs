@@ -27,10 +27,10 @@ pub fn threads(jobs: Option<usize>) -> Result<ThreadPool, ThreadPoolBuildError> 
     ThreadPoolBuilder::new().num_threads(jobs.map_or(0, |jobs| jobs.max(1))).build()
 }
 
-/// Results of `work` for each item, in the order of the items. `done` is told how many items are finished, after each.
-pub fn in_parallel<T: Sync, R: Send>(
-    items: &[T],
-    work: impl Fn(&T) -> R + Sync,
+/// Results of `work` for each item, in the order of the items. `done` gets how many items are finished, after each.
+pub fn in_parallel<'a, T: Sync, R: Send>(
+    items: &'a [T],
+    work: impl Fn(&'a T) -> R + Sync,
     done: &(dyn Fn(usize) + Sync),
 ) -> Vec<R> {
     let finished = AtomicUsize::new(0);

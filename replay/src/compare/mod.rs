@@ -369,10 +369,14 @@ impl Args {
             };
             comparisons.push(compare(&baseline, &other, align, &tolerances)?);
         }
-        answer(|output| match () {
-            () if self.json => print_json(&comparisons, output),
-            () if self.junit => print_junit("compare", compare_cases(&comparisons), output),
-            () => print_compare(&comparisons, output),
+        answer(|output| {
+            if self.json {
+                print_json(&comparisons, output)
+            } else if self.junit {
+                print_junit("compare", compare_cases(&comparisons), output)
+            } else {
+                print_compare(&comparisons, output)
+            }
         })?;
         let within = |comparison: &Comparison| comparison.failures.is_empty();
         Ok(Outcome::Decided { yes: comparisons.iter().all(within) })

@@ -128,7 +128,7 @@ pub(super) fn falling(trace: &Trace) -> &[Frame] {
         let falls = |frame: &Frame| {
             !frame.phase.before_apogee() && !frame.parachute && !frame.booster_attached && !frame.contact
         };
-        let fast = |frame: &Frame| falls(frame) && frame.believed.state.velocity_m_s.norm() > speed_m_s;
+        let fast = |frame: &Frame| falls(frame) && frame.estimate.state.velocity_m_s.norm() > speed_m_s;
         let frames = &trace.frames;
         let Some(first) = frames.iter().position(fast) else { return &[] };
         let length = frames[first..].iter().take_while(|frame| falls(frame)).count();
@@ -162,18 +162,18 @@ fn samples(
         let near = follows(before, frame) && before.time_s < frame.time_s;
         let before = if near { before } else { frame };
         let in_body = |frame: &Frame| {
-            let state = &frame.believed.state;
-            state.world_from_body.inverse_transform_vector(&frame.believed.velocity_through_air_m_s())
+            let state = &frame.estimate.state;
+            state.world_from_body.inverse_transform_vector(&frame.estimate.velocity_through_air_m_s())
         };
         let through_air = 0.5 * (in_body(before) + in_body(frame));
         let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
-        let state = &frame.believed.state;
+        let state = &frame.estimate.state;
         let height_m = state.position_m.z;
         let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
         let vehicle = VehicleNow::of(&mission.airframe, mass, density, fins_rad, false, 0.0);
         let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
         let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
-        let rate = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
+        let rate = frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s;
         let up = state.world_from_body.inverse_transform_vector(&nalgebra::Vector3::z());
         let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;
         Sample {
@@ -321,7 +321,7 @@ impl<'a> Series<'a> {
 pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, &'static str> {
     let series = Series::new(trace, thrust_along)?;
     let mission = &trace.mission;
-    let at_ignition = &series.frames[series.fallen - 1].believed;
+    let at_ignition = &series.frames[series.fallen - 1].estimate;
     let bias = Prior {
         mean: at_ignition.accelerometer_bias_m_s2.x,
         sigma: at_ignition.sigmas.accelerometer_bias_m_s2.x.max(1e-4),

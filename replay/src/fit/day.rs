@@ -13,6 +13,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail, ensure};
+use campaign::run::in_parallel;
 use clap::Args;
 use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::mission::Mission;
@@ -28,10 +29,9 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _}
 
 use super::lot::{Chance, Lot, Prediction, Trial, draw_next, predict};
 use super::{Basis, Fit, Pooled, Z_95, pooled};
-use crate::cli::{jobs, refuse_existing, say, text_of, write_new};
+use crate::cli::{in_pool, refuse_existing, say, text_of, write_new};
 use crate::print::{counted, shown};
 use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
-use crate::several::several;
 
 /// What is asked.
 #[derive(Debug, Clone)]
@@ -45,8 +45,6 @@ pub struct DayAsk<'a> {
     /// The landing rate that the club wants, and the risk of flying below it that it takes.
     pub limit: f64,
     pub risk: f64,
-    /// Flights at the same time; the answer does not depend on it.
-    pub jobs: NonZeroUsize,
 }
 
 /// Why nothing can be learnt.
@@ -304,7 +302,7 @@ fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
     [(lot.mean - reach).max(0.0), lot.mean + reach]
 }
 
-/// Flies the day's flights, several at a time.
+/// Flies the day's flights.
 fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<Trial>, LearnError> {
     let law = Law::of(Controller::Nmpc, &day.mission);
     let mut chance = Chance(ChaCha12Rng::seed_from_u64(ask.seed));
@@ -322,7 +320,7 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw, law.clone())?.run().legs)
     };
-    let landed = several(&motors, ask.jobs, one);
+    let landed = in_parallel(&motors, one, &|_| {});
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
     trials.collect()
@@ -579,18 +577,15 @@ impl Arguments {
         if let Some(flights) = self.flights {
             say(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
         }
-        let learnt = learn(
-            fits,
-            &DayAsk {
-                mission_toml: &mission_toml,
-                set: (&self.prior, &set),
-                flights: self.flights,
-                seed: self.seed,
-                limit: self.limit,
-                risk: self.risk,
-                jobs: jobs(self.jobs),
-            },
-        )?;
+        let ask = DayAsk {
+            mission_toml: &mission_toml,
+            set: (&self.prior, &set),
+            flights: self.flights,
+            seed: self.seed,
+            limit: self.limit,
+            risk: self.risk,
+        };
+        let learnt = in_pool(self.jobs, || learn(fits, &ask))??;
         if let Some(directory) = &self.day {
             let name = directory.display();
             std::fs::create_dir_all(directory).with_context(|| format!("{name}: cannot be made"))?;

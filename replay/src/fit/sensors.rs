@@ -74,16 +74,16 @@ pub(super) fn sensors(trace: &Trace) -> Vec<Parameter> {
     }
     found.extend(of_slow_sensors(frames));
     let last = fall.last().or(frames.last());
-    if let Some(Frame { believed, .. }) = last {
+    if let Some(Frame { estimate, .. }) = last {
         let axes = ["x", "y", "z"];
         for (axis, name) in axes.into_iter().enumerate() {
-            let (value, sigma) = (believed.gyro_bias_rad_s[axis], believed.sigmas.gyro_bias_rad_s[axis]);
+            let (value, sigma) = (estimate.gyro_bias_rad_s[axis], estimate.sigmas.gyro_bias_rad_s[axis]);
             let name = format!("gyro_bias_{name}");
             found.push(Parameter::normal(&name, "deg/s", to_deg * value, to_deg * sigma));
         }
         for (axis, name) in axes.into_iter().enumerate() {
             let (value, sigma) =
-                (believed.accelerometer_bias_m_s2[axis], believed.sigmas.accelerometer_bias_m_s2[axis]);
+                (estimate.accelerometer_bias_m_s2[axis], estimate.sigmas.accelerometer_bias_m_s2[axis]);
             let name = format!("accelerometer_bias_{name}");
             found.push(Parameter::normal(&name, "mg", value / milli_g, sigma / milli_g));
         }
@@ -152,15 +152,15 @@ fn of_slow_sensors(frames: &[Frame]) -> Vec<Parameter> {
 
 fn frame_acceleration(part: &[Frame], place: usize) -> Vector3<f64> {
     part.get(place).map_or_else(Vector3::zeros, |frame| {
-        let felt = frame.measured.imu.specific_force_m_s2 - frame.believed.accelerometer_bias_m_s2;
-        frame.believed.state.world_from_body * felt - Vector3::z() * GRAVITY_M_S2
+        let felt = frame.measured.imu.specific_force_m_s2 - frame.estimate.accelerometer_bias_m_s2;
+        frame.estimate.state.world_from_body * felt - Vector3::z() * GRAVITY_M_S2
     })
 }
 
 /// Velocity and position at the end of each frame from the inertial unit alone, along the estimated attitude.
 fn integrated(part: &[Frame]) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let Some(first) = part.first() else { return Vec::new() };
-    let (mut velocity, mut position) = (first.believed.state.velocity_m_s, first.believed.state.position_m);
+    let (mut velocity, mut position) = (first.estimate.state.velocity_m_s, first.estimate.state.position_m);
     let path = (0..part.len()).map(|place| {
         if place > 0 {
             let acceleration = frame_acceleration(part, place);

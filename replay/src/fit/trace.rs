@@ -16,7 +16,6 @@ use protocol::log::computer_v1::ComputerFrame;
 
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, RecordingError};
-use crate::settings::explained;
 
 /// One frame of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +37,7 @@ pub struct Frame {
     pub booster_attached: bool,
     pub phase: Phase,
     /// The flight computer's estimate at the end of the frame, and the standard deviations with it.
-    pub believed: Estimate,
+    pub estimate: Estimate,
 }
 
 /// A flight as its log has it.
@@ -102,13 +101,13 @@ impl Trace {
         input: &Input<'_>,
         commands: &Commands,
         phase: Phase,
-        believed: &Estimate,
+        estimate: &Estimate,
         gimbal_reported_rad: Option<[f64; 2]>,
     ) {
         let Sensed::Measured(measured) = input.sensed else { return };
         let numbers = [&measured.imu.gyro_rad_s, &measured.imu.specific_force_m_s2];
-        let sound = believed.state.is_finite()
-            && believed.wind_m_s.iter().all(|wind| wind.is_finite())
+        let sound = estimate.state.is_finite()
+            && estimate.wind_m_s.iter().all(|wind| wind.is_finite())
             && numbers.iter().all(|vector| vector.iter().all(|value| value.is_finite()))
             && input.fins_rad.iter().chain(&commands.gimbal_rad).all(|angle| angle.is_finite())
             && input.time_s.is_finite()
@@ -131,7 +130,7 @@ impl Trace {
             contact: input.contact,
             booster_attached: input.booster_attached,
             phase,
-            believed: *believed,
+            estimate: *estimate,
         });
     }
 
@@ -177,14 +176,14 @@ impl Trace {
                         phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
                     let read = read.input();
                     let input = read.since(0);
-                    let believed =
+                    let estimate =
                         estimate_from_log(&estimate, number).map_err(|error| unknown(error.to_string()))?;
                     if trace.is_none() {
                         let (mission, text) = mission_of(log)?;
                         trace = Some(Self::new(&name, mission, &text));
                     }
                     if let Some(trace) = &mut trace {
-                        trace.push(&input, &commands, phase, &believed, Some(read.gimbal_rad));
+                        trace.push(&input, &commands, phase, &estimate, Some(read.gimbal_rad));
                         if trace.frames.len() > FRAMES_MAX {
                             let kind = "frames of the flight computer";
                             return Err(RecordingError::TooLong { name: name.clone(), kind }.into());
@@ -215,9 +214,7 @@ fn mission_of<R: std::io::Read>(log: &FlightLog<R>) -> Result<(Mission, String),
         Some(Err(error)) => Err(RecordingError::ProfileUnusable { name, reason: error.to_string() }),
         Some(Ok(text)) => match flight::vehicles::mission::from_toml(text, "profile.toml") {
             Ok(mission) => Ok((mission, text.clone())),
-            Err(error) => {
-                Err(RecordingError::ProfileUnusable { name, reason: explained(&error.to_string()) })
-            }
+            Err(error) => Err(RecordingError::ProfileUnusable { name, reason: error.to_string() }),
         },
     }
 }

@@ -1,5 +1,5 @@
 //! Across the nose while the motor burns: how late and how far the gimbal follows its commands, and where it points when
-//! it is told to point along the axis.
+//! it is commanded to point along the axis.
 //!
 //! `I q' = -T l sin(g p + p0) + air + rest`, with the thrust `T` that was found along the nose, the arm `l` and the
 //! inertia `I` of the data, the servo's angle `p`, and a rest that wanders (gusts, what the exhaust does to the fins). The
@@ -260,14 +260,14 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
         let thrust_n = if burning { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
         let mass = mass_model.at(if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 });
         let in_body = |frame: &super::trace::Frame| {
-            let state = &frame.believed.state;
-            state.world_from_body.inverse_transform_vector(&frame.believed.velocity_through_air_m_s())
+            let state = &frame.estimate.state;
+            state.world_from_body.inverse_transform_vector(&frame.estimate.velocity_through_air_m_s())
         };
         let through_air = 0.5 * (in_body(before) + in_body(frame));
-        let rate: Vector3<f64> = frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s;
+        let rate: Vector3<f64> = frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s;
         let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
         let density =
-            Air::at_height_m(frame.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+            Air::at_height_m(frame.estimate.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
         // What was found along the nose holds for the fins across it, too.
         let air = along.solution.values[FINS]
             * air_moment_n_m(airframe, mass.cg_station_m, density, &through_air, &rate, &fins_rad);

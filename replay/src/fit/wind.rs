@@ -50,7 +50,7 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
     let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
     let samples: Vec<Sample> = fall
         .chunks_exact(FRAMES)
-        .filter(|chunk| chunk[0].believed.state.velocity_m_s.norm() > SLOWEST_M_S)
+        .filter(|chunk| chunk[0].estimate.state.velocity_m_s.norm() > SLOWEST_M_S)
         .filter_map(|chunk| sample(trace, along, chunk))
         .collect();
     if samples.len() < FEWEST {
@@ -81,7 +81,7 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
     }
     // What does not average out over a fall: a wrong attitude turns the fall's own speed into wind, a biased accelerometer
     // feels wind, and the drag is known as well as it was found.
-    let of_last = fall.last().map(|frame| frame.believed.sigmas);
+    let of_last = fall.last().map(|frame| frame.estimate.sigmas);
     let count = samples.len() as f64;
     let mean = |of: fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / count;
     let (airspeed_m_s, by_wind) = (mean(|sample| sample.airspeed_m_s), mean(|sample| sample.by_wind));
@@ -121,15 +121,15 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
     let mission = &trace.mission;
     let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg()).at(0.0);
     let middle = &frames[frames.len() / 2];
-    let density = Air::at_height_m(middle.believed.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+    let density = Air::at_height_m(middle.estimate.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
     let (total, _) = along.drag();
     let of = |frame: &Frame| {
         let vehicle = VehicleNow::of(&mission.airframe, &mass, density * total, frame.fins_rad, false, 0.0);
-        (vehicle, frame.measured.imu.gyro_rad_s - frame.believed.gyro_bias_rad_s)
+        (vehicle, frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s)
     };
     let felt_at = |frame: &Frame, wind_m_s: Vector2<f64>| -> Vector2<f64> {
         let (vehicle, rate) = of(frame);
-        let state = &frame.believed.state;
+        let state = &frame.estimate.state;
         let through_air =
             state.world_from_body.inverse_transform_vector(&(state.velocity_m_s - wind_m_s.push(0.0)));
         vehicle.air_force_n(&through_air, &rate).yz() / mass.mass_kg
@@ -141,11 +141,11 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
         .iter()
         .map(|frame| {
             let imu = &frame.measured.imu;
-            (imu.specific_force_m_s2 - frame.believed.accelerometer_bias_m_s2).yz()
+            (imu.specific_force_m_s2 - frame.estimate.accelerometer_bias_m_s2).yz()
         })
         .sum::<Vector2<f64>>()
         / frames.len() as f64;
-    let mut wind_m_s = middle.believed.wind_m_s;
+    let mut wind_m_s = middle.estimate.wind_m_s;
     let mut slope = Matrix2::zeros();
     for _ in 0..8 {
         let here = mean(wind_m_s);
@@ -158,7 +158,7 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
             break;
         }
     }
-    let state = &middle.believed.state;
+    let state = &middle.estimate.state;
     let airspeed_m_s = (state.velocity_m_s - Vector3::new(wind_m_s.x, wind_m_s.y, 0.0)).norm();
     wind_m_s.iter().all(|speed| speed.is_finite() && speed.abs() < 100.0).then(|| Sample {
         height_m: state.position_m.z,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use campaign::statistics::quantile;
 use flight::rules::phase::Phase;
 use flight_log::frame::accepts_abort;
 use protocol::dialect::TdInterlock;
@@ -371,19 +372,13 @@ impl SolveTimeCounter {
         self.times_s.sort_by(f64::total_cmp);
         Some(SolveTimes {
             count: self.count,
-            median_s: percentile(&self.times_s, 50),
-            p99_s: percentile(&self.times_s, 99),
-            max_s: percentile(&self.times_s, 100),
+            median_s: quantile(&self.times_s, 0.5)?,
+            p99_s: quantile(&self.times_s, 0.99)?,
+            max_s: quantile(&self.times_s, 1.0)?,
             deadline_s: self.deadline_s?,
             over_deadline: self.over_deadline,
         })
     }
-}
-
-/// The smallest element that at least `percent` of 100 do not exceed (nearest rank).
-fn percentile(sorted: &[f64], percent: usize) -> f64 {
-    let rank = (sorted.len() * percent).div_ceil(100);
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -417,15 +412,5 @@ mod tests {
         let timeline = tracker.into_timeline(PhaseSource::Vehicle).unwrap();
         assert_eq!(timeline.spans.len(), SPANS_KEPT);
         assert_eq!(timeline.further_changes, 10_000 - SPANS_KEPT as u64);
-    }
-
-    #[test]
-    fn percentiles_use_the_nearest_rank() {
-        let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
-        for (percent, expected) in [(50, 50.0), (99, 99.0), (100, 100.0)] {
-            assert_eq!(percentile(&hundred, percent).to_bits(), f64::to_bits(expected));
-            assert_eq!(percentile(&[7.0], percent).to_bits(), 7.0_f64.to_bits());
-        }
-        assert!(percentile(&[], 50).is_nan());
     }
 }

@@ -13,7 +13,6 @@ use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1;
 use serde::Serialize;
-use sim::ending::FlightEnding;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
@@ -23,7 +22,6 @@ use crate::log::{
     LogError, SummaryFacts, Verdicts, heard_message, summary_of,
 };
 use crate::print::{counted, print_json, shown};
-use crate::settings::explained;
 
 /// Describes a log file.
 ///
@@ -258,7 +256,7 @@ impl ProfileFacts {
         let parsed = match head.profile_toml.as_ref()? {
             Ok(text) => flight::vehicles::mission::from_toml(text, "profile.toml")
                 .map(|mission| (mission.name, mission.summary))
-                .map_err(|error| explained(&error.to_string())),
+                .map_err(|error| error.to_string()),
             Err(error) => Err(error.to_string()),
         };
         Some(match parsed {
@@ -386,7 +384,7 @@ impl VerdictFacts {
         };
         Self {
             landed: verdict.landed,
-            ending: verdict.ending.clone().unwrap_or_else(|| ending_of_earlier(verdict)),
+            ending: verdict.ending.clone().unwrap_or_default(),
             time_s: verdict.time_s,
             clock: Clock::Flight,
             limits: facts(&verdict.limits),
@@ -404,20 +402,6 @@ impl VerdictFacts {
     pub fn contact(&self) -> ClockTime {
         ClockTime { clock: self.clock, time_s: self.time_s }
     }
-}
-
-/// How a flight ended whose log, of an earlier release, does not say it.
-fn ending_of_earlier(verdict: &v1::LandingVerdict) -> String {
-    // A verdict of before the legs was judged by Table 2, which has a limit of `u`.
-    let in_plane = verdict.limits.iter().any(|limit| limit.name == "u");
-    let broken = verdict.limits.iter().rev().find(|limit| !limit.passed);
-    FlightEnding {
-        aborted: false,
-        landed: verdict.landed,
-        table_2: in_plane.then_some(verdict.landed),
-        failure: broken.map(|limit| limit.name.as_str()),
-    }
-    .to_string()
 }
 
 fn seconds(ns: u64) -> f64 {

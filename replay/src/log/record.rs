@@ -65,7 +65,7 @@ pub enum Entry {
     ComputerFrame(Box<LoggedFrame>),
     /// Solve time of a planning frame.
     PilotTiming(flight_v1::PilotTiming),
-    /// What the flight computer believed after a frame.
+    /// The estimate of the flight computer after a frame.
     Estimate(Box<flight_v1::Estimate>),
     /// The simulated world.
     World(Box<flight_v1::TruthSample>),

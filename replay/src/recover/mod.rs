@@ -1,7 +1,7 @@
 //! Recovers a whole log from a damaged one.
 //!
 //! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the middle. Every chunk with a
-//! correct checksum is kept, also after a broken one. What the file says about itself is believed: its checksums, and the
+//! correct checksum is kept, also after a broken one. What the file says about itself is taken as true: its checksums, and the
 //! chunks and messages that its summary counts. The report lists what is lost, and so does the recovered log itself
 //! ([`METADATA_RECOVERY`]). Nothing is invented: a message is kept unchanged or not at all.
 

@@ -191,7 +191,7 @@ impl Records {
         Ok(contents)
     }
 
-    /// What is told from here to the footer, or to the first record that makes no sense.
+    /// What is counted from here to the footer, or to the first record that makes no sense.
     fn told(&mut self, from_byte: u64) -> Result<WriterReport, LogError> {
         let mut told = WriterReport::default();
         let mut checksum = crc32fast::Hasher::new();

@@ -1,41 +1,42 @@
-//! Runs the jobs of a sweep, several at a time.
+//! Runs the jobs of a sweep in parallel.
 
-use std::num::NonZeroUsize;
+use campaign::run::in_parallel;
 
 use super::vary::{Choice, FlightOutcome, PointOutcome, SweepError, SweepReport};
 use crate::log::Recording;
 use crate::refly::{Prepared, ReflyError, ReflyOptions};
-use crate::several::{Finished, several};
 
-/// Flies every flight at every point, `jobs` at a time. `options` apply in addition to the settings of the points.
+/// Flies every flight at every point. `options` apply in addition to the settings of the points.
 ///
 /// # Errors
-/// Some flight cannot be flown again; of several errors the first flight's at the first point, whatever the timing.
+/// Some flight cannot be flown again; of several errors the first flight's at the first point, for any timing.
 pub fn sweep(
     flights: &[Recording],
     points: &[Choice],
     options: &ReflyOptions,
-    jobs: NonZeroUsize,
-    progress: &mut (dyn FnMut(usize, usize) + Send),
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<SweepReport, SweepError> {
     let all: Vec<(usize, usize)> =
         (0..points.len()).flat_map(|point| (0..flights.len()).map(move |flight| (point, flight))).collect();
-    let finished = Finished::new(0, all.len(), progress);
     let failed = |settings, source| SweepError { settings, source: Box::new(source) };
     // Flying to the start may take as long as the rest of the flight.
-    let prepared = several(flights, jobs, |recording| {
-        let flight = Prepared::new(recording, options)?;
-        Ok((flight.is_reproduced(options)?, flight))
-    });
+    let prepared = in_parallel(
+        flights,
+        |recording| {
+            let flight = Prepared::new(recording, options)?;
+            Ok((flight.is_reproduced(options)?, flight))
+        },
+        &|_| {},
+    );
     let prepared = prepared
         .into_iter()
         .collect::<Result<Vec<_>, ReflyError>>()
         .map_err(|source| failed("as recorded".to_owned(), source))?;
-    let outcomes = several(&all, jobs, |(point, flight)| {
-        let outcome = fly(&prepared[*flight].1, &points[*point], options);
-        finished.one_more();
-        outcome.map_err(|source| failed(points[*point].words().join(" "), source))
-    });
+    let fly = |(point, flight): &(usize, usize)| {
+        fly(&prepared[*flight].1, &points[*point], options)
+            .map_err(|source| failed(points[*point].words().join(" "), source))
+    };
+    let outcomes = in_parallel(&all, fly, &|done| progress(done, all.len()));
     let outcomes = outcomes.into_iter().collect::<Result<Vec<_>, _>>()?;
     let ranked = points.iter().zip(outcomes.chunks(flights.len().max(1))).enumerate();
     let ranked = ranked.map(|(point, (choice, outcomes))| point_outcome(point, choice, flights, outcomes));

@@ -67,19 +67,8 @@ impl<'a> Prepared<'a> {
                 }
             }
         }
-        let recorded = match &recording.verdict {
-            Some(verdict) => Some(VerdictFacts::of(verdict)),
-            // For an older log of a whole flight: its outcome without changes, if this build still flies the same
-            // flight.
-            None if reached.first_different.is_none() && frames.last().is_some_and(is_down) => {
-                let mut as_it_was = rerun.clone();
-                while as_it_was.step() {}
-                sortie::verdict(&as_it_was.flight).as_ref().map(VerdictFacts::of)
-            }
-            None => None,
-        };
         if options.from == From::Estimate {
-            put_where_it_believes(recording, &mut rerun, first_frame)?;
+            place_at_estimate(recording, &mut rerun, first_frame)?;
         }
         let world = rerun.flight.world();
         let place_m = world.state().position_m;
@@ -104,7 +93,7 @@ impl<'a> Prepared<'a> {
             first_frame,
             state,
             reached,
-            recorded,
+            recorded: recording.verdict.as_ref().map(VerdictFacts::of),
             rerun,
         })
     }
@@ -275,7 +264,7 @@ impl<'a> Prepared<'a> {
         let Recorded { mut rerun, .. } = Recorded::with_faults(self.recording, &options.faults)?;
         while rerun.flight.frame() + 1 < self.first_frame && rerun.step() {}
         if options.from == From::Estimate {
-            put_where_it_believes(self.recording, &mut rerun, self.first_frame)?;
+            place_at_estimate(self.recording, &mut rerun, self.first_frame)?;
         }
         Ok(rerun)
     }
@@ -301,8 +290,8 @@ impl<'a> Prepared<'a> {
         let all: Vec<Setting> = lasting.iter().chain(&of_mission).cloned().collect();
         let true_mission = mission_with(toml, &all)?;
         if let Some(controller) = Self::other_controller(options) {
-            let believed = mission_with(toml, &lasting)?;
-            rerun.flight.set_law(BurnLaw::of(controller, &believed));
+            let mission = mission_with(toml, &lasting)?;
+            rerun.flight.set_law(BurnLaw::of(controller, &mission));
         }
         let other_draw =
             options.seed.map(|seed| draw(&true_mission, &self.dispersion, seed, self.number).truth);
@@ -342,11 +331,6 @@ fn keep(kept: &mut Kept, rerun: &mut Rerun, phase: Phase) {
 /// The settings without a time.
 fn lasting(options: &ReflyOptions) -> Vec<Setting> {
     options.settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect()
-}
-
-/// Whether a frame's flight computer has noticed that it is on the ground.
-fn is_down(tick: &ComputerFrame) -> bool {
-    matches!(phase_of(&tick.output), Some(Phase::Touchdown | Phase::Safed))
 }
 
 /// Whether two frames are of the same flight: what was felt, what was decided, and what is remembered, unless that covers a
@@ -409,11 +393,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Res
 }
 
 /// Puts the vehicle at the position that its flight computer estimated at the end of the frame before the start.
-fn put_where_it_believes(
-    recording: &Recording,
-    rerun: &mut Rerun,
-    first_frame: u64,
-) -> Result<(), ReflyError> {
+fn place_at_estimate(recording: &Recording, rerun: &mut Rerun, first_frame: u64) -> Result<(), ReflyError> {
     let refused =
         |reason: &str| ReflyError::Start { name: recording.name.clone(), reason: reason.to_owned() };
     let Some(estimate) = rerun.flight.pilot().estimate().filter(|_| first_frame > 1) else {

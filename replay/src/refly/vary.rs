@@ -14,7 +14,7 @@ use serde::Serialize;
 
 pub use super::jobs::sweep;
 use super::{FlownHow, ReflyError, StartAt, can_be_flown};
-use crate::cli::{Outcome, answer, jobs, say, show_progress, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, in_pool, say, show_progress, warn_of_what_is_missing};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
 use crate::settings::Setting;
@@ -331,7 +331,7 @@ impl Arguments {
             }
         }
         ensure!(!flights.is_empty(), "none of the {} logs can be flown again", files.len());
-        let report = sweep(&flights, &points, &options, jobs(self.jobs), &mut show_progress)?;
+        let report = in_pool(self.jobs, || sweep(&flights, &points, &options, &show_progress))??;
         answer(|output| {
             if json {
                 print_json(&report, output)

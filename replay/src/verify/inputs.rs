@@ -1,4 +1,4 @@
-//! Judges the inputs of a flight computer: some values cannot be, whatever was flown.
+//! Judges the inputs of a flight computer: some values are impossible in any flight.
 //!
 //! What decides nothing could be changed in a log without a divergence. A value far outside of what any sensor can say, or one
 //! that does not follow from the frame before it, gives that away.

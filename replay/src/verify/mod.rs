@@ -26,7 +26,7 @@ pub mod explain;
 mod flight;
 mod inputs;
 mod parts;
-pub mod season;
+pub mod suite;
 
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -636,7 +636,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TICK", conflicts_with_all = ["junit", "strict"])]
     explain: Option<u64>,
     #[command(flatten)]
-    season: season::Arguments,
+    suite: suite::Arguments,
     #[command(flatten)]
     book: book::Arguments,
 }
@@ -661,9 +661,9 @@ impl Args {
             _ if self.json => Printed::Json,
             _ => Printed::Text,
         };
-        if self.season.is_asked() {
+        if self.suite.is_asked() {
             let [directory] = self.files.as_slice() else { bail!("--baseline takes one directory") };
-            return self.season.run(directory, kind, junit);
+            return self.suite.run(directory, kind, junit);
         }
         self.verify(kind, junit)
     }
@@ -671,7 +671,7 @@ impl Args {
     fn verify(&self, kind: Printed, junit: Option<NewFile>) -> Result<Outcome> {
         let mut files = Vec::new();
         for file in &self.files {
-            if file.is_dir() { files.extend(season::logs_of(file)?) } else { files.push(file.clone()) }
+            if file.is_dir() { files.extend(suite::logs_of(file)?) } else { files.push(file.clone()) }
         }
         let strict = self.strict.unwrap_or(self.junit.is_some());
         let mut answers: Vec<Verified> = Vec::new();

@@ -1,7 +1,5 @@
 //! Tests logs that this build would not produce: every command says so, so that nobody blames the settings for it.
 
-use std::num::NonZeroUsize;
-
 use replay::evaluate::evaluate;
 use replay::evaluate::print_evaluate;
 use replay::log::Recording;
@@ -48,7 +46,7 @@ fn an_evaluation_counts_differences_caused_by_the_build() {
 
 fn swept(flights: &[Recording]) -> SweepReport {
     let points = grid(&["powered.weights.theta=110".parse().unwrap()], &[]).unwrap();
-    sweep(flights, &points, &ReflyOptions::default(), NonZeroUsize::MIN, &mut |_, _| {}).unwrap()
+    sweep(flights, &points, &ReflyOptions::default(), &|_, _| {}).unwrap()
 }
 
 #[test]

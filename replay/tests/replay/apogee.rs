@@ -1,7 +1,6 @@
 //! Tests every what-if question on a whole flight from apogee, as logged by a campaign.
 
-use std::num::NonZeroUsize;
-
+use campaign::run::threads;
 use flight::rules::phase::Phase;
 use proptest::prelude::*;
 use protocol::log::computer_v1::{ComputerFrame, Request};
@@ -232,8 +231,8 @@ fn the_result_of_a_sweep_does_not_depend_on_the_number_of_jobs() {
     let flights = [recording(), crate::simulated::MK2.recording()];
     let points = grid(&[], &["truth.impulse_scale=0.8:1.0:3".parse().unwrap()]).unwrap();
     let fly = |flights: &[Recording], count: usize| {
-        let jobs = NonZeroUsize::new(count).unwrap();
-        sweep(flights, &points, &ReflyOptions::default(), jobs, &mut |_, _| {})
+        let sweep = || sweep(flights, &points, &ReflyOptions::default(), &|_, _| {});
+        threads(Some(count)).unwrap().install(sweep)
     };
     let one = fly(&flights[..1], 1).unwrap();
     assert_eq!(one, fly(&flights[..1], 3).unwrap());

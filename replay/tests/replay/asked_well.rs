@@ -100,19 +100,18 @@ fn no_message_is_printed_twice() {
     }
 }
 
-/// A profile with a key more, and one with a key fewer, are explained.
+/// A profile with a key more, and one with a key fewer, name the key.
 #[test]
-fn a_profile_of_another_release_is_explained() {
+fn a_key_that_a_profile_has_or_lacks_is_named() {
     use crate::flown::{FLIGHT, Recipe, mission_toml, write_log};
     let directory = tempfile::tempdir().unwrap();
     let whole = mission_toml();
     let more = whole.replacen("[powered]", "[powered]\nfuture_key = 1.0", 1);
     let fewer: String = whole.split_inclusive('\n').filter(|line| !line.starts_with("height_m")).collect();
     assert!(more != whole && fewer != whole);
-    for (name, text, words) in [
-        ("more.mcap", more, "this build does not know that key"),
-        ("fewer.mcap", fewer, "this build needs that key"),
-    ] {
+    for (name, text, words) in
+        [("more.mcap", more, "unknown field `future_key`"), ("fewer.mcap", fewer, "missing field `height_m`")]
+    {
         let path = directory.path().join(name);
         let recipe = Recipe { profile_toml: Some(text), with_frames: false };
         std::fs::write(&path, write_log(&FLIGHT.ticks, &recipe).bytes).unwrap();

@@ -1,6 +1,5 @@
 //! Tests logs that are too long, sparse, or full of impossible numbers: an answer or a reason, in bounded memory.
 
-use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::Command;
 
@@ -334,7 +333,7 @@ proptest! {
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
         let points = grid(&["powered.weights.theta=50:90:2".parse().unwrap()], &[]).unwrap();
         let options = ReflyOptions { start: StartAt::Tick(12), ..ReflyOptions::default() };
-        if let Ok(swept) = sweep(&[recording], &points, &options, NonZeroUsize::MIN, &mut |_, _| {}) {
+        if let Ok(swept) = sweep(&[recording], &points, &options, &|_, _| {}) {
             prop_assert_eq!(swept.points.len(), 2);
         }
     }

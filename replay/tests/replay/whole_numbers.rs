@@ -1,7 +1,5 @@
 //! Tests settings that take whole numbers, in a sweep.
 
-use std::num::NonZeroUsize;
-
 use replay::refly::ReflyOptions;
 use replay::refly::vary::{grid, sweep};
 
@@ -15,7 +13,7 @@ fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
     let fly = |range: &str| {
         let points = grid(&[format!("{STEPS}={range}").parse().unwrap()], &[]).unwrap();
         let options = ReflyOptions::default();
-        let report = sweep(&flights, &points, &options, NonZeroUsize::MIN, &mut |_, _| {});
+        let report = sweep(&flights, &points, &options, &|_, _| {});
         report.map_err(|error| format!("{:#}", anyhow::Error::from(error)))
     };
     assert_eq!(fly("10:20:3").unwrap().points, {
@@ -27,5 +25,4 @@ fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
     });
     let refusal = fly("10:11:3").unwrap_err();
     assert!(refusal.contains("powered.solver.max_iterations=10.5"), "{refusal}");
-    assert!(refusal.contains("must be a whole number"), "{refusal}");
 }

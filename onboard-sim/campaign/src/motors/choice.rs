@@ -194,7 +194,7 @@ pub fn choose(
     best(&pairing, landing_kg).map_err(refused)
 }
 
-/// What a team has, and what it can change whatever the motor.
+/// What a team has, and what it can change for any motor.
 #[derive(Debug, Clone)]
 pub struct Team {
     /// The mission of its airframe, in the world of its flights.

@@ -175,7 +175,7 @@ pub enum MissionTextError {
     Write(#[from] toml::ser::Error),
 }
 
-/// Height of the centre of gravity above the pad at which a mission's flight begins, m: at apogee, or where a drone lets go.
+/// Height of the centre of gravity above the pad at which a mission's flight begins, m: at apogee, or where a drone releases it.
 pub fn start_height_m(mission: &Mission) -> f64 {
     let dropped = mission.drop.filter(|_| mission.start.at == StartPoint::Drone);
     dropped.map_or(mission.start.height_m, |drop| drop.height_m)

@@ -181,7 +181,7 @@ pub struct FlyError {
     source: SetUpError,
 }
 
-/// Flies flights 0 to `flights` of each recipe: those of a campaign with the same recipe. `done` is told how many flights
+/// Flies flights 0 to `flights` of each recipe: those of a campaign with the same recipe. `done` gets how many flights
 /// of all are flown.
 ///
 /// # Errors

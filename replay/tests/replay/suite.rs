@@ -1,4 +1,4 @@
-//! Tests `replay verify --baseline` on a season: logs in subdirectories, and a campaign.
+//! Tests `replay verify --baseline` on a suite: logs in subdirectories, and a campaign.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,29 +16,29 @@ use crate::from_apogee::LANDED;
 use crate::simulated::{DISPERSED, MK2};
 use crate::tampered::Held;
 
-struct Season {
+struct Suite {
     directory: TempDir,
 }
 
-impl Season {
+impl Suite {
     /// Two landings of the first week, a rocket of the second.
     fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
-        let season = Self { directory };
+        let suite = Self { directory };
         for (from, to) in [
             (&MK2.log, "week-1/nominal.mcap"),
             (&DISPERSED.log, "week-1/dispersed.mcap"),
             (&LANDED.log, "week-2/mk2.mcap"),
         ] {
-            let to = season.logs().join(to);
+            let to = suite.logs().join(to);
             std::fs::create_dir_all(to.parent().unwrap()).unwrap();
             std::fs::copy(from, to).unwrap();
         }
-        season
+        suite
     }
 
     fn logs(&self) -> PathBuf {
-        self.directory.path().join("season")
+        self.directory.path().join("suite")
     }
 
     fn beside(&self, name: &str) -> PathBuf {
@@ -73,22 +73,22 @@ fn row<'a>(table: &'a str, flight: &str) -> &'a str {
 }
 
 #[test]
-fn an_accepted_season_passes_until_a_flight_gets_worse() {
-    let season = Season::new();
-    let (code, _, stderr) = season.gate(&[]);
+fn an_accepted_suite_passes_until_a_flight_gets_worse() {
+    let suite = Suite::new();
+    let (code, _, stderr) = suite.gate(&[]);
     assert!(code == 2 && stderr.contains("--accept writes a first baseline"), "{stderr}");
-    let (code, stdout, _) = season.gate(&["--accept"]);
-    assert!(code == 0 && stdout.contains("3 new") && season.baseline().exists(), "{stdout}");
-    let (code, stdout, _) = season.gate(&[]);
+    let (code, stdout, _) = suite.gate(&["--accept"]);
+    assert!(code == 0 && stdout.contains("3 new") && suite.baseline().exists(), "{stdout}");
+    let (code, stdout, _) = suite.gate(&[]);
     assert!(code == 0 && stdout.ends_with("PASSED: 3 flights: 3 same\n"), "{stdout}");
     assert!(row(&stdout, "week-2/mk2.mcap").contains("identical"), "{stdout}");
 
     // The baseline had more margin in one flight, less in another, and another ending in the third.
-    season.rewrite("week-1/nominal.mcap", |flight| flight["flown"]["margin"] = "0.99".into());
-    season.rewrite("week-1/dispersed.mcap", |flight| flight["flown"]["margin"] = "-0.5".into());
-    season.rewrite("week-2/mk2.mcap", |flight| flight["flown"]["landed"] = false.into());
-    let junit = season.beside("gate.xml");
-    let (code, stdout, _) = season.gate(&[&format!("--junit={}", junit.display())]);
+    suite.rewrite("week-1/nominal.mcap", |flight| flight["flown"]["margin"] = "0.99".into());
+    suite.rewrite("week-1/dispersed.mcap", |flight| flight["flown"]["margin"] = "-0.5".into());
+    suite.rewrite("week-2/mk2.mcap", |flight| flight["flown"]["landed"] = false.into());
+    let junit = suite.beside("gate.xml");
+    let (code, stdout, _) = suite.gate(&[&format!("--junit={}", junit.display())]);
     assert_eq!(code, 1, "{stdout}");
     for (flight, word) in [
         ("week-1/nominal.mcap", "WORSE"),
@@ -100,54 +100,54 @@ fn an_accepted_season_passes_until_a_flight_gets_worse() {
     assert!(stdout.ends_with("FAILED: 3 flights: 1 better, 1 FLIPPED: lands now, 1 WORSE\n"), "{stdout}");
     assert_eq!(elements(&std::fs::read_to_string(junit).unwrap()), [("testcase", 3), ("failure", 1)]);
 
-    let (code, _, _) = season.gate(&["--accept"]);
-    assert_eq!((code, season.gate(&[]).0), (0, 0));
-    std::fs::remove_file(season.logs().join("week-2/mk2.mcap")).unwrap();
-    let (code, stdout, _) = season.gate(&[]);
+    let (code, _, _) = suite.gate(&["--accept"]);
+    assert_eq!((code, suite.gate(&[]).0), (0, 0));
+    std::fs::remove_file(suite.logs().join("week-2/mk2.mcap")).unwrap();
+    let (code, stdout, _) = suite.gate(&[]);
     assert!(code == 1 && row(&stdout, "week-2/mk2.mcap").contains("MISSING"), "{stdout}");
 }
 
 #[test]
 fn a_gate_overwrites_nothing() {
-    let season = Season::new();
-    let log = season.logs().join("week-2/mk2.mcap");
-    let baseline = season.beside("foreign.json");
+    let suite = Suite::new();
+    let log = suite.logs().join("week-2/mk2.mcap");
+    let baseline = suite.beside("foreign.json");
     std::fs::write(&baseline, "{\n  \"flights\": {}\n}\n").unwrap();
     for (option, file) in
         [("--junit", &log), ("--junit", &baseline), ("--state", &log), ("--state", &baseline)]
     {
         let before = std::fs::read(file).unwrap();
-        let (code, stdout, stderr) = season.gate(&["--accept", &format!("{option}={}", file.display())]);
+        let (code, stdout, stderr) = suite.gate(&["--accept", &format!("{option}={}", file.display())]);
         assert!(code == 2 && stderr.contains(&file.display().to_string()), "{option}: {stdout}{stderr}");
-        assert!(!season.baseline().exists() && std::fs::read(file).unwrap() == before, "{option}");
+        assert!(!suite.baseline().exists() && std::fs::read(file).unwrap() == before, "{option}");
     }
 }
 
 #[test]
 fn a_renamed_flight_passes_and_a_copy_is_told() {
-    let season = Season::new();
-    assert_eq!(season.gate(&["--accept"]).0, 0);
-    let named = |name: &str| season.logs().join(name);
+    let suite = Suite::new();
+    assert_eq!(suite.gate(&["--accept"]).0, 0);
+    let named = |name: &str| suite.logs().join(name);
     std::fs::rename(named("week-1/nominal.mcap"), named("week-2/z.mcap")).unwrap();
     std::fs::copy(named("week-2/mk2.mcap"), named("week-1/a.mcap")).unwrap();
-    let (code, stdout, _) = season.gate(&[]);
+    let (code, stdout, _) = suite.gate(&[]);
     assert!(code == 0 && stdout.ends_with("PASSED: 4 flights: 3 same, 1 copy\n"), "{stdout}");
     assert!(row(&stdout, "week-1/a.mcap").contains("copy"), "{stdout}");
 }
 
 #[test]
 fn a_damaged_log_is_not_accepted_and_never_passes() {
-    let season = Season::new();
-    let log = season.logs().join("week-1/nominal.mcap");
+    let suite = Suite::new();
+    let log = suite.logs().join("week-1/nominal.mcap");
     let mut bytes = std::fs::read(&log).unwrap();
     bytes.truncate(bytes.len() * 2 / 3);
     std::fs::write(&log, bytes).unwrap();
-    let (code, stdout, stderr) = season.gate(&["--accept"]);
+    let (code, stdout, stderr) = suite.gate(&["--accept"]);
     assert!(code == 2 && stderr.contains("nothing is accepted: week-1/nominal.mcap"), "{stdout}{stderr}");
-    assert!(!season.baseline().exists());
+    assert!(!suite.baseline().exists());
     let nothing = r#"{"format": 1, "build": {}, "flights": {}}"#;
-    std::fs::write(season.baseline(), nothing).unwrap();
-    assert_eq!(season.gate(&[]).0, 1);
+    std::fs::write(suite.baseline(), nothing).unwrap();
+    assert_eq!(suite.gate(&[]).0, 1);
 }
 
 #[test]
@@ -165,17 +165,17 @@ fn elements(xml: &str) -> [(&'static str, usize); 2] {
 
 #[test]
 fn a_log_that_diverges_or_breaks_fails() {
-    let season = Season::new();
-    season.gate(&["--accept"]);
+    let suite = Suite::new();
+    suite.gate(&["--accept"]);
     // A forged command: the recorded decisions are not those of this build.
     let mut held = Held::read(&MK2.log);
     let forged = held.messages.iter_mut().filter(|message| message.is_tick()).nth(50).unwrap();
     let mut tick = ComputerFrame::decode(forged.data.as_slice()).unwrap();
     tick.output.fins_rad[0] += 0.01;
     forged.data = tick.encode_to_vec();
-    held.write(&season.logs().join("week-1/nominal.mcap"));
-    std::fs::write(season.logs().join("week-1/dispersed.mcap"), "no log").unwrap();
-    let (code, stdout, _) = season.gate(&[]);
+    held.write(&suite.logs().join("week-1/nominal.mcap"));
+    std::fs::write(suite.logs().join("week-1/dispersed.mcap"), "no log").unwrap();
+    let (code, stdout, _) = suite.gate(&[]);
     assert_eq!(code, 1, "{stdout}");
     assert!(row(&stdout, "week-1/nominal.mcap").contains("DIVERGED"), "{stdout}");
     assert!(row(&stdout, "week-1/dispersed.mcap").contains("LOST"), "{stdout}");
@@ -184,19 +184,19 @@ fn a_log_that_diverges_or_breaks_fails() {
 
 #[test]
 fn a_file_without_a_flight_is_no_flight_of_the_baseline() {
-    let season = Season::new();
+    let suite = Suite::new();
     let empty = write_log(&[], &crate::flown::Recipe { with_frames: false, ..Default::default() }).bytes;
-    let beside = season.logs().join("week-2/ground.mcap");
+    let beside = suite.logs().join("week-2/ground.mcap");
     std::fs::write(&beside, &empty).unwrap();
-    let (code, stdout, _) = season.gate(&["--accept"]);
+    let (code, stdout, _) = suite.gate(&["--accept"]);
     assert!(code == 0 && stdout.ends_with("PASSED: 3 flights: 3 new, 1 no flight\n"), "{stdout}");
-    assert!(!std::fs::read_to_string(season.baseline()).unwrap().contains("ground.mcap"));
-    let (code, stdout, _) = season.gate(&[]);
+    assert!(!std::fs::read_to_string(suite.baseline()).unwrap().contains("ground.mcap"));
+    let (code, stdout, _) = suite.gate(&[]);
     assert!(code == 0 && row(&stdout, "week-2/ground.mcap").contains("no flight"), "{stdout}");
 
     // A flight of the baseline that became an empty file is lost; it did not land differently.
-    std::fs::write(season.logs().join("week-1/nominal.mcap"), &empty).unwrap();
-    let (code, stdout, _) = season.gate(&[]);
+    std::fs::write(suite.logs().join("week-1/nominal.mcap"), &empty).unwrap();
+    let (code, stdout, _) = suite.gate(&[]);
     assert_eq!(code, 1, "{stdout}");
     let nominal = row(&stdout, "week-1/nominal.mcap");
     assert!(nominal.contains("LOST") && nominal.contains("no frames of a flight computer"), "{stdout}");
@@ -220,19 +220,19 @@ fn a_directory_without_a_flight_has_no_answer() {
 
 #[test]
 fn the_answer_depends_neither_on_the_jobs_nor_on_an_interruption() {
-    let season = Season::new();
-    season.gate(&["--accept"]);
-    let one = season.gate(&["--jobs", "1", "--json"]).1;
-    assert_eq!(one, season.gate(&["--jobs", "3", "--json"]).1);
-    let state = season.beside("state.jsonl");
+    let suite = Suite::new();
+    suite.gate(&["--accept"]);
+    let one = suite.gate(&["--jobs", "1", "--json"]).1;
+    assert_eq!(one, suite.gate(&["--jobs", "3", "--json"]).1);
+    let state = suite.beside("state.jsonl");
     let with_state = ["--json", "--state", &state.display().to_string()].map(str::to_owned);
     let with_state: Vec<&str> = with_state.iter().map(String::as_str).collect();
-    assert_eq!(one, season.gate(&with_state).1);
+    assert_eq!(one, suite.gate(&with_state).1);
     // Killed in the middle of a line: the other flights are not flown again, and the answer is the same.
     let kept = std::fs::read_to_string(&state).unwrap();
     assert_eq!(kept.lines().filter(|line| !line.is_empty()).count(), 3);
     std::fs::write(&state, &kept[..kept.len() - 9]).unwrap();
-    assert_eq!(one, season.gate(&with_state).1);
+    assert_eq!(one, suite.gate(&with_state).1);
     let kept = std::fs::read_to_string(&state).unwrap();
     assert_eq!(kept.lines().filter(|line| !line.is_empty()).count(), 4, "one broken, one anew: {kept}");
 }
@@ -266,14 +266,14 @@ fn a_campaign_is_flown_again_from_its_order() {
 /// is no flight.
 #[test]
 fn every_regular_file_counts_once_and_what_is_left_out_is_told() {
-    let season = Season::new();
-    let logs = season.logs();
+    let suite = Suite::new();
+    let logs = suite.logs();
     let pipe = logs.join("pipe.mcap");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     std::os::unix::fs::symlink(".", logs.join("self")).unwrap();
     std::os::unix::fs::symlink("nowhere.mcap", logs.join("dangling.mcap")).unwrap();
     std::os::unix::fs::symlink("week-1/nominal.mcap", logs.join("again.mcap")).unwrap();
-    let (found, skipped) = replay::verify::season::find(&logs).unwrap();
+    let (found, skipped) = replay::verify::suite::find(&logs).unwrap();
     let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
     assert_eq!(names, ["week-1/dispersed.mcap", "week-1/nominal.mcap", "week-2/mk2.mcap"]);
     let skipped: Vec<(&str, &str)> = skipped.iter().map(|left| (left.name.as_str(), left.reason)).collect();
@@ -286,17 +286,17 @@ fn every_regular_file_counts_once_and_what_is_left_out_is_told() {
             ("self", "a directory that is here already"),
         ]
     );
-    let (code, _, stderr) = season.gate(&["--accept"]);
+    let (code, _, stderr) = suite.gate(&["--accept"]);
     assert!(code == 0 && stderr.contains("left out: pipe.mcap: not a regular file"), "{stderr}");
 }
 
 /// A crash whose file is replaced by another flight that landed has not been mended.
 #[test]
 fn another_flight_under_the_name_of_a_crash_is_not_that_crash_landing() {
-    let season = Season::new();
-    assert_eq!(season.gate(&["--accept"]).0, 0);
-    std::fs::copy(&DISPERSED.log, season.logs().join("week-1/nominal.mcap")).unwrap();
-    let (code, table, _) = season.gate(&[]);
+    let suite = Suite::new();
+    assert_eq!(suite.gate(&["--accept"]).0, 0);
+    std::fs::copy(&DISPERSED.log, suite.logs().join("week-1/nominal.mcap")).unwrap();
+    let (code, table, _) = suite.gate(&[]);
     assert_eq!(code, 1, "{table}");
     assert!(table.contains("MISSING") && table.contains("copy") && !table.contains("FLIPPED"), "{table}");
 }

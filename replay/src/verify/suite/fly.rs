@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use campaign::run::in_parallel;
 use flight_log::sortie;
 use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
@@ -16,12 +16,11 @@ use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
-use super::{Checked, FlightResult, Flown, Found, SeasonError};
+use super::{Checked, FlightResult, Flown, Found, SuiteError};
 use crate::digest::digest;
 use crate::info::VerdictFacts;
 use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
-use crate::several::{Finished, several};
 use crate::verify::{Obstacle, Verification, verify};
 
 /// This many of the first records of the flight computer name a flight: its power-up and half a second.
@@ -49,26 +48,21 @@ fn log(path: &Path) -> FlightResult {
             return no_flight(Obstacle::NoTicks.to_string());
         }
         Ok(reports) => {
-            let all = |wanted: Verification| reports.iter().all(|report| report.outcome == wanted);
+            let any = |wanted: Verification| reports.iter().any(|report| report.outcome == wanted);
             let obstacle = reports.iter().find_map(|report| {
                 let cut = || report.cut.as_ref().map(ToString::to_string);
                 let obstacle = report.obstacle.as_ref().map(ToString::to_string);
                 obstacle.or_else(|| report.damage.clone()).or_else(cut)
             });
-            match () {
-                () if reports.iter().any(|report| report.outcome == Verification::Diverged) => {
-                    let first = reports.iter().find_map(|report| report.first_divergence.as_ref());
-                    (
-                        Checked::Diverged,
-                        first.map(|first| format!("first different at frame {}", first.frame)),
-                    )
-                }
-                () if reports.iter().any(|report| report.outcome == Verification::Impossible) => {
-                    let inputs = reports.iter().find_map(|report| report.part("inputs")?.why.clone());
-                    (Checked::Unverified, inputs)
-                }
-                () if all(Verification::Identical) => (Checked::Identical, None),
-                () => (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned()))),
+            if any(Verification::Diverged) {
+                let first = reports.iter().find_map(|report| report.first_divergence.as_ref());
+                (Checked::Diverged, first.map(|first| format!("first different at frame {}", first.frame)))
+            } else if any(Verification::Impossible) {
+                (Checked::Unverified, reports.iter().find_map(|report| report.part("inputs")?.why.clone()))
+            } else if reports.iter().all(|report| report.outcome == Verification::Identical) {
+                (Checked::Identical, None)
+            } else {
+                (Checked::Unverified, obstacle.or_else(|| Some("not the whole flight".to_owned())))
             }
         }
     };
@@ -150,18 +144,18 @@ struct Row {
 }
 
 /// The numbers of the flights in a campaign's directory.
-pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SeasonError> {
+pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SuiteError> {
     Ok(rows(directory)?.into_iter().map(|row| row.number).collect())
 }
 
 /// Flies one flight of a campaign.
-fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SeasonError> {
+fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SuiteError> {
     let recipe = recipe(directory)?;
     let row = rows(directory)?.into_iter().find(|row| row.number == number).ok_or_else(|| {
-        SeasonError::Campaign { path: directory.join(ROWS), reason: format!("has no flight {number}") }
+        SuiteError::Campaign { path: directory.join(ROWS), reason: format!("has no flight {number}") }
     })?;
     let mut flight = Sortie::new(&recipe, number)
-        .map_err(|error| SeasonError::Campaign { path: directory.to_owned(), reason: error.to_string() })?;
+        .map_err(|error| SuiteError::Campaign { path: directory.to_owned(), reason: error.to_string() })?;
     let outcome = flight.run();
     let bits = |value: Option<f64>| value.map(f64::to_bits);
     let touchdown = outcome.touchdown.as_ref();
@@ -185,8 +179,8 @@ fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SeasonErr
     })
 }
 
-fn recipe(directory: &Path) -> Result<Recipe, SeasonError> {
-    let wrong = |name: &str, reason: String| SeasonError::Campaign { path: directory.join(name), reason };
+fn recipe(directory: &Path) -> Result<Recipe, SuiteError> {
+    let wrong = |name: &str, reason: String| SuiteError::Campaign { path: directory.join(name), reason };
     let manifest: Manifest = serde_json::from_str(&text(directory.join(MANIFEST))?)
         .map_err(|error| wrong(MANIFEST, error.to_string()))?;
     let mission_toml = text(directory.join("mission.toml"))?;
@@ -211,27 +205,26 @@ fn recipe(directory: &Path) -> Result<Recipe, SeasonError> {
     })
 }
 
-fn rows(directory: &Path) -> Result<Vec<Row>, SeasonError> {
+fn rows(directory: &Path) -> Result<Vec<Row>, SuiteError> {
     let path = directory.join(ROWS);
     let csv = text(path.clone())?;
     let rows: Result<Vec<Row>, csv::Error> = csv::Reader::from_reader(csv.as_bytes()).deserialize().collect();
-    rows.map_err(|error| SeasonError::Campaign { path, reason: error.to_string() })
+    rows.map_err(|error| SuiteError::Campaign { path, reason: error.to_string() })
 }
 
-fn text(path: PathBuf) -> Result<String, SeasonError> {
-    std::fs::read_to_string(&path).map_err(|source| SeasonError::Read { path, source })
+fn text(path: PathBuf) -> Result<String, SuiteError> {
+    std::fs::read_to_string(&path).map_err(|source| SuiteError::Read { path, source })
 }
 
-/// The outcome of every flight, `jobs` at a time; stops early if `stop` is set, with the outcomes until then.
+/// The outcome of every flight; stops early if `stop` is set, with the outcomes until then.
 ///
 /// # Errors
 /// The state cannot be written.
 pub fn fly_all(
     flights: &[Found],
-    jobs: NonZeroUsize,
-    state: &mut SeasonState,
+    state: &mut SuiteState,
     stop: &AtomicBool,
-    progress: &mut (dyn FnMut(usize, usize) + Send),
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> io::Result<BTreeMap<String, FlightResult>> {
     let mut outcomes = BTreeMap::new();
     let mut missing = Vec::new();
@@ -244,9 +237,9 @@ pub fn fly_all(
             None => missing.push((found, key)),
         }
     }
-    let finished = Finished::new(outcomes.len(), flights.len(), progress);
+    let known = outcomes.len();
     let state = Mutex::new(state);
-    let results = several(&missing, jobs, |(found, key)| -> io::Result<_> {
+    let fly_noted = |(found, key): &(&Found, Option<String>)| -> io::Result<_> {
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
@@ -256,10 +249,9 @@ pub fn fly_all(
             let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
             state.note(key, outcome.clone()).inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
         }
-        finished.one_more();
         Ok(Some((found.name.clone(), outcome)))
-    });
-    for result in results {
+    };
+    for result in in_parallel(&missing, fly_noted, &|done| progress(known + done, flights.len())) {
         outcomes.extend(result?);
     }
     Ok(outcomes)
@@ -267,7 +259,7 @@ pub fn fly_all(
 
 /// The outcomes known so far, by what was flown and by which build.
 #[derive(Debug, Default)]
-pub struct SeasonState {
+pub struct SuiteState {
     known: BTreeMap<String, FlightResult>,
     file: Option<File>,
 }
@@ -282,7 +274,7 @@ struct Line {
 /// How every line begins that is not empty.
 const LINE_BEGINS: &str = "{\"key\":";
 
-impl SeasonState {
+impl SuiteState {
     /// A state in memory only.
     pub fn in_memory() -> Self {
         Self::default()
@@ -301,7 +293,7 @@ impl SeasonState {
             if let Ok(Line { key, outcome }) = serde_json::from_str(&line) {
                 known.insert(key, outcome);
             } else if !(line.starts_with(LINE_BEGINS) || LINE_BEGINS.starts_with(&line)) {
-                let words = "holds something else than the state of a season; give another file";
+                let words = "holds something else than the state of a suite; give another file";
                 return Err(io::Error::new(io::ErrorKind::InvalidData, words));
             }
         }

@@ -10,7 +10,7 @@ use super::fly::{MANIFEST, flights_of};
 
 /// Why there is nothing to hold against a baseline.
 #[derive(Debug, thiserror::Error)]
-pub enum SeasonError {
+pub enum SuiteError {
     /// A directory or a file of a campaign cannot be read.
     #[error("{}: cannot be read", path.display())]
     Read {
@@ -57,14 +57,14 @@ pub struct Skipped {
 /// Finds every flight of a directory, by name, and what was left out.
 ///
 /// # Errors
-/// See [`SeasonError`].
-pub fn find(directory: &Path) -> Result<(Vec<Found>, Vec<Skipped>), SeasonError> {
+/// See [`SuiteError`].
+pub fn find(directory: &Path) -> Result<(Vec<Found>, Vec<Skipped>), SuiteError> {
     let mut search =
         Search { root: directory, seen: BTreeSet::new(), found: Vec::new(), skipped: Vec::new() };
     search.walk(directory)?;
     let Search { mut found, mut skipped, .. } = search;
     if found.is_empty() {
-        return Err(SeasonError::Nothing { path: directory.to_owned() });
+        return Err(SuiteError::Nothing { path: directory.to_owned() });
     }
     found.sort_by(|a, b| (&a.path, a.number).cmp(&(&b.path, b.number)));
     skipped.sort_by(|a, b| a.name.cmp(&b.name));
@@ -80,8 +80,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn walk(&mut self, directory: &Path) -> Result<(), SeasonError> {
-        let failed = |source| SeasonError::Read { path: directory.to_owned(), source };
+    fn walk(&mut self, directory: &Path) -> Result<(), SuiteError> {
+        let failed = |source| SuiteError::Read { path: directory.to_owned(), source };
         self.seen.insert(directory.canonicalize().map_err(failed)?);
         if directory.join(MANIFEST).is_file() {
             for number in flights_of(directory)? {
@@ -104,7 +104,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    fn take(&mut self, path: PathBuf) -> Result<(), SeasonError> {
+    fn take(&mut self, path: PathBuf) -> Result<(), SuiteError> {
         let is_log = path.extension().is_some_and(|ending| ending == "mcap");
         let Ok((real, kind)) = path.canonicalize().and_then(|real| Ok((real, path.metadata()?))) else {
             if is_log {

@@ -16,13 +16,13 @@ use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
-pub use find::{Found, SeasonError, Skipped, find};
-pub use fly::{SeasonState, fly_all};
+pub use find::{Found, Skipped, SuiteError, find};
+pub use fly::{SuiteState, fly_all};
 use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
 
 use super::Printed;
-use crate::cli::{Outcome, answer, jobs, say, show_progress, stop_on_interrupt};
+use crate::cli::{Outcome, answer, in_pool, say, show_progress, stop_on_interrupt};
 use crate::output::{Destination, NewFile, Overwrite};
 use crate::print::{JunitCase, JunitOutcome, counted, print_json, print_junit, shown, write_junit};
 
@@ -73,8 +73,7 @@ impl Flown {
 /// What this build makes of a flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FlightResult {
-    /// Which flight it is, by its content; `None` if the file has none, and in baselines of earlier releases.
-    #[serde(default)]
+    /// Which flight it is, by its content; `None` if the file has none.
     pub flight: Option<String>,
     pub checked: Checked,
     /// `None` if it did not come down, or cannot be flown again.
@@ -303,11 +302,8 @@ fn change(before: &FlightResult, now: &FlightResult, tolerance: f64) -> Change {
     let unknown = |outcome: &FlightResult| {
         outcome.flown.is_none() && matches!(outcome.checked, Checked::Unverified | Checked::NoFlight)
     };
-    match (unknown(before), unknown(now)) {
-        (false, true) => return Change::Lost,
-        // Earlier releases accepted a file without a flight.
-        (true, true) if now.checked == Checked::NoFlight => return Change::NoFlight,
-        _ => {}
+    if unknown(now) && !unknown(before) {
+        return Change::Lost;
     }
     let landed = |outcome: &FlightResult| outcome.flown.as_ref().is_some_and(|flown| flown.landed);
     match (landed(before), landed(now)) {
@@ -334,7 +330,7 @@ const SAME_SHOWN: usize = 20;
 
 /// A gate as JSON has it.
 #[derive(Debug, Serialize)]
-pub struct SeasonReport<'a> {
+pub struct SuiteReport<'a> {
     /// No flight fails.
     pub passed: bool,
     pub interrupted: bool,
@@ -345,7 +341,7 @@ pub struct SeasonReport<'a> {
 ///
 /// # Errors
 /// The output failed.
-pub fn print_season(report: &SeasonReport, output: &mut impl Write) -> io::Result<()> {
+pub fn print_suite(report: &SuiteReport, output: &mut impl Write) -> io::Result<()> {
     let width =
         report.flights.iter().map(|judged| judged.name.chars().count()).max().unwrap_or(0).clamp(6, 40);
     writeln!(
@@ -375,7 +371,7 @@ pub fn print_season(report: &SeasonReport, output: &mut impl Write) -> io::Resul
 }
 
 /// One line: how many of which change.
-fn summary(report: &SeasonReport) -> String {
+fn summary(report: &SuiteReport) -> String {
     let all = [
         Change::Same,
         Change::Better,
@@ -397,16 +393,16 @@ fn summary(report: &SeasonReport) -> String {
         })
         .collect();
     let word = match report {
-        SeasonReport { interrupted: true, .. } => "INTERRUPTED",
-        SeasonReport { passed: true, .. } => "PASSED",
-        SeasonReport { passed: false, .. } => "FAILED",
+        SuiteReport { interrupted: true, .. } => "INTERRUPTED",
+        SuiteReport { passed: true, .. } => "PASSED",
+        SuiteReport { passed: false, .. } => "FAILED",
     };
     let flights = report.flights.iter().filter(|judged| judged.change != Change::NoFlight).count();
     format!("{word}: {}: {}", counted(flights as u64, "flight"), counts.join(", "))
 }
 
 /// Every flight as a case.
-pub fn season_cases(flights: &[Judged], may_diverge: bool) -> Vec<JunitCase> {
+pub fn suite_cases(flights: &[Judged], may_diverge: bool) -> Vec<JunitCase> {
     let case = |judged: &Judged| {
         let words = format!(
             "{}; margin {} -> {}",
@@ -494,13 +490,13 @@ impl Arguments {
             say(&format!("left out: {name}: {reason}"));
         }
         let mut state = match &self.state {
-            None => SeasonState::in_memory(),
+            None => SuiteState::in_memory(),
             Some(path) => {
-                SeasonState::open(path).with_context(|| format!("{}: cannot be used", path.display()))?
+                SuiteState::open(path).with_context(|| format!("{}: cannot be used", path.display()))?
             }
         };
         let stop = stop_on_interrupt()?;
-        let outcomes = fly_all(&flights, jobs(self.jobs), &mut state, &stop, &mut show_progress)
+        let outcomes = in_pool(self.jobs, || fly_all(&flights, &mut state, &stop, &show_progress))?
             .context("the state file cannot be written")?;
         let interrupted = stop.load(Ordering::Relaxed) && outcomes.len() < flights.len();
         let mut judged = judge(&outcomes, &baseline, self.tolerance);
@@ -515,13 +511,13 @@ impl Arguments {
         }
         let passed = !interrupted && !judged.iter().any(|judged| judged.fails(self.may_diverge));
         if let Some(file) = junit {
-            write_junit("season", season_cases(&judged, self.may_diverge), file)?;
+            write_junit("suite", suite_cases(&judged, self.may_diverge), file)?;
         }
-        let report = SeasonReport { passed, interrupted, flights: &judged };
+        let report = SuiteReport { passed, interrupted, flights: &judged };
         answer(|output| match kind {
-            Printed::Text => print_season(&report, output),
+            Printed::Text => print_suite(&report, output),
             Printed::Json => print_json(&report, output),
-            Printed::Junit => print_junit("season", season_cases(&judged, self.may_diverge), output),
+            Printed::Junit => print_junit("suite", suite_cases(&judged, self.may_diverge), output),
         })?;
         if self.accept && !interrupted {
             accepted(&outcomes)?;
@@ -548,14 +544,14 @@ fn accepted(outcomes: &BTreeMap<String, FlightResult>) -> Result<()> {
 }
 
 /// Refuses a directory whose logs hold no flight.
-fn some_flight(directory: &Path, outcomes: &BTreeMap<String, FlightResult>) -> Result<(), SeasonError> {
+fn some_flight(directory: &Path, outcomes: &BTreeMap<String, FlightResult>) -> Result<(), SuiteError> {
     if outcomes.values().any(|outcome| outcome.checked != Checked::NoFlight) {
         return Ok(());
     }
     let (name, first) = outcomes.first_key_value().map_or_else(Default::default, |(name, outcome)| {
         (name.clone(), outcome.problem.clone().unwrap_or_default())
     });
-    Err(SeasonError::NoFlights { path: directory.to_owned(), name, why: first })
+    Err(SuiteError::NoFlights { path: directory.to_owned(), name, why: first })
 }
 
 /// The logs of a directory.
@@ -623,20 +619,13 @@ mod tests {
         assert_eq!(names, ["a#9", "a#10", "a.mcap"]);
     }
 
-    /// It does not fail, whether it is new or an earlier release accepted it as a flight that cannot be verified.
     #[test]
-    fn a_file_without_a_flight_is_called_that() {
-        let without = |checked| {
-            BTreeMap::from([(
-                "ground.mcap".to_owned(),
-                FlightResult { flight: None, checked, flown: None, problem: None },
-            )])
-        };
-        for before in [BTreeMap::new(), without(Checked::Unverified)] {
-            let judged = judge(&without(Checked::NoFlight), &Baseline::of(before), 0.02).remove(0);
-            assert_eq!((judged.change, judged.fails(false)), (Change::NoFlight, false));
-        }
-        assert_eq!(Baseline::of(without(Checked::NoFlight)).flights, BTreeMap::new());
+    fn a_file_without_a_flight_is_called_that_and_does_not_fail() {
+        let none = FlightResult { flight: None, checked: Checked::NoFlight, flown: None, problem: None };
+        let without = BTreeMap::from([("ground.mcap".to_owned(), none)]);
+        let judged = judge(&without, &Baseline::default(), 0.02).remove(0);
+        assert_eq!((judged.change, judged.fails(false)), (Change::NoFlight, false));
+        assert_eq!(Baseline::of(without).flights, BTreeMap::new());
     }
 
     #[test]
