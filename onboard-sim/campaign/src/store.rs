@@ -378,13 +378,25 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
 }
 
 /// The manifest of a directory.
-///
-/// # Errors
-/// There is no manifest, or it does not parse.
-pub fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
+fn read_manifest(directory: &Path) -> Result<Manifest, StoreError> {
     let path = directory.join("manifest.json");
     let text = fs::read_to_string(&path).map_err(file_error(&path))?;
     serde_json::from_str(&text).map_err(|error| StoreError::Content { path, message: error.to_string() })
+}
+
+/// The order whose results a directory holds, from the texts in it.
+///
+/// # Errors
+/// A text is missing, or this program does not know what it orders.
+pub fn order_of(directory: &Path) -> Result<Order, StoreError> {
+    let text = |name: &str| {
+        let path = directory.join(name);
+        fs::read_to_string(&path).map_err(file_error(&path))
+    };
+    let manifest = read_manifest(directory)?;
+    manifest
+        .order(&text("mission.toml")?, &text("dispersion.toml")?)
+        .map_err(|error| StoreError::Content { path: directory.to_owned(), message: error.to_string() })
 }
 
 /// Merges the parts of a campaign into one directory. The order is rebuilt from the texts in the parts.
@@ -406,13 +418,7 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<(Store, Order), StoreError
             return Err(StoreError::OtherOrder { path: part.clone(), difference });
         }
     }
-    let text = |name: &str| {
-        let path = first.join(name);
-        fs::read_to_string(&path).map_err(file_error(&path))
-    };
-    let order = manifest
-        .order(&text("mission.toml")?, &text("dispersion.toml")?)
-        .map_err(|error| StoreError::Content { path: first.clone(), message: error.to_string() })?;
+    let order = order_of(first)?;
     let store = Store::open(out, &order, &manifest)?;
     for chunk in store.chunks() {
         let mut found: Option<(Vec<u8>, &PathBuf)> = None;

@@ -562,7 +562,7 @@ fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> 
     row(output, "solve time", &text)
 }
 
-fn solve_time_text(times: &SolveTimes) -> String {
+pub(crate) fn solve_time_text(times: &SolveTimes) -> String {
     format!(
         "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it",
         times.median_s * 1e3,

@@ -46,9 +46,7 @@ fn solve_times_are_printed_only_if_they_were_measured() {
     assert!(code == 0 && stdout.contains("deadline 5 ms"), "{stdout}");
     assert!(stdout.contains(&format!("of {count} frames that planned")), "{stdout}");
     let page = report(&MK2.log).unwrap().html;
-    for part in
-        ["solve time, 99 of 100 within", "frames over their deadline", "Duration of each frame with a plan"]
-    {
+    for part in ["deadline 5 ms", "Duration of each frame with a plan"] {
         assert!(page.contains(part), "{part}");
     }
     assert!(!page.contains("without a clock"));

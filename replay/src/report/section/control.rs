@@ -6,7 +6,7 @@ use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 
 use super::{COMPONENTS, rms_and_max};
-use crate::info::{Info, SolveTimes};
+use crate::info::{Info, solve_time_text};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, paragraph, table};
 use crate::report::track::{AHEAD_S, Decision, EstimateError, Flight, InSpace, Plant};
@@ -225,18 +225,6 @@ fn intervals<'a>(moving: &'a [&Plant]) -> impl Iterator<Item = (&'a Plant, &'a P
     })
 }
 
-/// Durations as rows of a table.
-fn time_rows(times: &SolveTimes) -> [Vec<String>; 5] {
-    let milliseconds = |s: f64| format!("{:.3} ms", 1e3 * s);
-    [
-        vec!["solve time, median".to_owned(), milliseconds(times.median_s)],
-        vec!["solve time, 99 of 100 within".to_owned(), milliseconds(times.p99_s)],
-        vec!["solve time, longest".to_owned(), milliseconds(times.max_s)],
-        vec!["deadline".to_owned(), milliseconds(times.deadline_s)],
-        vec!["frames over their deadline".to_owned(), times.over_deadline.to_string()],
-    ]
-}
-
 pub(super) fn solver(flight: &Flight, info: &Info) -> String {
     let idle = u32::from(ControlLevel::Idle.index());
     let plans: Vec<&Decision> = flight.thoughts.iter().filter(|thought| thought.level != idle).collect();
@@ -272,8 +260,7 @@ pub(super) fn solver(flight: &Flight, info: &Info) -> String {
                 "This flight was simulated without a clock: solve times and deadlines are not in its log.",
             );
     };
-    rows.push(vec!["frames timed, in descent and burn".to_owned(), times.count.to_string()]);
-    rows.extend(time_rows(&times));
+    rows.push(vec!["solve time".to_owned(), solve_time_text(&times)]);
     let timings = flight.recording.timings.iter();
     let points = timings.map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s)).collect();
     pictures

@@ -37,8 +37,8 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         section("Predicted against actual touchdown", control::prediction(flight)),
         section("Thrust expected against inferred", control::thrust(flight)),
         section("Estimator error", control::estimator(flight)),
-        section("Link", outcome::link(flight, info)),
-        section("Log", outcome::completeness(info)),
+        section("Link", outcome::link(flight)),
+        section("Log", outcome::described(info)),
     ]);
     all
 }

@@ -3,7 +3,7 @@
 use flight::rules::phase::Phase;
 
 use super::rms_and_max;
-use crate::info::{Info, PhaseSpan, VerdictLimit};
+use crate::info::{Info, PhaseSpan, VerdictLimit, print_info};
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, escaped, paragraph, put, table, table_of_limits};
@@ -68,56 +68,12 @@ fn bar(limit: &VerdictLimit) -> String {
     )
 }
 
-pub(super) fn completeness(info: &Info) -> String {
-    let found = &info.completeness;
-    let complete = if found.complete {
-        "<span class=\"good\">yes: ended properly, every checksum holds</span>".to_owned()
-    } else {
-        "<span class=\"bad\">NO</span>".to_owned()
-    };
-    let mut rows = vec![
-        vec!["complete".to_owned(), complete],
-        vec!["grade".to_owned(), escaped(&format!("{}: {}", info.grade.level.name(), info.grade.reason))],
-    ];
-    let mut row = |name: &str, value: Option<String>| {
-        rows.extend(value.map(|value| vec![name.to_owned(), escaped(&value)]));
-    };
-    row("damage", found.damage.clone());
-    row("the flight", found.cut.as_ref().map(ToString::to_string));
-    let readable_s = found.readable_until_s.filter(|_| found.damage.is_some());
-    row("readable until", readable_s.map(|until_s| format!("{until_s:.3} s after the first record")));
-    row("lost after that", found.missing_s.map(|missing_s| format!("{missing_s:.3} s")));
-    row("messages missing", Some(found.messages_lost.to_string()));
-    row("size", info.size_bytes.map(|bytes| format!("{bytes} bytes")));
-    row(
-        "profile",
-        info.profile.as_ref().map(|profile| {
-            let words = profile.name.clone().zip(profile.summary.clone());
-            words.map_or_else(
-                || format!("cannot be used: {}", profile.problem.clone().unwrap_or_default()),
-                |(name, summary)| format!("{name}: {summary}"),
-            )
-        }),
-    );
-    row("written by", Some(info.library.clone()));
-    for (fact, value) in &info.build {
-        row(&format!("build: {fact}"), Some(value.clone()));
-    }
-    let channels: Vec<Vec<String>> = info
-        .channels
-        .iter()
-        .map(|channel| {
-            vec![
-                escaped(&channel.topic),
-                escaped(&channel.schema),
-                channel.messages.to_string(),
-                channel.lost.to_string(),
-                channel.unreadable.to_string(),
-            ]
-        })
-        .collect();
-    table(&["", ""], &rows)
-        + &table(&["channel", "schema", "#messages", "#missing", "#unreadable"], &channels)
+/// What `info` says of the log.
+pub(super) fn described(info: &Info) -> String {
+    let mut text = Vec::new();
+    // Writing into memory cannot fail.
+    let _ = print_info(info, &mut text);
+    format!("<pre>{}</pre>\n", escaped(&String::from_utf8_lossy(&text)))
 }
 
 /// Most events that a page lists.
@@ -149,8 +105,7 @@ pub(super) fn phases(flight: &Flight, info: &Info) -> String {
     let Some(timeline) = info.phases.first() else {
         return paragraph("The log has no phases.");
     };
-    let mut html = strip(flight, &timeline.spans);
-    html.push_str(&times(flight, &timeline.spans));
+    let html = strip(flight, &timeline.spans);
     let known = moments(flight).into_iter().filter_map(|(what, time_s)| Some((what, time_s?)));
     let mut rows: Vec<Vec<String>> =
         known.map(|(what, time_s)| vec![escaped(what), format!("{time_s:.3} s")]).collect();
@@ -205,20 +160,6 @@ fn strip(flight: &Flight, spans: &[PhaseSpan]) -> String {
     svg + &format!("<p class=\"muted\">Times in {}.</p>\n", flight.axis_name())
 }
 
-/// The same in numbers, for narrow screens and screen readers.
-fn times(flight: &Flight, spans: &[PhaseSpan]) -> String {
-    let seconds = |time_s: f64| format!("{:.2} s", rounded(time_s));
-    let rows: Vec<Vec<String>> = spans
-        .iter()
-        .enumerate()
-        .map(|(place, span)| {
-            let until_s = spans.get(place + 1).map_or(span.until_s, |next| next.from_s);
-            vec![escaped(&span.phase), seconds(flight.axis_s(span.from_s)), seconds(until_s - span.from_s)]
-        })
-        .collect();
-    table(&["phase", "#from", "#for"], &rows)
-}
-
 /// To hundredths, without a negative zero.
 fn rounded(time_s: f64) -> f64 {
     (100.0 * time_s).round() / 100.0 + 0.0
@@ -253,33 +194,10 @@ fn thrust_through_weight_s(flight: &Flight) -> Option<f64> {
     after.phase.map(|_| after.time_s)
 }
 
-pub(super) fn link(flight: &Flight, info: &Info) -> String {
-    let frames: Vec<Vec<String>> = info
-        .channels
-        .iter()
-        .filter(|channel| channel.message_encoding == protocol::log::record::ENCODING_MAVLINK)
-        .map(|channel| {
-            let fact = |key: &str| channel.metadata.get(key).map(|text| escaped(text)).unwrap_or_default();
-            vec![
-                escaped(&channel.topic),
-                fact("endpoint"),
-                fact("link"),
-                channel.messages.to_string(),
-                channel.lost.to_string(),
-            ]
-        })
-        .collect();
+pub(super) fn link(flight: &Flight) -> String {
     let heard = &flight.recording.telemetry;
-    if frames.is_empty() && heard.is_empty() {
-        return paragraph("The log has neither frames nor a ground station's telemetry.");
-    }
-    let mut html = String::new();
-    if !frames.is_empty() {
-        html.push_str(&table(&["frames", "recorded by", "link", "#count", "#missing in the log"], &frames));
-    }
     if heard.is_empty() {
-        return html
-            + &paragraph("No ground station wrote into this log, so the link's age and loss are not known.");
+        return paragraph("No ground station wrote into this log, so the link's age and loss are not known.");
     }
     let of = |value: &dyn Fn(&protocol::log::v1::Telemetry) -> Option<f64>| -> Vec<(f64, f64)> {
         heard.iter().filter_map(|told| Some((flight.axis_s(told.time_s), value(told)?))).collect()
@@ -302,6 +220,5 @@ pub(super) fn link(flight: &Flight, info: &Info) -> String {
                 .svg(),
         );
     }
-    html.push_str(&table(&["as the ground station knew it", "#largest"], &rows));
-    html + &charts(&pictures)
+    table(&["as the ground station knew it", "#largest"], &rows) + &charts(&pictures)
 }

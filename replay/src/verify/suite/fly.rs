@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use campaign::row::{Row, from_csv};
 use campaign::run::in_parallel;
+use campaign::store::{self, StoreError};
 use flight_log::sortie;
 use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
-use sim::dispersion::Dispersion;
-use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 use super::{Checked, FlightResult, Flown, Found, SuiteError};
@@ -118,30 +118,9 @@ fn words(error: impl std::error::Error) -> String {
     words
 }
 
-/// The file that makes a directory a campaign's.
+/// The files of a campaign.
 pub(super) const MANIFEST: &str = "manifest.json";
 const ROWS: &str = "flights.csv";
-
-/// The facts of a campaign that its flights are made from.
-#[derive(Deserialize)]
-struct Manifest {
-    dispersion: String,
-    seed: u64,
-    controller: String,
-    steered: bool,
-    faults: Vec<String>,
-}
-
-/// What a row says about how its flight ended.
-#[derive(Deserialize)]
-struct Row {
-    number: u64,
-    legs: bool,
-    strict: bool,
-    failure: String,
-    touchdown_time_s: Option<f64>,
-    touchdown_vertical_m_s: Option<f64>,
-}
 
 /// The numbers of the flights in a campaign's directory.
 pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SuiteError> {
@@ -150,7 +129,9 @@ pub(super) fn flights_of(directory: &Path) -> Result<Vec<u64>, SuiteError> {
 
 /// Flies one flight of a campaign.
 fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SuiteError> {
-    let recipe = recipe(directory)?;
+    let campaign =
+        |error: StoreError| SuiteError::Campaign { path: directory.to_owned(), reason: words(error) };
+    let recipe = store::order_of(directory).map_err(campaign)?.recipe;
     let row = rows(directory)?.into_iter().find(|row| row.number == number).ok_or_else(|| {
         SuiteError::Campaign { path: directory.join(ROWS), reason: format!("has no flight {number}") }
     })?;
@@ -179,41 +160,10 @@ fn fly_campaign(directory: &Path, number: u64) -> Result<FlightResult, SuiteErro
     })
 }
 
-fn recipe(directory: &Path) -> Result<Recipe, SuiteError> {
-    let wrong = |name: &str, reason: String| SuiteError::Campaign { path: directory.join(name), reason };
-    let manifest: Manifest = serde_json::from_str(&text(directory.join(MANIFEST))?)
-        .map_err(|error| wrong(MANIFEST, error.to_string()))?;
-    let mission_toml = text(directory.join("mission.toml"))?;
-    let dispersion_toml = text(directory.join("dispersion.toml"))?;
-    let mut mission = flight::vehicles::mission::from_toml(&mission_toml, "mission.toml")
-        .map_err(|error| wrong("mission.toml", error.to_string()))?;
-    mission.steered = manifest.steered;
-    let faults = manifest.faults.iter().map(|fault| fault.parse().map_err(|error| format!("{error}")));
-    Ok(Recipe {
-        mission,
-        mission_toml,
-        dispersion: Dispersion::from_toml(&dispersion_toml, "dispersion.toml")
-            .map_err(|error| wrong("dispersion.toml", error.to_string()))?,
-        dispersion_name: manifest.dispersion,
-        dispersion_toml,
-        seed: manifest.seed,
-        controller: manifest
-            .controller
-            .parse()
-            .map_err(|error| wrong(MANIFEST, format!("controller: {error}")))?,
-        faults: faults.collect::<Result<_, _>>().map_err(|reason| wrong(MANIFEST, reason))?,
-    })
-}
-
 fn rows(directory: &Path) -> Result<Vec<Row>, SuiteError> {
     let path = directory.join(ROWS);
-    let csv = text(path.clone())?;
-    let rows: Result<Vec<Row>, csv::Error> = csv::Reader::from_reader(csv.as_bytes()).deserialize().collect();
-    rows.map_err(|error| SuiteError::Campaign { path, reason: error.to_string() })
-}
-
-fn text(path: PathBuf) -> Result<String, SuiteError> {
-    std::fs::read_to_string(&path).map_err(|source| SuiteError::Read { path, source })
+    let csv = std::fs::read(&path).map_err(|source| SuiteError::Read { path: path.clone(), source })?;
+    from_csv(&csv).map_err(|error| SuiteError::Campaign { path, reason: error.to_string() })
 }
 
 /// The outcome of every flight; stops early if `stop` is set, with the outcomes until then.
