@@ -5,7 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::builder::NonEmptyStringValueParser;
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
@@ -27,89 +27,17 @@ const DEMO_SEED: u64 = 1;
 /// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
 /// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended.
 #[derive(Debug, Clone, Parser)]
-#[command(name = "ground", version, after_help = exit::HELP)]
+#[command(name = "ground", version, after_help = exit::HELP, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to run instead of a station with its screen.
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
-    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
-    #[arg(long, value_name = "LINK", global = true)]
-    pub connect: Vec<LinkAddress>,
+    #[command(flatten)]
+    pub station: StationArgs,
 
-    /// This station's own MAVLink system id; every station on a link needs a different one. Default: 255.
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
-    pub sysid: Option<u8>,
-
-    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1; for a replay the
-    /// first vehicle in the log.
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..), global = true)]
-    pub vehicle_sysid: Option<u8>,
-
-    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen` creates a key.
-    #[arg(long, value_name = "FILE", global = true)]
-    pub key: Option<PathBuf>,
-
-    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
-    /// share. Without the name of somebody who has a key this station only looks on.
-    #[arg(long, value_name = "FILE", global = true)]
-    pub crew: Option<PathBuf>,
-
-    /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
-    #[arg(long, value_name = "NAME|FILE", global = true)]
-    pub mission: Option<String>,
-
-    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
-    #[arg(long, value_name = "FILE", global = true)]
-    pub checklist: Option<PathBuf>,
-
-    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
-    pub pad: Option<Degrees>,
-
-    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true, global = true)]
-    pub here: Option<Degrees>,
-
-    /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
-    ///
-    /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
-    #[arg(long, value_name = "FILE|none", global = true)]
-    pub log: Option<LogChoice>,
-
-    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2.
-    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect", global = true)]
-    pub profile: Option<String>,
-
-    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
-    /// --mission: where that flight should begin; arming is refused if it begins elsewhere.
-    #[arg(long, value_name = "START", global = true)]
-    pub start: Option<StartPoint>,
-
-    /// Demonstration: seed of its dispersions. Default: 1.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", global = true)]
-    pub seed: Option<u64>,
-
-    /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
-    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", global = true)]
-    pub speed: Option<Speed>,
-
-    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
-    ///
-    /// Default: with --connect the name of the log with this extension; the demonstration writes none.
-    #[arg(long, value_name = "FILE|none", global = true)]
-    pub tlog: Option<LogChoice>,
-
-    /// Settings file (TOML); `ground config example` prints one.
-    ///
-    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
-    #[arg(long, value_name = "FILE", global = true)]
-    pub config: Option<PathBuf>,
-
-    /// `ground daemon`: fly the demonstration even if the settings name a link.
-    #[arg(long, conflicts_with = "connect", global = true)]
-    pub demo: bool,
+    #[command(flatten)]
+    pub screen: ScreenArgs,
 
     /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
     /// touchdown-*.mcap in the current directory.
@@ -119,55 +47,6 @@ pub struct Cli {
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
     #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
     pub from: Option<ReplayFrom>,
-
-    /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
-    #[arg(long, value_name = "PATH", global = true)]
-    pub socket: Option<PathBuf>,
-
-    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
-    #[arg(long, value_name = "ADDRESS:PORT", global = true)]
-    pub watchers: Option<String>,
-
-    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
-    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), global = true)]
-    pub operator: Option<String>,
-
-    /// Ring the terminal's bell on an alarm. Default: true.
-    #[arg(long, value_name = "true|false", global = true)]
-    pub bell: Option<bool>,
-
-    /// Command to run with `sh -c` when an alarm is raised, with its text in $TOUCHDOWN_ALARM; or `none`.
-    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
-    pub alarm_command: Option<String>,
-
-    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
-    #[arg(long, value_name = "WHICH", global = true)]
-    pub characters: Option<Characters>,
-
-    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
-    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
-    #[arg(long, value_name = "WHICH", global = true)]
-    pub theme: Option<ThemeChoice>,
-
-    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
-    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new(), global = true)]
-    pub voice: Option<String>,
-
-    /// How much is called out. Default: normal.
-    #[arg(long, value_name = "HOW_MUCH", global = true)]
-    pub talk: Option<Amount>,
-
-    /// The least time between two heights that are called out. Default: 1.5.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, global = true)]
-    pub talk_every_s: Option<Seconds>,
-
-    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
-    #[arg(long, value_name = "ACTION=KEY,...", global = true)]
-    pub keys: Option<Bindings>,
-
-    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
-    #[arg(long, global = true)]
-    pub auto: bool,
 
     /// Print lines instead of the full screen, even on a terminal.
     #[arg(long)]
@@ -180,6 +59,165 @@ pub struct Cli {
     pub timeout_s: Option<Seconds>,
 }
 
+/// The settings file.
+#[derive(Debug, Clone, Args)]
+pub struct ConfigArgs {
+    /// Settings file (TOML); `ground config example` prints one.
+    ///
+    /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+}
+
+/// Who acts.
+#[derive(Debug, Clone, Args)]
+pub struct OperatorArgs {
+    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    pub operator: Option<String>,
+}
+
+/// The socket of a station.
+#[derive(Debug, Clone, Args)]
+pub struct SocketArgs {
+    /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
+    #[arg(long, value_name = "PATH")]
+    pub socket: Option<PathBuf>,
+}
+
+/// The links to the vehicle, and whose frames they carry.
+#[derive(Debug, Clone, Args)]
+pub struct LinkArgs {
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
+    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
+    #[arg(long, value_name = "LINK")]
+    pub connect: Vec<LinkAddress>,
+
+    /// This station's own MAVLink system id; every station on a link needs a different one. Default: 255.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    pub sysid: Option<u8>,
+
+    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1; for a replay the
+    /// first vehicle in the log.
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    pub vehicle_sysid: Option<u8>,
+
+    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen` creates a key.
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+
+    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
+    /// share. Without the name of somebody who has a key this station only looks on.
+    #[arg(long, value_name = "FILE")]
+    pub crew: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub operator: OperatorArgs,
+}
+
+/// What holds the links, with or without a screen.
+#[derive(Debug, Clone, Args)]
+pub struct StationArgs {
+    #[command(flatten)]
+    pub link: LinkArgs,
+
+    #[command(flatten)]
+    pub socket: SocketArgs,
+
+    #[command(flatten)]
+    pub config: ConfigArgs,
+
+    /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub mission: Option<String>,
+
+    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
+    #[arg(long, value_name = "FILE")]
+    pub checklist: Option<PathBuf>,
+
+    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
+    pub pad: Option<Degrees>,
+
+    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
+    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
+    pub here: Option<Degrees>,
+
+    /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
+    ///
+    /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
+    #[arg(long, value_name = "FILE|none")]
+    pub log: Option<LogChoice>,
+
+    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
+    ///
+    /// Default: with --connect the name of the log with this extension; the demonstration writes none.
+    #[arg(long, value_name = "FILE|none")]
+    pub tlog: Option<LogChoice>,
+
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect")]
+    pub profile: Option<String>,
+
+    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
+    /// --mission: where that flight should begin; arming is refused if it begins elsewhere.
+    #[arg(long, value_name = "START")]
+    pub start: Option<StartPoint>,
+
+    /// Demonstration: seed of its dispersions. Default: 1.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect")]
+    pub seed: Option<u64>,
+
+    /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
+    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect")]
+    pub speed: Option<Speed>,
+
+    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub watchers: Option<String>,
+
+    /// Command to run with `sh -c` when an alarm is raised, with its text in $TOUCHDOWN_ALARM; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new())]
+    pub alarm_command: Option<String>,
+
+    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
+    #[arg(long)]
+    pub auto: bool,
+}
+
+/// What a screen shows, says and takes.
+#[derive(Debug, Clone, Args)]
+pub struct ScreenArgs {
+    /// Ring the terminal's bell on an alarm. Default: true.
+    #[arg(long, value_name = "true|false")]
+    pub bell: Option<bool>,
+
+    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
+    #[arg(long, value_name = "WHICH")]
+    pub characters: Option<Characters>,
+
+    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
+    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
+    #[arg(long, value_name = "WHICH")]
+    pub theme: Option<ThemeChoice>,
+
+    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
+    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new())]
+    pub voice: Option<String>,
+
+    /// How much is called out. Default: normal.
+    #[arg(long, value_name = "HOW_MUCH")]
+    pub talk: Option<Amount>,
+
+    /// The least time between two heights that are called out. Default: 1.5.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub talk_every_s: Option<Seconds>,
+
+    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
+    #[arg(long, value_name = "ACTION=KEY,...")]
+    pub keys: Option<Bindings>,
+}
+
 /// The commands of `ground` besides a station with its screen.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Command {
@@ -187,17 +225,16 @@ pub enum Command {
     ///
     /// It keeps running when its screens close and when the session that started it ends.
     #[command(after_help = "Example: ground daemon --connect serial:/dev/ttyUSB0:57600 --log flight.mcap")]
-    Daemon,
+    Daemon {
+        #[command(flatten)]
+        station: Box<StationArgs>,
+        /// Fly the demonstration even if the settings name a link.
+        #[arg(long, conflicts_with = "connect")]
+        demo: bool,
+    },
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
     #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
-    Attach {
-        /// Show only; command nothing.
-        #[arg(long)]
-        watch: bool,
-        /// Watch a station on another machine: the HOST:PORT of its --watchers.
-        #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
-        from: Option<String>,
-    },
+    Attach(AttachArgs),
     /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
     ///
     /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
@@ -205,14 +242,7 @@ pub enum Command {
     #[command(
         after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
     )]
-    Download {
-        /// File on the vehicle. Default: its newest log.
-        #[arg(value_name = "NAME")]
-        name: Option<String>,
-        /// Folder to write into.
-        #[arg(long, value_name = "FOLDER", default_value = ".")]
-        to: PathBuf,
-    },
+    Download(DownloadArgs),
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
     #[command(after_help = "Example: ground status")]
     Status,
@@ -222,6 +252,12 @@ pub enum Command {
         /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
         #[arg(long)]
         force: bool,
+        #[command(flatten)]
+        socket: SocketArgs,
+        #[command(flatten)]
+        operator: OperatorArgs,
+        #[command(flatten)]
+        config: ConfigArgs,
     },
     /// Check the settings file or print an example.
     #[command(after_help = "Example: ground config check")]
@@ -241,14 +277,48 @@ pub enum Command {
     Man,
 }
 
+/// A screen for a station in another process.
+#[derive(Debug, Clone, Args)]
+pub struct AttachArgs {
+    /// Show only; command nothing.
+    #[arg(long)]
+    pub watch: bool,
+    /// Watch a station on another machine: the HOST:PORT of its --watchers.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
+    pub from: Option<String>,
+    #[command(flatten)]
+    pub socket: SocketArgs,
+    #[command(flatten)]
+    pub operator: OperatorArgs,
+    #[command(flatten)]
+    pub screen: ScreenArgs,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+}
+
+/// The vehicle's own log, over a link of its own.
+#[derive(Debug, Clone, Args)]
+pub struct DownloadArgs {
+    /// File on the vehicle. Default: its newest log.
+    #[arg(value_name = "NAME")]
+    pub name: Option<String>,
+    /// Folder to write into.
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    pub to: PathBuf,
+    #[command(flatten)]
+    pub link: LinkArgs,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+}
+
 /// What can be done with the settings.
 #[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 pub enum ConfigCommand {
     /// Check the settings and print them as a table.
     #[command(after_help = "Examples:\n  ground config check\n  ground config check field.toml")]
     Check {
-        /// The file, as with --config.
-        #[arg(value_name = "FILE", conflicts_with = "config")]
+        /// The file. Default: the usual one.
+        #[arg(value_name = "FILE")]
         file: Option<PathBuf>,
     },
     /// Print a file with every key, its meaning and its default.
@@ -267,7 +337,19 @@ pub struct Demonstration<'a> {
     pub speed: Speed,
 }
 
-impl Cli {
+impl LinkArgs {
+    /// Our own MAVLink address.
+    pub fn us(&self) -> Address {
+        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
+    }
+
+    /// The vehicle's MAVLink address.
+    pub fn vehicle(&self) -> Address {
+        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
+    }
+}
+
+impl StationArgs {
     /// What the demonstration flies.
     pub fn demonstration(&self) -> Demonstration<'_> {
         Demonstration {
@@ -278,60 +360,17 @@ impl Cli {
         }
     }
 
-    /// Our own MAVLink address.
-    pub fn us(&self) -> Address {
-        self.sysid.map_or(GROUND, |id| GROUND.of_system(id))
-    }
-
-    /// The vehicle's MAVLink address.
-    pub fn vehicle(&self) -> Address {
-        self.vehicle_sysid.map_or(VEHICLE, |id| VEHICLE.of_system(id))
-    }
-
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
     pub fn describes_demonstration(&self) -> bool {
-        self.demo
-            || self.profile.is_some()
+        self.profile.is_some()
             || (self.start.is_some() && self.mission.is_none())
             || self.seed.is_some()
             || self.speed.is_some()
     }
 
-    /// A given flag that the command would ignore.
-    pub fn ignored_flag(&self) -> Option<&'static str> {
-        let downloads = matches!(self.command, Some(Command::Download { .. }));
-        let ignores = downloads
-            || matches!(self.command, Some(Command::Attach { .. } | Command::Status | Command::Stop { .. }));
-        // A download has a link of its own.
-        let ignored =
-            |flag: &str| ignores && !(downloads && ["--connect", "--key", "--crew"].contains(&flag));
-        let given = [
-            ("--connect", !self.connect.is_empty()),
-            ("--key", self.key.is_some()),
-            ("--crew", self.crew.is_some()),
-            ("--mission", self.mission.is_some()),
-            ("--checklist", self.checklist.is_some()),
-            ("--pad", self.pad.is_some()),
-            ("--here", self.here.is_some()),
-            ("--watchers", self.watchers.is_some()),
-            ("--log", self.log.is_some()),
-            ("--tlog", self.tlog.is_some()),
-            ("--profile", self.profile.is_some()),
-            ("--start", self.start.is_some()),
-            ("--seed", self.seed.is_some()),
-            ("--speed", self.speed.is_some()),
-            ("--demo", self.demo),
-            ("--replay", self.replay.is_some()),
-            ("--auto", self.auto),
-            ("--timeout-s", self.timeout_s.is_some()),
-            ("--alarm-command", self.alarm_command.is_some()),
-        ];
-        given.into_iter().find(|(flag, given)| *given && ignored(flag)).map(|(flag, _)| flag)
-    }
-
     /// Whether the automatic mode starts the flight.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
-        self.auto || (self.connect.is_empty() && !interactive)
+        self.auto || (self.link.connect.is_empty() && !interactive)
     }
 }
 
@@ -507,45 +546,24 @@ mod tests {
 
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself() {
-        let demo = Cli::try_parse_from(["ground"]).unwrap();
+        let demo = Cli::try_parse_from(["ground"]).unwrap().station;
         let expected = Demonstration { profile: "mk2", start: None, seed: 1, speed: Speed::Factor(1.0) };
         assert_eq!(demo.demonstration(), expected, "the mission itself");
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
-        let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap();
+        let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap().station;
         assert!(!live.starts_by_itself(false));
     }
 
     #[test]
-    fn flags_that_an_attached_screen_would_ignore_are_found() {
-        let ignored = |line: &str| Cli::try_parse_from(line.split(' ')).unwrap().ignored_flag();
-        for (flag, value) in [
-            ("--connect", " udpin:0.0.0.0:14550"),
-            ("--key", " k"),
-            ("--mission", " mk2"),
-            ("--checklist", " c"),
-            ("--pad", " -1.5,2"),
-            ("--here", " 1,2"),
-            ("--watchers", " 127.0.0.1:1"),
-            ("--log", " none"),
-            ("--tlog", " none"),
-            ("--profile", " mk2"),
-            ("--start", " apogee"),
-            ("--seed", " 1"),
-            ("--speed", " 1"),
-            ("--demo", ""),
-            ("--auto", ""),
-            ("--alarm-command", " true"),
-        ] {
-            for command in ["attach", "status", "stop"] {
-                assert_eq!(ignored(&format!("ground {command} {flag}{value}")), Some(flag));
-            }
-            let of_a_link = ["--connect", "--key"].contains(&flag);
-            let expected = (!of_a_link).then_some(flag);
-            assert_eq!(ignored(&format!("ground download {flag}{value}")), expected);
-            assert_eq!(ignored(&format!("ground daemon {flag}{value}")), None);
-        }
-        assert_eq!(ignored("ground --timeout-s 3 attach"), Some("--timeout-s"));
-        assert_eq!(ignored("ground --replay f.mcap attach"), Some("--replay"));
-        assert_eq!(ignored("ground attach --watch --socket s --operator anna --bell false"), None);
+    fn a_command_has_the_flags_that_it_uses() {
+        let flags = |name: &str| -> Vec<String> {
+            let command = Cli::command().find_subcommand(name).unwrap().clone();
+            command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
+        };
+        assert_eq!(flags("stop"), ["force", "socket", "operator", "config"]);
+        assert_eq!(flags("status"), [""; 0]);
+        let link = ["to", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
+        assert_eq!(flags("download"), link);
+        assert!(Cli::try_parse_from(["ground", "--timeout-s", "3", "attach"]).is_err());
     }
 }

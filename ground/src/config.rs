@@ -8,7 +8,7 @@ use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
-use crate::cli::{Characters, Cli, Command, LogChoice, Seconds, ThemeChoice};
+use crate::cli::{Characters, LinkArgs, LogChoice, ScreenArgs, Seconds, StationArgs, ThemeChoice};
 use crate::model::{Amount, Bindings, DEFINITIONS, Talk};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
@@ -80,7 +80,7 @@ impl Config {
     /// # Errors
     /// The text is invalid; the error says where.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let config: Self = toml::from_str(text).map_err(|error| error.to_string())?;
+        let mut config: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         for link in &config.connect {
             link.parse::<LinkAddress>().map_err(|error| format!("connect: {error}"))?;
         }
@@ -99,37 +99,44 @@ impl Config {
                 return Err(format!("{key} is empty; give a command or \"none\""));
             }
         }
+        config.voice.take_if(|command| command == "none");
         Ok(config)
     }
 
-    /// Fills in the flags that the command line does not give.
-    pub fn fill(&self, cli: &mut Cli) {
+    /// Fills in the links of a daemon. A bare `ground` takes none: it must always be the demonstration.
+    pub fn fill_connect(&self, station: &mut StationArgs) {
+        let connect = &mut station.link.connect;
+        if connect.is_empty() && !station.describes_demonstration() {
+            station.link.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        }
+    }
+
+    /// Fills in the flags of a station that the command line does not give.
+    pub fn fill(&self, station: &mut StationArgs) {
         fn parsed<T: std::str::FromStr>(value: Option<&String>) -> Option<T> {
             value.and_then(|value| value.parse().ok())
         }
-        fn fill<T>(flag: &mut Option<T>, set: Option<T>) {
-            *flag = flag.take().or(set);
+        self.fill_link(&mut station.link);
+        if !station.link.connect.is_empty() {
+            fill(&mut station.mission, self.mission.clone());
+            fill(&mut station.checklist, self.checklist.clone());
         }
-        // Only a daemon takes links from the settings: a bare `ground` must always be the demonstration.
-        let is_daemon = matches!(cli.command, Some(Command::Daemon));
-        if cli.connect.is_empty() && is_daemon && !cli.describes_demonstration() {
-            cli.connect = self.connect.iter().filter_map(|link| link.parse().ok()).collect();
+        fill(&mut station.log, parsed(self.log.as_ref()));
+        fill(&mut station.tlog, parsed(self.tlog.as_ref()));
+        fill(&mut station.socket.socket, self.socket.clone());
+        fill(&mut station.alarm_command, self.alarm_command.clone());
+        station.alarm_command.take_if(|command| command == "none");
+    }
+
+    /// Fills in the flags of a link that the command line does not give.
+    pub fn fill_link(&self, link: &mut LinkArgs) {
+        fill(&mut link.sysid, self.sysid);
+        fill(&mut link.vehicle_sysid, self.vehicle_sysid);
+        if !link.connect.is_empty() {
+            fill(&mut link.key, self.key.clone());
+            fill(&mut link.crew, self.crew.clone());
         }
-        // A replay shows the vehicle in the log, whatever the settings say.
-        if cli.replay.is_none() {
-            fill(&mut cli.sysid, self.sysid);
-            fill(&mut cli.vehicle_sysid, self.vehicle_sysid);
-        }
-        if !cli.connect.is_empty() {
-            fill(&mut cli.key, self.key.clone());
-            fill(&mut cli.crew, self.crew.clone());
-            fill(&mut cli.mission, self.mission.clone());
-            fill(&mut cli.checklist, self.checklist.clone());
-        }
-        fill(&mut cli.operator, self.operator.clone());
-        fill(&mut cli.log, parsed(self.log.as_ref()));
-        fill(&mut cli.tlog, parsed(self.tlog.as_ref()));
-        fill(&mut cli.socket, self.socket.clone());
+        fill(&mut link.operator.operator, self.operator.clone());
     }
 
     /// What is called out.
@@ -139,22 +146,24 @@ impl Config {
         Talk { amount: self.talk, height_every, has_voice: self.voice.is_some() }
     }
 
-    /// The flags about the screen and its alarms override the file.
+    /// The flags about the screen override the file.
     #[must_use]
-    pub fn overridden_by(self, cli: &Cli) -> Self {
-        let alarm_command = cli.alarm_command.clone().or(self.alarm_command);
+    pub fn overridden_by(self, screen: &ScreenArgs) -> Self {
         Self {
-            bell: cli.bell.or(self.bell),
-            alarm_command: alarm_command.filter(|command| command != "none"),
-            characters: cli.characters.unwrap_or(self.characters),
-            theme: cli.theme.unwrap_or(self.theme),
-            keys: cli.keys.clone().unwrap_or(self.keys),
-            voice: cli.voice.clone().or(self.voice).filter(|command| command != "none"),
-            talk: cli.talk.unwrap_or(self.talk),
-            talk_every_s: cli.talk_every_s.or(self.talk_every_s),
+            bell: screen.bell.or(self.bell),
+            characters: screen.characters.unwrap_or(self.characters),
+            theme: screen.theme.unwrap_or(self.theme),
+            keys: screen.keys.clone().unwrap_or(self.keys),
+            voice: screen.voice.clone().or(self.voice).filter(|command| command != "none"),
+            talk: screen.talk.unwrap_or(self.talk),
+            talk_every_s: screen.talk_every_s.or(self.talk_every_s),
             ..self
         }
     }
+}
+
+fn fill<T>(flag: &mut Option<T>, set: Option<T>) {
+    *flag = flag.take().or(set);
 }
 
 /// The usual path of the settings file.
@@ -259,6 +268,7 @@ mod tests {
     use super::*;
     use clap::{CommandFactory as _, Parser as _};
 
+    use crate::cli::{Cli, Command};
     use crate::model::{Act, Amount};
     use crate::view::theme::Palette;
 
@@ -299,35 +309,37 @@ mod tests {
     }
 
     /// A key, its value in a file, its flags, and a check that the value of the flag is used.
-    type Override = (&'static str, &'static str, &'static [&'static str], fn(&Cli, &Config) -> bool);
+    type Override = (&'static str, &'static str, &'static [&'static str], fn(&StationArgs, &Config) -> bool);
 
     const OVERRIDES: [Override; 19] = [
-        ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |cli, _| {
-            cli.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
+        ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |station, _| {
+            station.link.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
         }),
-        ("sysid", "3", &["--sysid", "4"], |cli, _| cli.us().system_id == 4),
-        ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |cli, _| cli.vehicle().system_id == 4),
-        ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |cli, _| {
-            cli.key == Some("b".into())
+        ("sysid", "3", &["--sysid", "4"], |station, _| station.link.us().system_id == 4),
+        ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |station, _| station.link.vehicle().system_id == 4),
+        ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |station, _| {
+            station.link.key == Some("b".into())
         }),
-        ("crew", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--crew", "b"], |cli, _| {
-            cli.crew == Some("b".into())
+        ("crew", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--crew", "b"], |station, _| {
+            station.link.crew == Some("b".into())
         }),
-        ("operator", "\"Ann\"", &["--operator", "Bob"], |cli, _| cli.operator.as_deref() == Some("Bob")),
-        ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |cli, _| {
-            cli.mission.as_deref() == Some("mk3")
+        ("operator", "\"Ann\"", &["--operator", "Bob"], |station, _| {
+            station.link.operator.operator.as_deref() == Some("Bob")
         }),
-        ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |cli, _| {
-            cli.checklist.as_deref() == Some(Path::new("b"))
+        ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |station, _| {
+            station.mission.as_deref() == Some("mk3")
         }),
-        ("log", "\"a.mcap\"", &["--log", "b.mcap"], |cli, _| {
-            cli.log == Some(LogChoice::File("b.mcap".into()))
+        ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |station, _| {
+            station.checklist.as_deref() == Some(Path::new("b"))
         }),
-        ("tlog", "\"a.tlog\"", &["--tlog", "none"], |cli, _| cli.tlog == Some(LogChoice::None)),
-        ("socket", "\"/a\"", &["--socket", "/b"], |cli, _| cli.socket == Some("/b".into())),
+        ("log", "\"a.mcap\"", &["--log", "b.mcap"], |station, _| {
+            station.log == Some(LogChoice::File("b.mcap".into()))
+        }),
+        ("tlog", "\"a.tlog\"", &["--tlog", "none"], |station, _| station.tlog == Some(LogChoice::None)),
+        ("socket", "\"/a\"", &["--socket", "/b"], |station, _| station.socket.socket == Some("/b".into())),
         ("bell", "true", &["--bell", "false"], |_, config| config.bell == Some(false)),
-        ("alarm_command", "\"a\"", &["--alarm-command", "b"], |_, config| {
-            config.alarm_command.as_deref() == Some("b")
+        ("alarm_command", "\"a\"", &["--alarm-command", "b"], |station, _| {
+            station.alarm_command.as_deref() == Some("b")
         }),
         ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
             config.characters == Characters::Ascii
@@ -346,12 +358,22 @@ mod tests {
     ];
 
     /// Combines settings and command line as a run does.
-    fn together(file: &str, flags: &[&str]) -> (Cli, Config) {
+    fn together(file: &str, flags: &[&str]) -> (StationArgs, Config) {
         let config = Config::parse(file).unwrap();
-        let mut cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
-        config.fill(&mut cli);
-        let config = config.overridden_by(&cli);
-        (cli, config)
+        let cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
+        let config = config.overridden_by(&cli.screen);
+        let station = match cli.command {
+            Some(Command::Daemon { mut station, demo }) => {
+                if !demo {
+                    config.fill_connect(&mut station);
+                }
+                *station
+            }
+            _ => cli.station,
+        };
+        let mut station = station;
+        config.fill(&mut station);
+        (station, config)
     }
 
     #[test]
@@ -366,10 +388,10 @@ mod tests {
         for (key, in_file, flags, holds) in OVERRIDES {
             let file = format!("{key} = {in_file}");
             assert!(flags.contains(&format!("--{}", key.replace('_', "-")).as_str()), "{key}: its own name");
-            let (cli, config) = together(&file, flags);
-            assert!(holds(&cli, &config), "{key}: the flag counts");
-            let (cli, config) = together(&file, &[]);
-            assert!(!holds(&cli, &config), "{key}: without the flag the file counts");
+            let (station, config) = together(&file, flags);
+            assert!(holds(&station, &config), "{key}: the flag counts");
+            let (station, config) = together(&file, &[]);
+            assert!(!holds(&station, &config), "{key}: without the flag the file counts");
         }
     }
 
@@ -391,7 +413,7 @@ mod tests {
     #[test]
     fn a_bare_ground_takes_no_link_from_the_settings() {
         for bare in [&[][..], &["--auto"], &["--headless"], &["--log", "none"]] {
-            assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).0.connect, [], "{bare:?}");
+            assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).0.link.connect, [], "{bare:?}");
         }
     }
 
@@ -399,11 +421,11 @@ mod tests {
     fn flags_for_the_demonstration_and_none_override_the_file() {
         let file = "connect = [\"udpin:0.0.0.0:14550\"]";
         for demonstration in [&["daemon", "--demo"][..], &["daemon", "--seed", "2"]] {
-            assert_eq!(together(file, demonstration).0.connect, []);
+            assert_eq!(together(file, demonstration).0.link.connect, []);
         }
-        assert_eq!(together(file, &["daemon"]).0.connect.len(), 1);
-        let (_, config) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
-        assert_eq!(config.alarm_command, None);
+        assert_eq!(together(file, &["daemon"]).0.link.connect.len(), 1);
+        let (station, _) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
+        assert_eq!(station.alarm_command, None);
         let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);
         assert!(empty.unwrap_err().to_string().contains("--alarm-command"));
     }

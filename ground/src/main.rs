@@ -17,13 +17,8 @@ fn main() -> ExitCode {
             return if message.use_stderr() { code(Exit::Usage) } else { ExitCode::SUCCESS };
         }
     };
-    if let Some(flag) = cli.ignored_flag() {
-        let why = "only the station that holds the link uses it";
-        let _ = writeln!(std::io::stderr(), "error: {flag} means nothing to this command: {why}");
-        return code(Exit::Usage);
-    }
     // While it unwound, the panic has printed its message, restored the terminal and finished the log.
-    let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&cli)));
+    let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(cli)));
     match ended {
         Ok(Ok(exit)) => code(exit),
         Ok(Err(error)) => {

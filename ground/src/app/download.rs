@@ -23,7 +23,7 @@ use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
 use super::output::print;
 use super::wire::Wire;
-use crate::cli::Cli;
+use crate::cli::DownloadArgs;
 use crate::exit::Exit;
 use crate::update::Msg;
 
@@ -171,22 +171,17 @@ const SHOW_EVERY: Duration = Duration::from_millis(500);
 ///
 /// # Errors
 /// The link cannot be opened, the vehicle refuses, or a file cannot be written.
-pub(in crate::app) async fn run_download(
-    cli: &Cli,
-    name: Option<&str>,
-    folder: &Path,
-) -> anyhow::Result<Exit> {
+pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<Exit> {
+    let DownloadArgs { name, to, link, .. } = args;
+    let addresses = (link.us(), link.vehicle());
     anyhow::ensure!(
-        !cli.connect.is_empty(),
+        !link.connect.is_empty(),
         "no link to a vehicle: give --connect. In a station that holds the link, the key L fetches the log"
     );
-    let KeyRing { key, .. } = KeyRing::open(cli)?;
+    let KeyRing { key, .. } = KeyRing::open(link)?;
     let clock = Clock::start();
-    let mut wire =
-        Wire::open((cli.us(), cli.vehicle()), cli.connect.clone(), key, clock, None, LogTime::Run(clock))
-            .await?;
-    let mut downloading =
-        Downloading::begin(name, folder.to_owned(), (cli.us(), cli.vehicle()), clock.start_unix_ns());
+    let mut wire = Wire::open(addresses, link.connect.clone(), key, clock, None, LogTime::Run(clock)).await?;
+    let mut downloading = Downloading::begin(name.as_deref(), to.clone(), addresses, clock.start_unix_ns());
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);

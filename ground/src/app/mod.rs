@@ -15,7 +15,6 @@ pub mod wire;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -32,7 +31,7 @@ use protocol::transport::LinkAddress;
 use simulated_vehicle::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
-use crate::cli::{Cli, Command, ConfigCommand, LogChoice, Seconds};
+use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, Seconds, StationArgs};
 use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
@@ -50,56 +49,86 @@ use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
 
+/// Who watches over a station, and for how long.
+#[derive(Debug, Clone, Copy)]
+struct Duty {
+    /// It runs on after a flight, and serves screens also in a demonstration.
+    is_daemon: bool,
+    /// It has a screen of its own.
+    interactive: bool,
+    time_limit: Option<Duration>,
+}
+
 /// Runs the ground station until its end.
 ///
 /// # Errors
 /// A socket, a file or the terminal failed, or the profile is wrong.
-pub fn run(cli: &Cli) -> anyhow::Result<Exit> {
-    match &cli.command {
-        Some(Command::Config { command }) => return print_config(cli, command),
-        Some(Command::Completions { shell }) => return print_completions(*shell),
-        Some(Command::Man) => return print_manual(),
-        _ => {}
-    }
-    let config = Config::load(cli.config.as_deref())?.overridden_by(cli);
-    let mut cli = cli.clone();
-    config.fill(&mut cli);
-    let (cli, config) = (&cli, &config);
+pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
-    let socket = cli.socket.as_deref();
-    let operator = operator(cli.operator.as_deref());
+    let load = |args: &ConfigArgs| Config::load(args.config.as_deref());
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
-    runtime.block_on(async {
-        match (&cli.command, &cli.replay) {
-            (Some(Command::Status), _) => stations::list().await,
-            (Some(Command::Stop { force }), _) => stations::stop(socket, *force, operator).await,
-            (Some(Command::Attach { watch, from }), _) => {
-                let viewer = Viewer {
-                    // Nobody can command through a feed.
-                    watch: *watch || from.is_some(),
-                    feed: from.clone(),
-                    operator,
-                    keys: config.keys.clone(),
-                    talk: config.talk(),
-                };
-                attached::session(socket, &viewer, config, interactive).await
-            }
-            (Some(Command::Download { name, to }), _) => {
-                download::run_download(cli, name.as_deref(), to).await
-            }
-            (Some(Command::Daemon), _) => Box::pin(session(cli, config, false, operator)).await,
-            (_, Some(path)) => replaying::session(cli, path, config, interactive).await,
-            (_, None) => Box::pin(session(cli, config, interactive, operator)).await,
+    match cli.command {
+        Some(Command::Config { command }) => print_config(&command),
+        Some(Command::Completions { shell }) => print_completions(shell),
+        Some(Command::Man) => print_manual(),
+        Some(Command::Status) => runtime.block_on(stations::list()),
+        Some(Command::Stop { force, socket, operator: who, config }) => {
+            let config = load(&config)?;
+            let (socket, who) = (socket.socket.or(config.socket), who.operator.or(config.operator));
+            runtime.block_on(stations::stop(socket.as_deref(), force, operator(who.as_deref())))
         }
-    })
+        Some(Command::Attach(args)) => {
+            let config = load(&args.config)?.overridden_by(&args.screen);
+            let (socket, who) = (
+                args.socket.socket.or(config.socket.clone()),
+                args.operator.operator.or(config.operator.clone()),
+            );
+            let viewer = Viewer {
+                // Nobody can command through a feed.
+                watch: args.watch || args.from.is_some(),
+                feed: args.from,
+                operator: operator(who.as_deref()),
+                keys: config.keys.clone(),
+                talk: config.talk(),
+            };
+            runtime.block_on(attached::session(socket.as_deref(), &viewer, &config, interactive))
+        }
+        Some(Command::Download(mut args)) => {
+            load(&args.config)?.fill_link(&mut args.link);
+            runtime.block_on(download::run_download(&args))
+        }
+        Some(Command::Daemon { mut station, demo }) => {
+            let config = load(&station.config)?;
+            if !demo {
+                config.fill_connect(&mut station);
+            }
+            config.fill(&mut station);
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            runtime.block_on(Box::pin(session(&station, &config, duty)))
+        }
+        None => {
+            let mut station = cli.station;
+            let config = load(&station.config)?.overridden_by(&cli.screen);
+            if let Some(path) = &cli.replay {
+                // It shows the vehicle in the log, not the one in the settings.
+                let vehicle = station.link.vehicle_sysid.map(|_| station.link.vehicle());
+                let replay = replaying::session(path, vehicle, cli.from, &config, interactive);
+                return runtime.block_on(replay);
+            }
+            config.fill(&mut station);
+            let time_limit = cli.timeout_s.map(|Seconds(limit)| limit);
+            let duty = Duty { is_daemon: false, interactive, time_limit };
+            runtime.block_on(Box::pin(session(&station, &config, duty)))
+        }
+    }
 }
 
-async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String) -> anyhow::Result<Exit> {
+async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
     let clock = Clock::start();
-    let demo_options = match &cli.connect[..] {
-        [] => Some(DemoOptions::load(&cli.demonstration(), cli.vehicle().system_id)?),
+    let demo_options = match &args.link.connect[..] {
+        [] => Some(DemoOptions::load(&args.demonstration(), args.link.vehicle().system_id)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -110,12 +139,12 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
             ..LogHeader::default()
         },
     };
-    let tlog = cli.tlog.as_ref();
+    let tlog = args.tlog.as_ref();
     let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
-    let recorder = open_log(cli.log.as_ref(), tlog, &header)?;
+    let recorder = open_log(args.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder.clone());
     let (mut station, mut model, mut wire) =
-        match Box::pin(start(cli, config, interactive, operator, (clock, demo_options, recorder))).await {
+        match Box::pin(start(args, config, duty, (clock, demo_options, recorder))).await {
             Ok(started) => started,
             Err(error) => {
                 log_guard.discard();
@@ -130,37 +159,37 @@ async fn session(cli: &Cli, config: &Config, interactive: bool, operator: String
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
-    output::closing(&model, interactive, log_path.as_ref(), clock.now());
+    output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
     log_path.context("the log")?;
-    Ok(exit::decide(&model.outcome, interactive))
+    Ok(exit::decide(&model.outcome, duty.interactive))
 }
 
 /// Opens everything that a station needs, except its log.
 async fn start(
-    cli: &Cli,
+    args: &StationArgs,
     config: &Config,
-    interactive: bool,
-    operator: String,
+    duty: Duty,
     (clock, demo_options, recorder): (Clock, Option<DemoOptions>, Option<Recorder>),
 ) -> anyhow::Result<(Station, Model, Wire)> {
-    let is_daemon = matches!(cli.command, Some(Command::Daemon));
+    let Duty { is_daemon, interactive, time_limit } = duty;
+    let link = &args.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
-    let mut endpoints = cli.connect.clone();
+    let mut endpoints = link.connect.clone();
     if endpoints.is_empty() {
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
-    let KeyRing { key, owner, book_key, roles } = KeyRing::open(cli)?;
+    let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
-    let checklist = cli.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
-    let mission = cli.mission.as_deref().map(load_flight).transpose()?;
+    let checklist = args.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
+    let mission = args.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened =
-        Wire::open((cli.us(), cli.vehicle()), endpoints, key, clock, recorder.clone(), log_time.clone())
+        Wire::open((link.us(), link.vehicle()), endpoints, key, clock, recorder.clone(), log_time.clone())
             .await;
     let wire = match opened {
         Ok(wire) => wire,
-        Err(error) => return Err(stations::explain(error, &cli.connect).await),
+        Err(error) => return Err(stations::explain(error, &link.connect).await),
     };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
@@ -168,25 +197,29 @@ async fn start(
         }
         _ => None,
     };
-    let auto = if is_daemon { cli.auto } else { cli.starts_by_itself(interactive) };
+    let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
-        vehicle_name: demo.as_ref().map(|_| cli.demonstration().profile.to_owned()),
+        vehicle_name: demo.as_ref().map(|_| args.demonstration().profile.to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
-        us: cli.us(),
+        us: link.us(),
         session: drawn_session(),
-        vehicle: cli.vehicle(),
+        vehicle: link.vehicle(),
         role: Role::Station,
-        seat: if interactive { Seat::new(1, operator) } else { Seat::default() },
+        seat: if interactive {
+            Seat::new(1, operator(link.operator.operator.as_deref()))
+        } else {
+            Seat::default()
+        },
         key_owner: owner,
-        start: cli.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
+        start: args.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
-        pad: cli.pad,
-        here: cli.here,
+        pad: args.pad,
+        here: args.here,
         start_unix_s,
         demonstration: demo.is_some(),
         auto,
@@ -194,10 +227,10 @@ async fn start(
         interactive: interactive || is_daemon,
         keys: config.keys.clone(),
         talk: config.talk(),
-        time_limit: cli.timeout_s.map(|Seconds(limit)| limit).or(auto.then_some(AUTO_TIME_LIMIT)),
+        time_limit: time_limit.or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    let renamed = other_name(cli.log.as_ref(), recorder.as_ref().map(Recorder::path));
+    let renamed = other_name(args.log.as_ref(), recorder.as_ref().map(Recorder::path));
     announce(&mut model, auto, renamed, clock.now());
     let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
@@ -207,17 +240,9 @@ async fn start(
         file
     });
     model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
-    if model.place.is_some() {
-        model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
-    }
-    let server = serve(cli, &mut model, interactive, &clock).await?;
-    let watchers = feed(cli, server.as_ref()).await?;
-    if demo.is_some()
-        && !is_daemon
-        && let Some(line) = stations::running_beside().await
-    {
-        model.info(clock.now(), line);
-    }
+    announce_what_is_there(&mut model, is_daemon, clock.now()).await;
+    let server = serve(args, &mut model, duty, &clock).await?;
+    let watchers = feed(args.watchers.as_deref(), server.as_ref()).await?;
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
@@ -227,10 +252,10 @@ async fn start(
         log_space: SpaceWatch::default(),
         demo,
         output,
-        socket: cli.socket.clone(),
+        socket: args.socket.socket.clone(),
         server,
         screens: Vec::new(),
-        alarm_command: config.alarm_command.clone(),
+        alarm_command: args.alarm_command.clone(),
         quiet_input: None,
         signatures,
         book: None,
@@ -263,20 +288,32 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
     }
 }
 
+/// Says what an earlier run has left, and which stations run beside a demonstration.
+async fn announce_what_is_there(model: &mut Model, is_daemon: bool, now: Duration) {
+    if model.place.is_some() {
+        model.info(now, "the last place of a vehicle is kept from before: page Find");
+    }
+    if model.settings.demonstration
+        && !is_daemon
+        && let Some(line) = stations::running_beside().await
+    {
+        model.info(now, line);
+    }
+}
+
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
 /// terminal needs none.
 async fn serve(
-    cli: &Cli,
+    args: &StationArgs,
     model: &mut Model,
-    interactive: bool,
+    Duty { is_daemon, interactive, .. }: Duty,
     clock: &Clock,
 ) -> anyhow::Result<Option<Server>> {
-    let is_daemon = matches!(cli.command, Some(Command::Daemon));
     if model.settings.demonstration && !is_daemon {
         return Ok(None);
     }
     let first_screen = if interactive { 2 } else { 1 };
-    match Server::open(cli.socket.as_deref(), hello(model), first_screen).await {
+    match Server::open(args.socket.socket.as_deref(), hello(model), first_screen).await {
         Ok(server) => Ok(Some(server)),
         Err(error) if is_daemon => Err(error),
         // It has its own screen or lines, so it can run without the socket.
@@ -288,8 +325,8 @@ async fn serve(
 }
 
 /// Opens the feed for watchers, if one is wanted.
-async fn feed(cli: &Cli, server: Option<&Server>) -> anyhow::Result<Option<Watchers>> {
-    match (&cli.watchers, server) {
+async fn feed(address: Option<&str>, server: Option<&Server>) -> anyhow::Result<Option<Watchers>> {
+    match (address, server) {
         (Some(address), Some(server)) => Watchers::open(address, server.shared()).await.map(Some),
         (Some(_), None) => {
             anyhow::bail!(
@@ -319,13 +356,12 @@ fn start_demo(
 ///
 /// # Errors
 /// The settings are wrong; the error says where, and what would be accepted.
-pub fn print_config(cli: &Cli, command: &ConfigCommand) -> anyhow::Result<Exit> {
+pub fn print_config(command: &ConfigCommand) -> anyhow::Result<Exit> {
     match command {
         ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
         ConfigCommand::Check { file } => {
-            let named = file.as_ref().or(cli.config.as_ref());
-            let config = Config::load(named.map(PathBuf::as_path))?;
-            let file = named.cloned().or_else(usual_path);
+            let config = Config::load(file.as_deref())?;
+            let file = file.clone().or_else(usual_path);
             let said = match file {
                 Some(path) if path.exists() => format!("{}: valid", path.display()),
                 Some(path) => format!("{}: no such file; these are the defaults", path.display()),
@@ -404,18 +440,18 @@ impl KeyRing {
     ///
     /// # Errors
     /// A file cannot be read, others can read it, or the crew has nobody of this name.
-    pub(super) fn open(cli: &Cli) -> anyhow::Result<Self> {
-        let Some(shared) = cli.key.as_deref() else {
+    pub(super) fn open(link: &LinkArgs) -> anyhow::Result<Self> {
+        let Some(shared) = link.key.as_deref() else {
             anyhow::ensure!(
-                cli.crew.is_none(),
+                link.crew.is_none(),
                 "--crew needs --key, the key that vehicle and stations share"
             );
             return Ok(Self { key: None, owner: None, book_key: None, roles: Vec::new() });
         };
-        let crew = cli.crew.as_deref().map(CrewFile::open).transpose()?;
+        let crew = link.crew.as_deref().map(CrewFile::open).transpose()?;
         let people = crew.iter().flat_map(|crew| &crew.members);
         let roles = people.map(|member| (member.name.clone(), member.role)).collect();
-        let member = match (&crew, cli.operator.as_deref()) {
+        let member = match (&crew, link.operator.operator.as_deref()) {
             (Some(crew), Some(name)) => Some(crew.member(name)?),
             _ => None,
         };

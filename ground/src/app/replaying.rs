@@ -6,11 +6,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::identity::Address;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
 use super::output::{self, Lines, Output};
-use crate::cli::{Cli, ReplayFrom};
+use crate::cli::ReplayFrom;
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
@@ -42,15 +43,20 @@ fn newest_log(folder: &Path) -> anyhow::Result<PathBuf> {
 ///
 /// # Errors
 /// The log cannot be read, the terminal failed, or the recording has no such phase.
-pub async fn session(cli: &Cli, path: &Path, config: &Config, interactive: bool) -> anyhow::Result<Exit> {
+pub async fn session(
+    path: &Path,
+    vehicle: Option<Address>,
+    from: Option<ReplayFrom>,
+    config: &Config,
+    interactive: bool,
+) -> anyhow::Result<Exit> {
     let mut told = 0;
     let newest = (path == Path::new(LAST)).then(|| newest_log(Path::new("."))).transpose()?;
     let path = newest.as_deref().unwrap_or(path);
-    let vehicle = cli.vehicle_sysid.map(|_| cli.vehicle());
     let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
     let damage = recording.damage.clone();
     let mut player = Player::new(recording, settings(&path.display().to_string(), &config.keys));
-    match cli.from {
+    match from {
         None => {}
         Some(ReplayFrom::Time(at)) => player.seek(at),
         Some(ReplayFrom::Phase(phase)) => {
