@@ -33,7 +33,7 @@ fn the_same_flight_with_other_functions_of_the_c_library_is_identical_bit_for_bi
         let mut frames = frames_of(&folder.path().join(log));
         // The free space on the disk is not the flight's.
         for frame in &mut frames {
-            frame.input.log_space_bytes = 0;
+            frame.input.log.space_bytes = 0;
         }
         frames.iter().map(ComputerFrame::encode_to_vec).collect()
     };

@@ -7,8 +7,8 @@ use std::process::{Command, Output};
 
 use flight::computer::Computer;
 use flight::guidance::baseline::Law;
-use flight_log::estimate::state_from_log;
 use flight_log::frame::{input_from_log, output_to_log};
+use flight_log::logged::state_from_log;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::reader::{LogItem, LogReader};

@@ -7,7 +7,8 @@ use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, Output};
 use flight::rules::outputs::Line;
 use flight::vehicle::mission::Mission;
-use flight_log::frame::{LoggedInput, commander_to_log, request_to_log, uplink_to_log};
+use flight_log::frame::LoggedInput;
+use flight_log::logged::Logged;
 use protocol::frame::Framer;
 use protocol::mission::MissionHash;
 use vehicle_link::endpoint::{UplinkState, VehicleEndpoint};
@@ -137,9 +138,9 @@ impl Crewed {
         }
         self.heard = self.endpoint.heard(input.time_s);
         stream::Heard {
-            uplink: uplink_to_log(self.heard.uplink),
-            commander: self.heard.commander.as_ref().map(commander_to_log),
-            requests: self.heard.requests.iter().map(request_to_log).collect(),
+            uplink: self.heard.uplink.to_log(),
+            commander: self.heard.commander.to_log(),
+            requests: self.heard.requests.iter().map(Logged::to_log).collect(),
         }
     }
 }

@@ -7,8 +7,8 @@ use flight::guidance::powered::LandingSolved;
 use flight::vehicle::mission::Mission;
 use protocol::records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
 
-use crate::estimate::{RecordError, state_from_log, vector_from_log};
 use crate::frame::{LoggedInput, frame_to_log, input_from_log};
+use crate::logged::{RecordError, state_from_log, vector_from_log};
 
 /// Why a frame was not run again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

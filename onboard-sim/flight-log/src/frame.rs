@@ -1,37 +1,20 @@
-//! Converts the flight computer's frames between its own types and log records, bit for bit.
+//! The flight computer's frames as log records, and back, bit for bit.
 
 use alloc::vec::Vec;
 
-use flight::computer::crew::{Asked, Ending, People, Request};
-use flight::computer::pilot::Sensed;
-use flight::computer::{Commander, Commands, Computer, Input, LogState, Output, Rehearsed};
+use flight::computer::crew::{Asked, Ending, Request};
+use flight::computer::pilot::{Pilot, Sensed};
+use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
+use flight::estimation::motor_estimate::MotorEstimate;
 use flight::guidance::powered::ControlLevel;
-use flight::rules::arming::{PredictedLanding, Uplink};
-use flight::rules::operator::{Name, Operator, Role};
+use flight::rules::arming::Uplink;
 use flight::rules::outputs::{Line, Outputs};
 use flight::rules::phase::Phase;
-use flight::rules::two_person::Station;
 use flight::vehicle::mission::StartPoint;
 use protocol::records::computer_v1 as v1;
+use protocol::records::flight_v1;
 
-use crate::estimate::{
-    RecordError, estimate_from_log, estimate_to_log, list, measurements_from_log, measurements_to_log,
-    state_to_log, vector_to_log,
-};
-
-/// Requests, by their number in the log.
-const ASKED: [Asked; 10] = [
-    Asked::Arm,
-    Asked::Disarm,
-    Asked::Start,
-    Asked::Hold,
-    Asked::Abort,
-    Asked::Tap,
-    Asked::TakeCommand,
-    Asked::Check,
-    Asked::CheckStill,
-    Asked::EndCheck,
-];
+use crate::logged::{At, Logged, RecordError};
 
 /// A frame's input that owns its lists: read from a log, or by a board.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,8 +50,8 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
     let stood = released && mission.start.at == StartPoint::Pad;
     v1::ComputerStart {
         frame: if released { computer.frame() } else { 0 },
-        believed: state_to_log(&estimate.state),
-        gyro_bias_rad_s: stood.then(|| vector_to_log(&estimate.gyro_bias_rad_s)),
+        believed: estimate.state.to_log(),
+        gyro_bias_rad_s: stood.then(|| estimate.gyro_bias_rad_s.to_log()),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         released,
@@ -102,7 +85,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         booster_attached,
         pin_out,
         battery_v,
-        log: LogState { running: log_running, space_bytes: log_space_bytes },
+        log,
         uplink,
         ref commander,
         people,
@@ -110,8 +93,8 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         rehearsed,
     } = input;
     let (measured, known) = match sensed {
-        Sensed::Measured(measurements) => (Some(measurements_to_log(measurements)), None),
-        Sensed::Known(estimate) => (None, Some(estimate_to_log(estimate))),
+        Sensed::Measured(measurements) => (Some(measurements.to_log()), None),
+        Sensed::Known(estimate) => (None, Some(estimate.to_log())),
     };
     v1::ComputerInput {
         frame,
@@ -122,21 +105,15 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         fins_rad: fins_rad.to_vec(),
         contact,
         igniter_continuity,
+        booster_attached,
         pin_out,
-        log_running,
-        log_space_bytes,
-        uplink: uplink_to_log(uplink),
-        commander: commander.as_ref().map(commander_to_log),
-        requests: requests.iter().map(request_to_log).collect(),
-        rehearsed: rehearsed.map(|rehearsed| v1::Rehearsed {
-            warm: rehearsed.warm,
-            found: rehearsed.found.clone(),
-            lands: rehearsed.landing.as_ref().map(|landing| landing.lands),
-            landing_found: rehearsed.landing.as_ref().map(|landing| landing.found.clone()),
-        }),
-        booster_attached: booster_attached.then_some(true),
-        people: people.map(people_to_log),
         battery_v,
+        log: log.to_log(),
+        uplink: uplink.to_log(),
+        commander: commander.to_log(),
+        people: people.to_log(),
+        requests: requests.iter().map(Logged::to_log).collect(),
+        rehearsed: rehearsed.map(Logged::to_log),
     }
 }
 
@@ -146,57 +123,40 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// This build does not know some value of it.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let frame = input.frame;
+    let at = |field| At { frame, field };
     let sensed = match (&input.measured, &input.known) {
-        (Some(measurements), None) => Sensed::Measured(measurements_from_log(measurements)),
-        (None, Some(estimate)) => Sensed::Known(estimate_from_log(estimate, frame)?),
+        (Some(measurements), None) => Sensed::Measured(Logged::from_log(measurements, at("measured"))?),
+        (None, Some(estimate)) => Sensed::Known(Logged::from_log(estimate, at("known"))?),
         _ => return Err(RecordError::Sensed { frame }),
     };
-    let commander = input.commander.as_ref().map(|commander| commander_from_log(commander, frame));
     let rest = Input {
         frame,
         time_s: input.time_s,
         sensed,
-        gimbal_rad: list(&input.gimbal_rad, frame, "gimbal angles")?,
-        fins_rad: list(&input.fins_rad, frame, "fin angles")?,
+        gimbal_rad: Logged::from_log(&input.gimbal_rad, at("gimbal_rad"))?,
+        fins_rad: Logged::from_log(&input.fins_rad, at("fins_rad"))?,
         contact: input.contact,
         igniter_continuity: input.igniter_continuity,
+        booster_attached: input.booster_attached,
         pin_out: input.pin_out,
         battery_v: input.battery_v,
-        log: LogState { running: input.log_running, space_bytes: input.log_space_bytes },
-        uplink: uplink_from_log(input.uplink.as_ref()),
-        commander: commander.transpose()?,
+        log: Logged::from_log(&input.log, at("log"))?,
+        uplink: Logged::from_log(&input.uplink, at("uplink"))?,
+        commander: Logged::from_log(&input.commander, at("commander"))?,
+        people: Logged::from_log(&input.people, at("people"))?,
         requests: &[],
         rehearsed: None,
-        booster_attached: input.booster_attached.unwrap_or(false),
-        people: input.people.as_ref().map(|people| people_from_log(people, frame)).transpose()?,
     };
-    let requests = input.requests.iter().map(|request| request_from_log(request, frame));
-    let rehearsed = input.rehearsed.as_ref().map(|rehearsed| Rehearsed {
-        warm: rehearsed.warm,
-        found: rehearsed.found.clone(),
-        landing: rehearsed
-            .lands
-            .zip(rehearsed.landing_found.clone())
-            .map(|(lands, found)| PredictedLanding { lands, found }),
-    });
+    let requests = input.requests.iter().map(|request| Logged::from_log(request, at("request")));
+    let rehearsed = Logged::from_log(&input.rehearsed, at("rehearsed"))?;
     Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
 }
 
 /// Whether a frame accepted an abort.
 pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
-    let aborts = |request: &v1::Request| ASKED.get(request.asked as usize) == Some(&Asked::Abort);
+    let (abort, accepted) = (Asked::Abort.to_log(), Ending::Accepted.to_log());
     let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
-    answered.any(|(request, answer)| aborts(request) && *answer == ending_to_log(Ending::Accepted))
-}
-
-fn ending_to_log(ending: Ending) -> u32 {
-    match ending {
-        Ending::Accepted => 0,
-        Ending::NotNow => 1,
-        Ending::Denied => 2,
-        Ending::Failed => 3,
-        Ending::Asked => 4,
-    }
+    answered.any(|(request, answer)| request.asked == abort && *answer == accepted)
 }
 
 /// A frame's output as a record; `computer` has just flown it.
@@ -213,9 +173,9 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
-        answers: answers.iter().map(|answer| ending_to_log(answer.ending)).collect(),
-        ignite_booster: outputs.is_on(Line::AscentIgniter).then_some(true),
-        separate_booster: outputs.is_on(Line::Separation).then_some(true),
+        answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
+        ignite_booster: outputs.is_on(Line::AscentIgniter),
+        separate_booster: outputs.is_on(Line::Separation),
     }
 }
 
@@ -225,13 +185,13 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
 /// A list has the wrong length.
 pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Commands, RecordError> {
     Ok(Commands {
-        gimbal_rad: list(&output.gimbal_rad, frame, "gimbal angles")?,
-        fins_rad: list(&output.fins_rad, frame, "fin angles")?,
+        gimbal_rad: Logged::from_log(&output.gimbal_rad, At { frame, field: "gimbal_rad" })?,
+        fins_rad: Logged::from_log(&output.fins_rad, At { frame, field: "fins_rad" })?,
         outputs: Outputs::of(|line| match line {
             Line::LandingIgniter => output.ignite,
             Line::Parachute => output.parachute,
-            Line::AscentIgniter => output.ignite_booster.unwrap_or(false),
-            Line::Separation => output.separate_booster.unwrap_or(false),
+            Line::AscentIgniter => output.ignite_booster,
+            Line::Separation => output.separate_booster,
         }),
     })
 }
@@ -246,144 +206,51 @@ pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
     u8::try_from(output.phase).ok().and_then(Phase::from_index)
 }
 
-/// The station that armed the vehicle as a record.
-pub fn commander_to_log(commander: &Commander) -> v1::Commander {
-    let Commander { station, age_s, by, deaf } = commander;
-    v1::Commander {
-        system: u32::from(station.system),
-        component: u32::from(station.component),
-        age_s: *age_s,
-        by: by.as_ref().map(operator_to_log),
-        station: (station.number != 0).then_some(station.number),
-        deaf: deaf.then_some(true),
-    }
+/// What the pilot thought after a frame: its estimate, with the motor's. `None` before it has one.
+pub fn thought_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
+    let estimate = pilot.estimate()?;
+    Some(flight_v1::Estimate { motor: motor_to_log(pilot.motor()), ..estimate.to_log() })
 }
 
-/// A recorded station that armed the vehicle.
-///
-/// # Errors
-/// This build does not know some value of it.
-pub fn commander_from_log(commander: &v1::Commander, frame: u64) -> Result<Commander, RecordError> {
-    let station = station_from_log((commander.system, commander.component, commander.station), frame)?;
-    let by = commander.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?;
-    Ok(Commander { station, age_s: commander.age_s, by, deaf: commander.deaf.unwrap_or(false) })
-}
-
-/// How well a station is heard, as a record; `None` where nobody has to be heard.
-pub fn uplink_to_log(uplink: Uplink) -> Option<v1::Uplink> {
-    match uplink {
-        Uplink::NotNeeded => None,
-        Uplink::NeverHeard => Some(v1::Uplink { age_s: None }),
-        Uplink::Heard { age_s } => Some(v1::Uplink { age_s: Some(age_s) }),
-    }
-}
-
-/// How well a station was heard.
-pub fn uplink_from_log(uplink: Option<&v1::Uplink>) -> Uplink {
-    match uplink {
-        None => Uplink::NotNeeded,
-        Some(v1::Uplink { age_s: None }) => Uplink::NeverHeard,
-        Some(v1::Uplink { age_s: Some(age_s) }) => Uplink::Heard { age_s: *age_s },
-    }
-}
-
-/// A request of the crew as a record.
-pub fn request_to_log(request: &Request) -> v1::Request {
-    // Every kind is in the list; a test checks that.
-    let asked = ASKED.iter().position(|known| *known == request.asked).unwrap_or(ASKED.len());
-    v1::Request {
-        asked: asked as u32,
-        uplink: uplink_to_log(request.uplink),
-        system: request.station.map(|station| u32::from(station.system)),
-        component: request.station.map(|station| u32::from(station.component)),
-        by: request.by.as_ref().map(operator_to_log),
-        confirms: request.confirms.map(u32::from),
-        station: request.station.map(|station| station.number).filter(|number| *number != 0),
-    }
-}
-
-/// A recorded request of the crew.
-///
-/// # Errors
-/// This build does not know some value of it.
-pub fn request_from_log(request: &v1::Request, frame: u64) -> Result<Request, RecordError> {
-    let unknown =
-        RecordError::Unknown { frame, what: "request", found: request.asked, most: ASKED.len() - 1 };
-    let ids = request.system.zip(request.component);
-    let station =
-        ids.map(|(system, component)| station_from_log((system, component, request.station), frame));
-    Ok(Request {
-        asked: *ASKED.get(request.asked as usize).ok_or(unknown)?,
-        uplink: uplink_from_log(request.uplink.as_ref()),
-        station: station.transpose()?,
-        by: request.by.as_ref().map(|by| operator_from_log(by, frame)).transpose()?,
-        confirms: request.confirms.map(|number| short(number, frame, "ask")).transpose()?,
+/// The motor's estimate as a record; none before ignition.
+fn motor_to_log(motor: &MotorEstimate) -> Option<flight_v1::MotorEstimate> {
+    let ignition_s = motor.ignition_s()?;
+    let [
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
+    ] = motor.sigmas();
+    Some(flight_v1::MotorEstimate {
+        impulse_scale: motor.impulse_scale(),
+        burn_time_scale: motor.burn_time_stretch(),
+        ignition_s,
+        air_scale: motor.air_scale(),
+        shape_deviation: motor.shape_deviation(),
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
     })
-}
-
-fn station_from_log(
-    (system, component, number): (u32, u32, Option<u32>),
-    frame: u64,
-) -> Result<Station, RecordError> {
-    Ok(Station {
-        system: byte(system, frame, "system")?,
-        component: byte(component, frame, "component")?,
-        number: number.unwrap_or(0),
-    })
-}
-
-fn operator_to_log(operator: &Operator) -> v1::Operator {
-    v1::Operator {
-        number: u32::from(operator.number),
-        role: u32::from(operator.role as u8),
-        name: operator.name.as_str().into(),
-    }
-}
-
-fn operator_from_log(operator: &v1::Operator, frame: u64) -> Result<Operator, RecordError> {
-    let most = Role::ALL.len() - 1;
-    let unknown = RecordError::Unknown { frame, what: "role", found: operator.role, most };
-    Ok(Operator {
-        number: byte(operator.number, frame, "operator")?,
-        role: *Role::ALL.get(operator.role as usize).ok_or(unknown)?,
-        name: Name::new(&operator.name),
-    })
-}
-
-fn people_to_log(people: People) -> v1::People {
-    match people {
-        People::One => v1::People { count: 1, first_ask: None },
-        People::Two { first_ask } => v1::People { count: 2, first_ask: Some(u32::from(first_ask)) },
-    }
-}
-
-fn people_from_log(people: &v1::People, frame: u64) -> Result<People, RecordError> {
-    match (people.count, people.first_ask) {
-        (1, _) => Ok(People::One),
-        (2, Some(first_ask)) => Ok(People::Two { first_ask: short(first_ask, frame, "first ask")? }),
-        (found, _) => Err(RecordError::Unknown { frame, what: "crew", found, most: 2 }),
-    }
-}
-
-fn short(number: u32, frame: u64, what: &'static str) -> Result<u16, RecordError> {
-    let most = usize::from(u16::MAX);
-    u16::try_from(number).map_err(|_too_large| RecordError::Unknown { frame, what, found: number, most })
-}
-
-fn byte(number: u32, frame: u64, what: &'static str) -> Result<u8, RecordError> {
-    let most = usize::from(u8::MAX);
-    u8::try_from(number).map_err(|_too_large| RecordError::Unknown { frame, what, found: number, most })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flight::computer::LogState;
+    use flight::computer::crew::People;
     use flight::estimation::estimator::{ImuSample, Measurements};
+    use flight::rules::arming::PredictedLanding;
+    use flight::rules::operator::{Name, Operator, Role};
+    use flight::rules::two_person::Station;
     use nalgebra::Vector3;
     use proptest::prelude::*;
     use prost::Message as _;
 
-    use crate::estimate::tests::any_bits;
+    use crate::logged::ASKED;
+    use crate::logged::tests::any_bits;
 
     fn any_uplink() -> impl Strategy<Value = Uplink> {
         prop_oneof![
@@ -502,10 +369,10 @@ mod tests {
             ..v1::ComputerInput::default()
         };
         let error = input_from_log(&input).unwrap_err().to_string();
-        assert_eq!(error, "frame 7: request 10 is unknown; this build knows 0 to 9");
+        assert_eq!(error, "frame 7: asked 10 is unknown; this build knows 0 to 9");
         let error =
             input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
-        assert_eq!(error.to_string(), "frame 7: gimbal angles has 1 values and should have 2");
+        assert_eq!(error.to_string(), "frame 7: gimbal_rad has 1 values and should have 2");
         let both =
             v1::ComputerInput { known: Some(protocol::records::flight_v1::Estimate::default()), ..input };
         assert_eq!(input_from_log(&both).unwrap_err(), RecordError::Sensed { frame: 7 });

@@ -5,7 +5,7 @@
 //!
 //! * [`frame`]: the flight computer's frames.
 //! * [`again`]: the flight computer of a log, run again on these frames.
-//! * [`estimate`]: what it measures and estimates.
+//! * [`logged`]: its types and their records.
 //! * [`sortie`]: a simulated flight as records, with the truth.
 //!
 //! Without the feature `simulated` (the last one) the crate needs no operating system.
@@ -14,7 +14,7 @@
 extern crate alloc;
 
 pub mod again;
-pub mod estimate;
 pub mod frame;
+pub mod logged;
 #[cfg(feature = "simulated")]
 pub mod sortie;

@@ -23,8 +23,8 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::world::{Strain, Touchdown};
 
-use crate::estimate::{state_to_log, thought_to_log, vector_to_log};
-use crate::frame::{frame_to_log, start_to_log};
+use crate::frame::{frame_to_log, start_to_log, thought_to_log};
+use crate::logged::Logged as _;
 
 /// The header of the log of a simulated flight.
 pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
@@ -95,11 +95,11 @@ fn truth(flight: &Sortie) -> TruthSample {
     let commanded = flight.computer().commands();
     TruthSample {
         time_s: world.time_s(),
-        state: state_to_log(world.state()),
+        state: world.state().to_log(),
         height_m: world.height_m(),
         thrust_n: world.thrust_n(),
         mass_kg: world.mass().mass_kg,
-        wind_m_s: vector_to_log(&world.wind_m_s()),
+        wind_m_s: world.wind_m_s().to_log(),
         gimbal_commanded_rad: commanded.gimbal_rad.to_vec(),
         gimbal_actual_rad: world.gimbal_rad().to_vec(),
         fins_commanded_rad: commanded.fins_rad.to_vec(),

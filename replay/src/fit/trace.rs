@@ -10,8 +10,8 @@ use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use flight_log::estimate::estimate_from_log;
 use flight_log::frame::{commands_from_log, input_from_log, phase_of};
+use flight_log::logged::{At, Logged as _};
 use protocol::log::computer_v1::ComputerFrame;
 
 use crate::digest::digest;
@@ -176,8 +176,8 @@ impl Trace {
                         phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
                     let read = read.input();
                     let input = read.since(0);
-                    let estimate =
-                        estimate_from_log(&estimate, number).map_err(|error| unknown(error.to_string()))?;
+                    let estimate = Estimate::from_log(&estimate, At { frame: number, field: "estimate" })
+                        .map_err(|error| unknown(error.to_string()))?;
                     if trace.is_none() {
                         let (mission, text) = mission_of(log)?;
                         trace = Some(Self::new(&name, mission, &text));

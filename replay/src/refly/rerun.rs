@@ -2,8 +2,8 @@
 
 use flight::computer::{Commands, FRAME_S};
 use flight::vehicle::mission::Mission;
-use flight_log::estimate::{state_from_log, vector_from_log};
 use flight_log::frame::accepts_abort;
+use flight_log::logged::{state_from_log, vector_from_log};
 use flight_log::sortie::{self as sortie_log, LastFrame};
 use sim::dispersion::Dispersion;
 use sim::fault::{Breakage, FaultError, TimedFault};

@@ -12,7 +12,7 @@ use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
-use flight_log::estimate::{state_from_log, vector_from_log};
+use flight_log::logged::{state_from_log, vector_from_log};
 use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::{flight_v1, v1};

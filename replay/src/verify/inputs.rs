@@ -53,7 +53,7 @@ impl Inputs {
             frame: input.frame,
             in_flight,
             pin_out: input.pin_out,
-            booster_attached: input.booster_attached == Some(true),
+            booster_attached: input.booster_attached,
             battery_v: input.battery_v,
             uplink_age_s: input.uplink.as_ref().and_then(|uplink| uplink.age_s),
             commander_age_s: input.commander.as_ref().map(|commander| commander.age_s),
@@ -89,7 +89,7 @@ fn out_of_range(input: &ComputerInput) -> Option<String> {
         .find_map(|angle| within("angle of a servo, rad,", *angle, ANGLE_MAX_RAD))
         .or_else(|| outside("battery, V,", input.battery_v?, 0.0, BATTERY_MAX_V))
         .or_else(|| {
-            let space = input.log_space_bytes;
+            let space = input.log.space_bytes;
             let can_be = space <= SPACE_MAX_BYTES || space == u64::MAX;
             (!can_be).then(|| format!("{space} bytes of space for the log: no disk has as many"))
         })
@@ -105,9 +105,9 @@ fn out_of_range(input: &ComputerInput) -> Option<String> {
 }
 
 fn measured(measured: &Measurements, time_s: f64) -> Option<String> {
-    let Measurements { gyro_rad_s, specific_force_m_s2, pressure_altitude_m, gnss, lidar_range_m } = measured;
-    vector("gyro, rad/s,", gyro_rad_s, RATE_MAX_RAD_S)
-        .or_else(|| vector("accelerometer, m/s2,", specific_force_m_s2, FORCE_MAX_M_S2))
+    let Measurements { imu, pressure_altitude_m, gnss, lidar_range_m } = measured;
+    vector("gyro, rad/s,", &imu.gyro_rad_s, RATE_MAX_RAD_S)
+        .or_else(|| vector("accelerometer, m/s2,", &imu.specific_force_m_s2, FORCE_MAX_M_S2))
         .or_else(|| within("pressure altitude, m,", (*pressure_altitude_m)?, PLACE_MAX_M))
         .or_else(|| outside("lidar range, m,", (*lidar_range_m)?, -1.0, RANGE_MAX_M))
         .or_else(|| {

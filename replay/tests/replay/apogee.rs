@@ -323,8 +323,8 @@ fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
         _ => {
             if let Some(measured) = &mut input.measured {
                 match field {
-                    10 => measured.gyro_rad_s.y = number,
-                    11 => measured.specific_force_m_s2.x = number,
+                    10 => measured.imu.gyro_rad_s.y = number,
+                    11 => measured.imu.specific_force_m_s2.x = number,
                     12 => measured.pressure_altitude_m = Some(number),
                     _ => measured.lidar_range_m = Some(number),
                 }

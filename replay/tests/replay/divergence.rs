@@ -25,7 +25,7 @@ const FIELDS: [(&str, Flip); 10] = [
     ("output.parachute", |tick, _| tick.output.parachute ^= true),
     ("output.phase", |tick, bit| flip_u32(&mut tick.output.phase, bit)),
     ("output.level", |tick, bit| flip_u32(&mut tick.output.level, bit)),
-    ("output.ignite_booster", |tick, _| tick.output.ignite_booster = Some(true)),
+    ("output.ignite_booster", |tick, _| tick.output.ignite_booster = true),
     ("output.fins_rad.len", |tick, _| {
         tick.output.fins_rad.pop();
     }),
@@ -72,7 +72,7 @@ fn minus_zero_is_not_zero() {
 fn an_input_that_is_not_a_number_is_replayed_like_any_other() {
     let payload = f64::from_bits(0x7ff8_dead_beef_0001);
     let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[7].input.measured.as_mut().unwrap().gyro_rad_s.x = payload;
+    ticks[7].input.measured.as_mut().unwrap().imu.gyro_rad_s.x = payload;
     let report = verify_ticks(&ticks);
     assert_eq!(report.frames_compared, 8);
     assert_eq!(report.first_divergence.unwrap().frame, 8, "the recorded output belonged to another input");

@@ -438,7 +438,7 @@ proptest! {
                     request.asked = asked;
                 }
                 if let Some(measured) = &mut found.input.measured {
-                    measured.gyro_rad_s.x = number;
+                    measured.imu.gyro_rad_s.x = number;
                 }
             }
         };

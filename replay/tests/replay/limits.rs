@@ -282,8 +282,8 @@ fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
     let measured = input.measured.as_mut().unwrap();
     match field {
         0 => input.time_s = number,
-        1 => measured.gyro_rad_s.x = number,
-        2 => measured.specific_force_m_s2.z = number,
+        1 => measured.imu.gyro_rad_s.x = number,
+        2 => measured.imu.specific_force_m_s2.z = number,
         3 => measured.pressure_altitude_m = Some(number),
         4 => measured.lidar_range_m = Some(number),
         5 => input.fins_rad[0] = number,

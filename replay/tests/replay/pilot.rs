@@ -9,8 +9,8 @@ use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::guidance::baseline::Law;
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
-use flight_log::estimate::state_to_log;
 use flight_log::frame::frame_to_log;
+use flight_log::logged::Logged as _;
 use nalgebra::{UnitQuaternion, Vector3};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
@@ -85,7 +85,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
     let start = ComputerStart {
         frame: 0,
         released: true,
-        believed: state_to_log(&believed),
+        believed: believed.to_log(),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         gyro_bias_rad_s: None,

@@ -132,8 +132,11 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| names.iter().position(|known| *known == name).unwrap();
-    let (gimbal, gyro, fin) =
-        (column("output.gimbal_2_rad"), column("input.measured.gyro_rad_s.x"), column("output.fins_4_rad"));
+    let (gimbal, gyro, fin) = (
+        column("output.gimbal_2_rad"),
+        column("input.measured.imu.gyro_rad_s.x"),
+        column("output.fins_4_rad"),
+    );
     let recording = MK2.recording();
     // Frames outside the flight have no flight time, the last column.
     let lines = lines.filter(|line| !line.ends_with(','));
@@ -143,7 +146,7 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
         assert_eq!(cells.len(), names.len());
         let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
         assert_eq!(number(gimbal), tick.output.gimbal_rad[1].to_bits());
-        assert_eq!(number(gyro), tick.input.measured.as_ref().unwrap().gyro_rad_s.x.to_bits());
+        assert_eq!(number(gyro), tick.input.measured.as_ref().unwrap().imu.gyro_rad_s.x.to_bits());
         assert_eq!(number(fin), tick.output.fins_rad[3].to_bits());
         count += 1;
     }

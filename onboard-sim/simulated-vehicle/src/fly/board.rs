@@ -22,8 +22,7 @@ use std::{io, thread};
 use board::stream;
 use board::stream::{Answer, Begin, Frame, OnTheAir, Reader, put};
 use flight::rules::arming::Uplink;
-use flight_log::estimate::RecordError;
-use flight_log::frame::{commander_from_log, request_from_log, uplink_from_log};
+use flight_log::logged::{At, Logged, RecordError};
 use protocol::hub::line::SHARE;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S};
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
@@ -129,11 +128,11 @@ impl OnBoard {
         let Some(stream::Heard { uplink, commander, requests }) = &self.heard else {
             return Ok(UplinkState { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
         };
-        let next = self.last.map_or(0, |last| last + 1);
-        let requests = requests.iter().map(|request| request_from_log(request, next));
+        let at = At { frame: self.last.map_or(0, |last| last + 1), field: "heard" };
+        let requests = requests.iter().map(|request| Logged::from_log(request, at));
         Ok(UplinkState {
-            uplink: uplink_from_log(uplink.as_ref()),
-            commander: commander.as_ref().map(|commander| commander_from_log(commander, next)).transpose()?,
+            uplink: Logged::from_log(uplink, at)?,
+            commander: Logged::from_log(commander, at)?,
             requests: requests.collect::<Result<_, _>>()?,
         })
     }
