@@ -172,19 +172,26 @@ impl Computer {
         let does = |effect| next.effects.contains(effect);
         // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean "unknown".
         let impact = || AbortEffect::Impact { m_s: libm::ceil(self.impact_m_s()).clamp(0.0, 254.0) as u8 };
-        match () {
-            () if next.refusal.is_some() => AbortEffect::None,
-            () if does(Effect::ShowPadWait) => AbortEffect::SafeOnPad,
-            () if does(Effect::DeployChute) => AbortEffect::ChuteNow,
-            () if does(Effect::RecordLoss) => impact(),
-            () if next.mode.interlocks.lands_in_place => match () {
-                () if mode.phase.in_descent() => AbortEffect::Burn,
-                // It was commanded to light and has not.
-                () if mode.phase == Phase::Ignition && mode.interlocks.no_light_latched => impact(),
-                () if self.plans_a_landing() => AbortEffect::LandInPlace,
-                () => AbortEffect::LandUpright,
-            },
-            () => AbortEffect::ChuteAtApogee,
+        // The motor was commanded to light and has not.
+        let unlit = mode.phase == Phase::Ignition && mode.interlocks.no_light_latched;
+        if next.refusal.is_some() {
+            AbortEffect::None
+        } else if does(Effect::ShowPadWait) {
+            AbortEffect::SafeOnPad
+        } else if does(Effect::DeployChute) {
+            AbortEffect::ChuteNow
+        } else if does(Effect::RecordLoss) {
+            impact()
+        } else if !next.mode.interlocks.lands_in_place {
+            AbortEffect::ChuteAtApogee
+        } else if mode.phase.in_descent() {
+            AbortEffect::Burn
+        } else if unlit {
+            impact()
+        } else if self.plans_a_landing() {
+            AbortEffect::LandInPlace
+        } else {
+            AbortEffect::LandUpright
         }
     }
 }

@@ -339,10 +339,12 @@ pub async fn fly_observed(
         if over && !aborted_on_the_pad && options.exit_when_safed && pace.has_lingered(served) {
             break false;
         }
-        let waiting = match () {
-            () if over => Waiting::Over,
-            () if crewed && vehicle.phase().on_pad() => Waiting::Crew,
-            () => Waiting::Nobody,
+        let waiting = if over {
+            Waiting::Over
+        } else if crewed && vehicle.phase().on_pad() {
+            Waiting::Crew
+        } else {
+            Waiting::Nobody
         };
         tokio::select! {
             () = pace.wait(waiting) => {}

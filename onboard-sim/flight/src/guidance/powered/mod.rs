@@ -271,23 +271,12 @@ impl PoweredGuidance {
             && solution.states.iter().all(PlanarState::is_finite)
             && largest_tilt_rad < PLAN_TILT_MAX_RAD
             && solution.inputs_rad.iter().all(|input| input.is_finite());
-        let level = match () {
-            () if !usable => match &self.flown {
-                Some(flown) if flown.left_s(time_s) > 0.0 => ControlLevel::ShiftedPlan,
-                _ => ControlLevel::Stabiliser,
-            },
-            // Too low for any landing: a plan would turn the body across the air to brake, and gain the same speed
-            // sideways.
-            () if !situation.high && solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S) => {
-                ControlLevel::Stabiliser
-            }
-            () if solution.status == SolveStatus::Converged
-                && solution.condition_miss <= self.settings.landing_miss =>
-            {
-                ControlLevel::Converged
-            }
-            () => ControlLevel::BestFeasible,
-        };
+        // Too low for any landing: a plan would turn the body across the air to brake, and gain the same speed sideways.
+        let too_low = !situation.high && solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S);
+        let lands = solution.status == SolveStatus::Converged
+            && solution.condition_miss <= self.settings.landing_miss;
+        let left_s = self.flown.as_ref().map(|flown| flown.left_s(time_s));
+        let level = ControlLevel::of_plan(usable, left_s, too_low, lands);
         let touchdown = solution.states.last().copied().unwrap_or_default();
         self.report = PoweredReport {
             level,

@@ -30,6 +30,20 @@ pub enum ControlLevel {
 }
 
 impl ControlLevel {
+    /// The level after a plan was tried. `usable`: it is finite and flyable; `left_s`: time that an earlier plan still has, s;
+    /// `too_low`: no landing is left to plan; `lands`: the plan converged on its end.
+    pub(super) fn of_plan(usable: bool, left_s: Option<f64>, too_low: bool, lands: bool) -> Self {
+        if !usable {
+            if left_s.is_some_and(|left_s| left_s > 0.0) { Self::ShiftedPlan } else { Self::Stabiliser }
+        } else if too_low {
+            Self::Stabiliser
+        } else if lands {
+            Self::Converged
+        } else {
+            Self::BestFeasible
+        }
+    }
+
     /// Every level, in index order.
     pub const ALL: [Self; 6] = [
         Self::Idle,

@@ -82,12 +82,12 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         }
         (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the ground only"),
 
-        (P::PadIdle, E::ArmRequested { checks_passed }) => match () {
-            () if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
-            () if !locks.pin_out => Row::Refuse(Refusal::PinIn),
-            () if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
-            () => Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE),
-        },
+        (P::PadIdle, E::ArmRequested { .. }) if locks.abort_latched => Row::Refuse(Refusal::AbortLatched),
+        (P::PadIdle, E::ArmRequested { .. }) if !locks.pin_out => Row::Refuse(Refusal::PinIn),
+        (P::PadIdle, E::ArmRequested { checks_passed: false }) => Row::Refuse(Refusal::ChecksFailed),
+        (P::PadIdle, E::ArmRequested { checks_passed: true }) => {
+            Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE)
+        }
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
         (P::PadArmed, E::DisarmRequested { .. }) => disarmed(mode),
@@ -344,11 +344,15 @@ fn countdown_over(mode: &Mode, time_s: f64) -> bool {
 
 /// The interlocks of the landing motor that hold in every phase.
 fn may_light(locks: Interlocks, row: impl FnOnce() -> Row) -> Row {
-    match () {
-        () if !locks.armed => Row::Refuse(Refusal::NotArmed),
-        // An abort too low for the parachute lands on the motor.
-        () if locks.abort_latched && !locks.lands_in_place => Row::Refuse(Refusal::AbortLatched),
-        () if locks.landing_motor_inhibited => Row::Refuse(Refusal::LandingMotorInhibited),
-        () => row(),
+    // An abort too low for the parachute lands on the motor.
+    let aborted = locks.abort_latched && !locks.lands_in_place;
+    if !locks.armed {
+        Row::Refuse(Refusal::NotArmed)
+    } else if aborted {
+        Row::Refuse(Refusal::AbortLatched)
+    } else if locks.landing_motor_inhibited {
+        Row::Refuse(Refusal::LandingMotorInhibited)
+    } else {
+        row()
     }
 }

@@ -88,18 +88,10 @@ impl SpaceGuidance {
     ) -> Option<PoweredReport> {
         let outcome = self.search(time_s, state, situation, settings, space)?;
         let usable = self.found.is_finite();
-        let level = match () {
-            () if !usable => match self.left_s(time_s) {
-                Some(left_s) if left_s > 0.0 => ControlLevel::ShiftedPlan,
-                _ => ControlLevel::Stabiliser,
-            },
-            // Too low for any landing: upright brakes just as well.
-            () if self.found.end_m_s() < HARD_M_S => ControlLevel::Stabiliser,
-            () if outcome.status == Status::Converged && outcome.miss <= settings.landing_miss => {
-                ControlLevel::Converged
-            }
-            () => ControlLevel::BestFeasible,
-        };
+        // Too low for any landing: upright brakes just as well.
+        let too_low = self.found.end_m_s() < HARD_M_S;
+        let lands = outcome.status == Status::Converged && outcome.miss <= settings.landing_miss;
+        let level = ControlLevel::of_plan(usable, self.left_s(time_s), too_low, lands);
         if usable {
             self.found.project(plane, situation.wind_m_s.dot(&plane.along), &mut self.projected);
         }
