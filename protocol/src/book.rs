@@ -1,13 +1,13 @@
-//! The book of a station: who did what when, as a chain of hashes whose head is signed.
+//! The book of a station: who did what when, with a hash over all of it that is signed.
 //!
-//! Every entry holds the hash of the entry before it, so a later change of an entry breaks the chain there. Whoever
-//! changes an entry and computes all later hashes anew gets another head, which they cannot sign. The vehicle keeps the
-//! signed heads it was sent, so a book that was cut is shorter than what the vehicle knows of it.
+//! Whoever changes an entry gets another hash, which they cannot sign. The vehicle keeps the signed hashes that it was sent,
+//! so a book that was cut is shorter than what the vehicle has of it.
 //!
 //! The way of an entry: the ground's `update` enters a line for a key, a command, an answer, a signature of the checklist or a
 //! word of the vehicle. Its `app` adds the time of day; here it is numbered and hashed, and it goes to `/book` of the station's
-//! log. At most every 2 s the head is signed, recorded (`/book/head`) and sent to the vehicle until the vehicle confirms it. The
-//! frame is in the vehicle's log before the confirmation leaves. `replay verify --book` compares all of them ([`audit`]).
+//! log. At most every 2 s, and at the close, the hash of all entries is signed, recorded (`/book/head`) and sent to the vehicle
+//! until the vehicle confirms it. The frame is in the vehicle's log before the confirmation leaves. `replay verify --book`
+//! compares all of them ([`audit`]).
 
 use std::fmt;
 
@@ -19,12 +19,7 @@ use crate::identity::Address;
 use crate::log::v1;
 use crate::signing::Key;
 
-/// Bytes of a hash.
-pub const HASH_LEN: usize = 32;
-/// What every hash of an entry begins with, so that no hash of something else is one.
-const ENTRY_DOMAIN: &[u8] = b"touchdown book entry 1";
-
-pub type Hash = [u8; HASH_LEN];
+pub type Hash = [u8; 32];
 
 /// The kind of the first entry.
 pub const OPENED: &str = "opened";
@@ -43,11 +38,11 @@ pub struct Line<'a> {
     pub text: &'a str,
 }
 
-/// The end of a book: how many entries it has, and the hash of the last.
+/// The end of a book: how many entries it has, and the hash over all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct Head {
-    /// The beginning of the first entry's hash, which names the book.
+    /// The beginning of the hash over the first entry, which names the book.
     pub book: u64,
     pub entries: u32,
     pub hash: Hash,
@@ -61,69 +56,51 @@ pub struct SignedHead {
 }
 
 /// A book that is being written. It begins with the first entry.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default)]
 pub struct Book {
+    hasher: Sha256,
     head: Option<Head>,
 }
 
 impl Book {
     /// Enters a line at the end.
     pub fn enter(&mut self, line: &Line) -> v1::BookEntry {
-        let number = self.head.map_or(0, |head| head.entries);
-        let previous = self.head.map_or([0; HASH_LEN], |head| head.hash);
-        let hash = hash(&previous, number, line);
-        let book = self.head.map_or_else(|| name(&hash), |head| head.book);
-        self.head = Some(Head { book, entries: number.saturating_add(1), hash });
-        v1::BookEntry {
-            number,
+        let entry = v1::BookEntry {
+            number: self.head.map_or(0, |head| head.entries),
             unix_ns: line.unix_ns,
             kind: line.kind.to_owned(),
             who: line.who.to_owned(),
             text: line.text.to_owned(),
-            previous: previous.to_vec(),
-            hash: hash.to_vec(),
-        }
+        };
+        self.add(&entry);
+        entry
     }
 
     /// The present end; `None` before the first entry.
     pub fn head(&self) -> Option<Head> {
         self.head
     }
-}
 
-/// The name of a book whose first entry has this hash.
-fn name(first: &Hash) -> u64 {
-    let mut bytes = [0; 8];
-    bytes.copy_from_slice(&first[..8]);
-    u64::from_le_bytes(bytes)
-}
-
-/// The hash of an entry: SHA-256 over the hash before, the number, and the line; each text with its length before it.
-fn hash(previous: &Hash, number: u32, line: &Line) -> Hash {
-    let mut hasher = Sha256::new()
-        .chain_update(ENTRY_DOMAIN)
-        .chain_update(previous)
-        .chain_update(number.to_le_bytes())
-        .chain_update(line.unix_ns.to_le_bytes());
-    for text in [line.kind, line.who, line.text] {
-        hasher.update((text.len() as u64).to_le_bytes());
-        hasher.update(text.as_bytes());
+    /// Adds the numbers and texts of an entry to the hash; each text with its length before it.
+    fn add(&mut self, entry: &v1::BookEntry) -> Head {
+        self.hasher.update(entry.number.to_le_bytes());
+        self.hasher.update(entry.unix_ns.to_le_bytes());
+        for text in [&entry.kind, &entry.who, &entry.text] {
+            self.hasher.update((text.len() as u64).to_le_bytes());
+            self.hasher.update(text.as_bytes());
+        }
+        let hash: Hash = self.hasher.clone().finalize().into();
+        let name = hash.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        let book = self.head.map_or(name, |head| head.book);
+        *self.head.insert(Head { book, entries: entry.number.saturating_add(1), hash })
     }
-    hasher.finalize().into()
 }
 
 /// The beginning of a hash in groups of four digits, to be compared by eye.
 pub fn shown(hash: &[u8]) -> String {
-    let mut text = String::new();
-    for (place, byte) in hash.iter().take(16).enumerate() {
-        if place > 0 && place % 2 == 0 {
-            text.push('-');
-        }
-        text.extend(
-            [byte >> 4, byte & 0xF].into_iter().filter_map(|digit| char::from_digit(digit.into(), 16)),
-        );
-    }
-    text
+    let (pairs, _) = hash.as_chunks::<2>();
+    let groups: Vec<String> = pairs.iter().take(8).map(|[a, b]| format!("{a:02x}{b:02x}")).collect();
+    groups.join("-")
 }
 
 impl SignedHead {
@@ -147,12 +124,11 @@ impl SignedHead {
     }
 
     /// The record of the station's log.
-    pub fn record(&self, public_key: Option<PublicKey>) -> v1::BookHead {
+    pub fn record(&self) -> v1::BookHead {
         v1::BookHead {
             book: self.head.book,
             entries: self.head.entries,
             hash: self.head.hash.to_vec(),
-            public_key: public_key.map_or_else(Vec::new, |key| key.bytes().to_vec()),
             signature: self.signature.to_vec(),
         }
     }
@@ -234,162 +210,108 @@ fn signed_bytes(head: &Head) -> Vec<u8> {
     [HEAD_DOMAIN, &head.book.to_le_bytes(), &head.entries.to_le_bytes(), &head.hash].concat()
 }
 
-// Checks a book against itself, its signed heads, and the heads that others know.
+// Checks a book against the signed heads in its own log and in the vehicle's.
 
-/// A head that the auditor has from somewhere else.
+/// A signed head that was found in a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Known {
+pub struct FoundHead {
     /// As in `the vehicle's log flight.mcap`.
     pub from: String,
+    pub by_vehicle: bool,
     pub signed: SignedHead,
 }
 
 /// Why a book is not what was written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Broken {
-    #[error("entry {number} is missing: the next one in the log is entry {found}")]
-    Missing { number: u32, found: u32 },
-    #[error("entry {number} was changed: its hash does not fit its text")]
-    Changed { number: u32 },
-    #[error("entry {number} does not follow entry {}: an entry before it was changed or exchanged", number - 1)]
-    NotLinked { number: u32 },
-    #[error("entry {number} is no entry: a hash has the wrong length")]
-    NoHash { number: u32 },
     #[error("the book does not begin with its first entry")]
     NoBeginning,
-    #[error("{from} has another hash for the first {entries} entries: an entry up to {} was changed", entries - 1)]
-    OtherHistory { from: String, entries: u32 },
-    #[error("the book was cut: it has {entries} entries, and {from} knows of {known}")]
-    Cut { entries: u32, from: String, known: u32 },
-    #[error("the head of {entries} entries in {from} is not signed with the key of the book")]
+    #[error("entry {number} is missing: the next one in the log is entry {found}")]
+    Missing { number: u32, found: u32 },
+    #[error("an entry from {first} to {last} was changed: {from} has another hash")]
+    Changed { first: u32, last: u32, from: String },
+    #[error("the book was cut: it has {entries} entries, and {from} has a hash of {signed}")]
+    Cut { entries: u32, from: String, signed: u32 },
+    #[error("the hash of {entries} entries in {from} is not signed with the key of the book")]
     BadSignature { from: String, entries: u32 },
     #[error("the book is signed with another key than the given one: {found}")]
     OtherKey { found: String },
 }
 
-/// What is proven of a book whose links all hold.
+/// The result for one book.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Proof {
-    /// The entries that a signed head of the station covers: only the key's owner can have written them.
+pub struct Audit {
+    pub head: Option<Head>,
+    /// The key in the text of the first entry.
+    pub key: Option<PublicKey>,
+    /// The first that is wrong; `None` if the book is whole.
+    pub broken: Option<Broken>,
+    /// The entries under a signature in the station's log: only the owner of the key can have written them.
     pub signed: u32,
-    /// The entries that somebody else knows the head of: they cannot have been changed or cut since.
+    /// The entries whose hash a vehicle has: they cannot have been changed or cut since.
     pub witnessed: u32,
     /// Whether the last entry says that the book was closed.
     pub closed: bool,
 }
 
-/// The result for one book.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Audit {
-    /// The name of the book.
-    pub book: u64,
-    pub entries: u32,
-    pub head: Option<Head>,
-    /// The key named in the first entry's text, that has signed the heads.
-    pub key: Option<PublicKey>,
-    /// The first of each kind of broken link, the earliest first; empty if the book is whole.
-    pub broken: Vec<Broken>,
-    pub proof: Proof,
+/// Checks the entries of one book, in the order of the log, against the signed heads of it. `trusted` is the key that the auditor
+/// trusts; without it the key in the first entry is taken.
+pub fn audit(entries: &[v1::BookEntry], heads: &[FoundHead], trusted: Option<PublicKey>) -> Audit {
+    let mut audit = Audit {
+        key: entries.first().and_then(|first| key_in(&first.text)),
+        closed: entries.last().is_some_and(|entry| entry.kind == CLOSED),
+        ..Audit::default()
+    };
+    audit.broken = check(entries, heads, trusted, &mut audit).err();
+    audit
 }
 
-/// Checks the entries of one book, in the order of the log, its own signed heads, and the heads that others know.
-/// `pinned` is the key that the auditor trusts; without it the key in the log is taken.
-pub fn audit(
+fn check(
     entries: &[v1::BookEntry],
-    own: &[v1::BookHead],
-    known: &[Known],
-    pinned: Option<PublicKey>,
-) -> Audit {
-    let mut found = Audit::default();
-    let heads = chain(entries, &mut found);
-    found.entries = u32::try_from(heads.len()).unwrap_or(u32::MAX);
-    found.head = heads.last().copied();
-    found.book = found.head.map(|head| head.book).unwrap_or_default();
-    found.proof.closed = entries.last().is_some_and(|entry| entry.kind == CLOSED);
-    let named = entries.first().and_then(|entry| key_in(&entry.text));
-    let in_heads = own.iter().find_map(|head| PublicKey::from_bytes(&head.public_key));
-    found.key = named.or(in_heads);
-    if let (Some(pinned), Some(key)) = (pinned, found.key)
-        && pinned != key
-    {
-        found.broken.push(Broken::OtherKey { found: key.to_string() });
-    }
-    let key = pinned.or(found.key);
-    for signed in own.iter().filter_map(SignedHead::of_record) {
-        let from = "the log itself".to_owned();
-        if hold(&heads, &Known { from, signed }, key, &mut found) && key.is_some() {
-            found.proof.signed = found.proof.signed.max(signed.head.entries);
-        }
-    }
-    for known in known {
-        if hold(&heads, known, key, &mut found) {
-            found.proof.witnessed = found.proof.witnessed.max(known.signed.head.entries);
-        }
-    }
-    found
-}
-
-/// Follows the chain to its first broken link. Returns the head after each entry.
-fn chain(entries: &[v1::BookEntry], found: &mut Audit) -> Vec<Head> {
-    let mut heads: Vec<Head> = Vec::new();
+    heads: &[FoundHead],
+    trusted: Option<PublicKey>,
+    audit: &mut Audit,
+) -> Result<(), Broken> {
+    let mut book = Book::default();
+    let mut ends: Vec<Head> = Vec::new();
     if entries.first().is_none_or(|first| first.number != 0 || first.kind != OPENED) {
-        found.broken.push(Broken::NoBeginning);
-        return heads;
+        return Err(Broken::NoBeginning);
     }
-    for (place, entry) in entries.iter().enumerate() {
-        let number = u32::try_from(place).unwrap_or(u32::MAX);
+    for entry in entries {
+        let number = ends.len() as u32;
         if entry.number != number {
-            found.broken.push(Broken::Missing { number, found: entry.number });
-            return heads;
+            return Err(Broken::Missing { number, found: entry.number });
         }
-        let stored: Result<Hash, _> = entry.hash.as_slice().try_into();
-        let previous: Result<Hash, _> = entry.previous.as_slice().try_into();
-        let (Ok(stored), Ok(previous)) = (stored, previous) else {
-            found.broken.push(Broken::NoHash { number });
-            return heads;
+        ends.push(book.add(entry));
+    }
+    audit.head = book.head();
+    if let (Some(trusted), Some(key)) = (trusted, audit.key)
+        && trusted != key
+    {
+        return Err(Broken::OtherKey { found: key.to_string() });
+    }
+    let key = trusted.or(audit.key);
+    let mut heads: Vec<&FoundHead> = heads.iter().collect();
+    heads.sort_by_key(|found| found.signed.head.entries);
+    for FoundHead { from, by_vehicle, signed } in heads {
+        let (from, count) = (from.clone(), signed.head.entries);
+        if key.is_some_and(|key| !key.signed(signed)) {
+            return Err(Broken::BadSignature { from, entries: count });
+        }
+        let Some(end) = count.checked_sub(1).and_then(|last| ends.get(last as usize)) else {
+            return Err(Broken::Cut { entries: ends.len() as u32, from, signed: count });
         };
-        if previous != heads.last().map_or([0; HASH_LEN], |head| head.hash) {
-            found.broken.push(Broken::NotLinked { number });
-            return heads;
+        if end.hash != signed.head.hash {
+            let first = audit.signed.max(audit.witnessed);
+            return Err(Broken::Changed { first, last: count - 1, from });
         }
-        let line = Line { unix_ns: entry.unix_ns, kind: &entry.kind, who: &entry.who, text: &entry.text };
-        if hash(&previous, number, &line) != stored {
-            found.broken.push(Broken::Changed { number });
-            return heads;
-        }
-        let book = heads.first().map_or_else(|| name(&stored), |head| head.book);
-        heads.push(Head { book, entries: number.saturating_add(1), hash: stored });
-    }
-    heads
-}
-
-/// Whether a known head fits the chain and is signed with the book's key, if it has one.
-fn hold(heads: &[Head], known: &Known, key: Option<PublicKey>, found: &mut Audit) -> bool {
-    let Head { entries, hash, .. } = known.signed.head;
-    let from = known.from.clone();
-    if key.is_some_and(|key| !key.signed(&known.signed)) {
-        return report(found, Broken::BadSignature { from, entries });
-    }
-    let place = usize::try_from(entries).unwrap_or(usize::MAX).checked_sub(1);
-    match place.and_then(|place| heads.get(place)) {
-        Some(head) if head.hash == hash => true,
-        Some(_) => report(found, Broken::OtherHistory { from, entries }),
-        // What comes after a broken link cannot be compared.
-        None if entries == 0 || !found.broken.is_empty() => false,
-        None => {
-            let entries_here = u32::try_from(heads.len()).unwrap_or(u32::MAX);
-            report(found, Broken::Cut { entries: entries_here, from, known: entries })
+        if *by_vehicle {
+            audit.witnessed = count;
+        } else if key.is_some() {
+            audit.signed = count;
         }
     }
-}
-
-/// Adds a broken link, unless one of its kind is known. Returns false.
-fn report(found: &mut Audit, broken: Broken) -> bool {
-    let kind = std::mem::discriminant(&broken);
-    if !found.broken.iter().any(|other| std::mem::discriminant(other) == kind) {
-        found.broken.push(broken);
-    }
-    false
+    Ok(())
 }
 
 /// The key in the text of the first entry.

@@ -197,7 +197,7 @@ impl StationBook {
             Some(key) => key.sign(head),
             None => SignedHead { head, signature: [0; 64] },
         };
-        let record = Record::BookHead(signed.record(self.key.as_ref().map(BookKey::public)));
+        let record = Record::BookHead(signed.record());
         Some((signed, record))
     }
 

@@ -218,7 +218,7 @@ pub struct BookState {
 }
 
 impl BookState {
-    /// The number of entries and the beginning of the head, as `replay verify --book --head` takes it.
+    /// The number of entries and the beginning of the hash, as `replay verify --book` prints them.
     pub fn short(&self) -> Option<String> {
         let head = self.head?.head;
         Some(format!("{}:{}", head.entries, shown(&head.hash)))

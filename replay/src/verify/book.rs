@@ -1,4 +1,4 @@
-//! Proves the books of ground stations, or names the first broken link of each.
+//! Prints the books of ground stations, and proves them or says what is broken.
 //!
 //! A log of a station holds its book. A log of the vehicle holds the ends of books that stations sent: whoever changes a
 //! station's log cannot change those.
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use prost::Message as _;
-use protocol::book::{Audit, Known, PublicKey, SignedHead, audit, shown as shown_hash};
+use protocol::book::{Audit, FoundHead, PublicKey, SignedHead, audit, shown as shown_hash};
 use protocol::dialect::MavMessage;
 use protocol::frame::Framer;
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
@@ -21,47 +21,13 @@ use crate::cli::{Outcome, answer};
 use crate::log::open_regular;
 use crate::print::{print_json, shown};
 
-/// A head as a station shows it at the end: the number of entries, and the beginning of the hash.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ShownHead {
-    pub entries: u32,
-    /// Groups of four hexadecimal digits.
-    pub hash: String,
-}
-
-impl std::str::FromStr for ShownHead {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no head; give it as the station showed it, as in 57:ab12-cd34-...");
-        let (entries, hash) = text.split_once(':').ok_or_else(wrong)?;
-        let entries = entries.parse().map_err(|_not_a_number| wrong())?;
-        let digits = hash.chars().filter(char::is_ascii_hexdigit).count();
-        let plain = hash.chars().all(|letter| letter.is_ascii_hexdigit() || letter == '-');
-        if digits < 8 || !plain {
-            return Err(wrong());
-        }
-        Ok(Self { entries, hash: hash.to_lowercase() })
-    }
-}
-
-/// What an auditor holds against the books.
-#[derive(Debug, Clone, Default)]
-pub struct Trusted {
-    /// The station's public key.
-    pub key: Option<PublicKey>,
-    /// The head that a station showed.
-    pub head: Option<ShownHead>,
-}
-
 /// The result for one book.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BookFound {
     /// The log that holds it.
     pub log: String,
     pub entries: u32,
-    /// The number of entries and the beginning of the head, as the station shows it.
+    /// The number of entries and the beginning of the hash, as the station shows it.
     pub head: String,
     /// The key that signed it.
     pub public_key: Option<String>,
@@ -69,27 +35,23 @@ pub struct BookFound {
     pub key_is_trusted: bool,
     /// Whether it ends with its last entry.
     pub closed: bool,
-    /// How many entries a signed head of the log covers.
+    /// How many entries a signature in the log covers.
     pub signed: u32,
     /// How many entries a vehicle's log covers.
     pub witnessed: u32,
-    /// Whether the head that the station showed is its end.
-    pub shown_head_fits: Option<bool>,
-    /// What is broken, the first link first; empty if it is whole.
-    pub broken: Vec<String>,
+    /// What is broken; `None` if it is whole.
+    pub broken: Option<String>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
+    /// A line for each entry: when, what, who.
+    pub story: Vec<String>,
 }
 
 impl BookFound {
-    /// Whether no link is broken and its end is vouched for: by a closing entry under a signature, by a vehicle, or by
-    /// the shown head.
+    /// Whether nothing is broken and its end is vouched for: by a closing entry under a signature, or by a vehicle.
     pub fn is_proven(&self) -> bool {
-        let whole = self.broken.is_empty() && self.shown_head_fits != Some(false);
-        let to_its_end = (self.closed && self.signed == self.entries)
-            || self.witnessed == self.entries
-            || self.shown_head_fits == Some(true);
-        whole && to_its_end
+        let to_its_end = (self.closed && self.signed == self.entries) || self.witnessed == self.entries;
+        self.broken.is_none() && to_its_end
     }
 }
 
@@ -97,7 +59,7 @@ impl BookFound {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct AuditFound {
     pub books: Vec<BookFound>,
-    /// Books that a vehicle knows of and that are not among the logs.
+    /// Books of which a vehicle has a hash and that are not among the logs.
     pub missing: Vec<String>,
 }
 
@@ -107,73 +69,59 @@ impl AuditFound {
     }
 }
 
-/// Audits every book in these logs against what all of them know.
+/// Audits every book in these logs against the signed hashes in all of them. `trusted` is the station's public key.
 ///
 /// # Errors
 /// A log cannot be read.
-pub fn audit_logs(paths: &[impl AsRef<Path>], trusted: &Trusted) -> Result<AuditFound, ReadError> {
+pub fn audit_logs(paths: &[impl AsRef<Path>], trusted: Option<PublicKey>) -> Result<AuditFound, ReadError> {
     let logs = paths.iter().map(|path| read(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
-    Ok(audit_contents(&logs, trusted))
-}
-
-/// Audits logs that were read.
-pub fn audit_contents(logs: &[Contents], trusted: &Trusted) -> AuditFound {
-    let told: Vec<&Known> = logs.iter().flat_map(|log| &log.told_to_vehicle).collect();
+    let by_vehicle: Vec<&FoundHead> =
+        logs.iter().flat_map(|log| &log.heads).filter(|head| head.by_vehicle).collect();
     let mut books = Vec::new();
     let mut present = Vec::new();
-    for log in logs.iter().filter(|log| !log.entries.is_empty() || !log.heads.is_empty()) {
+    for log in logs.iter().filter(|log| log.has_book()) {
+        let own: Vec<&FoundHead> = log.heads.iter().filter(|head| !head.by_vehicle).collect();
         // The name of a book is in its heads, too: its first entry may have been changed.
-        let names = book_names(log);
-        let of_it = told.iter().filter(|known| names.contains(&known.signed.head.book));
-        let known: Vec<Known> = of_it.map(|known| (*known).clone()).collect();
-        books.push(found(log, &audit(&log.entries, &log.heads, &known, trusted.key), trusted));
+        let names: Vec<u64> = own.iter().map(|head| head.signed.head.book).collect();
+        let of_it = by_vehicle.iter().filter(|head| names.contains(&head.signed.head.book));
+        let heads: Vec<FoundHead> = own.iter().chain(of_it).map(|head| (*head).clone()).collect();
+        books.push(found(log, &audit(&log.entries, &heads, trusted), trusted));
         present.extend(names);
     }
     let mut missing: Vec<String> = Vec::new();
-    for known in told.iter().filter(|known| !present.contains(&known.signed.head.book)) {
-        let name = format!("book {:016x}, of which {} knows", known.signed.head.book, known.from);
+    for head in by_vehicle.iter().filter(|head| !present.contains(&head.signed.head.book)) {
+        let name = format!("book {:016x}, of which {} has a hash", head.signed.head.book, head.from);
         if !missing.contains(&name) {
             missing.push(name);
         }
     }
-    AuditFound { books, missing }
+    Ok(AuditFound { books, missing })
 }
 
-/// Every name under which a log's book may be known.
-fn book_names(log: &Contents) -> Vec<u64> {
-    let first = log.entries.first().and_then(|entry| entry.hash.first_chunk::<8>());
-    let mut names: Vec<u64> = first.map(|bytes| u64::from_le_bytes(*bytes)).into_iter().collect();
-    names.extend(log.heads.iter().map(|head| head.book));
-    names.sort_unstable();
-    names.dedup();
-    names
-}
-
-fn found(log: &Contents, audit: &Audit, trusted: &Trusted) -> BookFound {
+fn found(log: &Contents, audit: &Audit, trusted: Option<PublicKey>) -> BookFound {
     let head =
         audit.head.map_or_else(String::new, |head| format!("{}:{}", head.entries, shown_hash(&head.hash)));
-    let shown_head_fits = trusted.head.as_ref().map(|wanted| {
-        audit.head.is_some_and(|head| {
-            head.entries == wanted.entries && shown_hash(&head.hash).starts_with(&wanted.hash)
-        })
-    });
-    let mut broken: Vec<String> = audit.broken.iter().map(ToString::to_string).collect();
-    if shown_head_fits == Some(false) {
-        broken.push("its end is not the head that the station showed".to_owned());
-    }
     BookFound {
         log: log.name.clone(),
-        entries: audit.entries,
+        entries: audit.head.map_or(0, |head| head.entries),
         head,
         public_key: audit.key.map(|key| key.to_string()),
-        key_is_trusted: trusted.key.is_some() && trusted.key == audit.key,
-        closed: audit.proof.closed,
-        signed: audit.proof.signed,
-        witnessed: audit.proof.witnessed,
-        shown_head_fits,
-        broken,
+        key_is_trusted: trusted.is_some() && trusted == audit.key,
+        closed: audit.closed,
+        signed: audit.signed,
+        witnessed: audit.witnessed,
+        broken: audit.broken.as_ref().map(ToString::to_string),
         damage: log.damage.clone(),
+        story: log.entries.iter().map(told).collect(),
     }
+}
+
+/// As in `12:03:07 commanded: ARM commanded, attempt 1 (Ann)`; times are UTC.
+fn told(entry: &BookEntry) -> String {
+    let second = entry.unix_ns / 1_000_000_000;
+    let (hour, minute, second) = (second / 3600 % 24, second / 60 % 60, second % 60);
+    let who = if entry.who.is_empty() { String::new() } else { format!(" ({})", entry.who) };
+    format!("{hour:02}:{minute:02}:{second:02} {}: {}{who}", entry.kind, entry.text)
 }
 
 /// Why a log cannot be audited.
@@ -187,21 +135,20 @@ pub enum ReadError {
 
 /// What one log holds of books.
 #[derive(Debug, Clone, Default)]
-pub struct Contents {
-    pub name: String,
+struct Contents {
+    name: String,
     /// The entries of the station's book, in the order of the file.
-    pub entries: Vec<BookEntry>,
-    pub heads: Vec<BookHead>,
-    /// The ends of books that the vehicle received.
-    pub told_to_vehicle: Vec<Known>,
-    pub damage: Option<String>,
+    entries: Vec<BookEntry>,
+    /// The signed hashes of the station's own book, and those that the vehicle received.
+    heads: Vec<FoundHead>,
+    damage: Option<String>,
 }
 
 /// Reads a log to its end, or to its first damage.
 ///
 /// # Errors
 /// The file cannot be read, or is no log.
-pub fn read(path: &Path) -> Result<Contents, ReadError> {
+fn read(path: &Path) -> Result<Contents, ReadError> {
     let failed = |source| ReadError::Read { path: path.to_owned(), source };
     let mut reader = LogReader::new(BufReader::new(open_regular(path).map_err(failed)?));
     let mut contents = Contents { name: path.display().to_string(), ..Contents::default() };
@@ -220,11 +167,19 @@ pub fn read(path: &Path) -> Result<Contents, ReadError> {
 }
 
 impl Contents {
-    /// A record that cannot be decoded is left out: then the chain shows a gap.
+    fn has_book(&self) -> bool {
+        !self.entries.is_empty() || self.heads.iter().any(|head| !head.by_vehicle)
+    }
+
+    /// A record that cannot be decoded is left out: then an entry is missing.
     fn take(&mut self, channel: &LogChannel, data: &[u8]) {
         match channel.topic.as_str() {
             TOPIC_BOOK => self.entries.extend(BookEntry::decode(data).ok()),
-            TOPIC_BOOK_HEAD => self.heads.extend(BookHead::decode(data).ok()),
+            TOPIC_BOOK_HEAD => {
+                let signed = BookHead::decode(data).ok().and_then(|record| SignedHead::of_record(&record));
+                let from = "the log itself".to_owned();
+                self.heads.extend(signed.map(|signed| FoundHead { from, by_vehicle: false, signed }));
+            }
             TOPIC_RAW_RX
                 if channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "vehicle") =>
             {
@@ -233,7 +188,8 @@ impl Contents {
                 let message = framer.next_frame().and_then(|frame| frame.decode().ok());
                 if let Some(MavMessage::TD_BOOK_HEAD(head)) = message {
                     let from = format!("the vehicle's log {}", self.name);
-                    self.told_to_vehicle.push(Known { from, signed: SignedHead::of_message(&head) });
+                    let signed = SignedHead::of_message(&head);
+                    self.heads.push(FoundHead { from, by_vehicle: true, signed });
                 }
             }
             _ => {}
@@ -241,7 +197,7 @@ impl Contents {
     }
 }
 
-/// Writes what is proven of each book, or what is broken.
+/// Writes each book, and what is proven of it or broken.
 ///
 /// # Errors
 /// The output failed.
@@ -257,7 +213,7 @@ pub fn print_audit(found: &AuditFound, output: &mut impl Write) -> io::Result<()
         )?;
     }
     if found.books.is_empty() {
-        writeln!(output, "no book in these logs: only a ground station of this version writes one")?;
+        writeln!(output, "no book in these logs: only a ground station writes one")?;
     }
     Ok(())
 }
@@ -265,13 +221,16 @@ pub fn print_audit(found: &AuditFound, output: &mut impl Write) -> io::Result<()
 fn print_book(book: &BookFound, output: &mut impl Write) -> io::Result<()> {
     let verdict = if book.is_proven() {
         "PROVEN"
-    } else if book.broken.is_empty() {
+    } else if book.broken.is_none() {
         "NOT PROVEN TO ITS END"
     } else {
         "BROKEN"
     };
+    for line in &book.story {
+        writeln!(output, "{}", shown(line))?;
+    }
     writeln!(output, "{}: {verdict}: {} entries, head {}", shown(&book.log), book.entries, book.head)?;
-    for broken in &book.broken {
+    if let Some(broken) = &book.broken {
         writeln!(output, "  BROKEN: {}", shown(broken))?;
     }
     match &book.public_key {
@@ -281,7 +240,7 @@ fn print_book(book: &BookFound, output: &mut impl Write) -> io::Result<()> {
     }
     writeln!(
         output,
-        "  {} entries under a signature, {} known to a vehicle, {}",
+        "  {} entries under a signature, {} confirmed by a vehicle, {}",
         book.signed,
         book.witnessed,
         if book.closed {
@@ -300,16 +259,13 @@ fn print_book(book: &BookFound, output: &mut impl Write) -> io::Result<()> {
 #[derive(Debug, Args)]
 #[group(id = "books")]
 pub(super) struct Arguments {
-    /// Prove the books of ground stations (who did what when) in logs of stations and of the vehicle: only the vehicle's
-    /// log or --head shows that a book was cut.
+    /// Print and prove the books of ground stations (who did what when) in logs of stations and of the vehicle: only the
+    /// vehicle's log shows that a book was cut.
     #[arg(long, conflicts_with_all = ["junit", "strict", "explain", "baseline"])]
     pub(super) book: bool,
     /// The station's public key, 64 hexadecimal digits, as the first entry of its book and the answer show it.
     #[arg(long, requires = "book", value_name = "HEX", value_parser = public_key)]
     public_key: Option<PublicKey>,
-    /// The head that the station showed at its end, as in 57:ab12-cd34.
-    #[arg(long, requires = "book", value_name = "ENTRIES:HASH")]
-    head: Option<ShownHead>,
 }
 
 fn public_key(text: &str) -> Result<PublicKey, String> {
@@ -318,8 +274,7 @@ fn public_key(text: &str) -> Result<PublicKey, String> {
 
 impl Arguments {
     pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Outcome> {
-        let trusted = Trusted { key: self.public_key, head: self.head };
-        let found = audit_logs(files, &trusted)?;
+        let found = audit_logs(files, self.public_key)?;
         answer(|output| if json { print_json(&found, output) } else { print_audit(&found, output) })?;
         Ok(if found.books.is_empty() { Outcome::NotAll } else { Outcome::Decided { yes: found.is_proven() } })
     }
