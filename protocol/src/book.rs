@@ -48,11 +48,18 @@ pub struct Head {
     pub hash: Hash,
 }
 
-/// A head and its signature; all zeros without a key.
+/// A head and its signature; all zeros without a key, and on an attached screen, which sends none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct SignedHead {
     pub head: Head,
+    #[cfg_attr(feature = "transport", serde(skip, default = "no_signature"))]
     pub signature: [u8; 64],
+}
+
+#[cfg(feature = "transport")]
+fn no_signature() -> [u8; 64] {
+    [0; 64]
 }
 
 /// A book that is being written. It begins with the first entry.

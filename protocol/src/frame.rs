@@ -183,7 +183,7 @@ pub struct DecodeError {
 
 /// Returns the dialect's CRC seed (CRC_EXTRA) of a message; `None` for an id outside the dialect.
 ///
-/// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so both cases must be told apart.
+/// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so both cases must be distinguished.
 #[inline]
 fn crc_extra(message_id: u32) -> Option<u8> {
     match MavMessage::extra_crc(message_id) {

@@ -180,11 +180,6 @@ impl LinkStats {
         self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
     }
 
-    /// Returns the time since the last frame of this message from this component; `None` if it was never heard.
-    pub fn message_age(&self, source: Address, message_id: u32, now: Duration) -> Option<Duration> {
-        self.messages.get(&(source, message_id)).map(|at| now.saturating_sub(*at))
-    }
-
     /// Returns the source, the message id and the time since the last frame of every message that was heard.
     pub fn messages(&self, now: Duration) -> impl Iterator<Item = (Address, u32, Duration)> {
         self.messages.iter().map(move |((source, id), at)| (*source, *id, now.saturating_sub(*at)))
@@ -222,11 +217,11 @@ impl LinkStats {
     }
 }
 
-/// How old the newest content of a vehicle is, whatever time it has spent in queues.
+/// How old the newest content of a vehicle is, with the time that it has spent in queues.
 ///
 /// The vehicle's messages carry its own clock. When one arrives, the clocks differ by at most `arrival - clock`, because
 /// nothing arrives before it was sent. The answer to a TIMESYNC was given after the question left, so they differ by at
-/// least `question - clock`. The latter decides, if there is one: then the age is rather told too great, by the time that the
+/// least `question - clock`. The latter decides, if there is one: then the age is rather given too great, by the time that the
 /// question took.
 #[derive(Debug, Clone, Default)]
 pub struct ContentAge {

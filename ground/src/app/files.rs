@@ -221,7 +221,7 @@ pub(super) struct SignatureFile {
     hash: String,
 }
 
-/// Opens a checklist, and marks what has been signed for it today. Also returns what the crew should be told.
+/// Opens a checklist, and marks what has been signed for it today. Also returns what to report to the crew.
 ///
 /// # Errors
 /// The checklist is wrong, its signatures cannot be written, or another station keeps them.

@@ -133,7 +133,7 @@ pub fn closing(
         return;
     }
     let mut text = String::new();
-    match model.vehicle.verdict {
+    match model.vehicle.verdict() {
         Some(verdict) => text.push_str(&verdict_table(model, &verdict.value, now)),
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}

@@ -52,7 +52,7 @@ pub enum ServerEvent {
 
 struct History {
     hello: Hello,
-    /// The latest checklist, which is told also if the history no longer reaches back to it.
+    /// The latest checklist, which is sent also if the history no longer reaches back to it.
     checklist: Option<Bytes>,
     /// Whole messages, each with its length before it.
     blocks: VecDeque<Bytes>,
@@ -198,7 +198,7 @@ impl Shared {
     pub(super) fn for_watcher(&self, past_bytes: usize) -> (Vec<u8>, broadcast::Receiver<Bytes>) {
         let (all, live) = self.snapshot(0);
         let has_checklist = self.history.lock().is_ok_and(|history| history.checklist.is_some());
-        // The greeting and the checklist come first, whatever is left out after them.
+        // The greeting and the checklist come first, before what may be left out.
         let first = all.len().min(1 + usize::from(has_checklist));
         let (first, past) = all.split_at(first);
         let mut left = past_bytes;
@@ -329,7 +329,7 @@ pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-// The feed for watchers: what every screen is told, over TCP, one way. Nothing that a watcher sends is ever read, so
+// The feed for watchers: what every screen gets, over TCP, one way. Nothing that a watcher sends is ever read, so
 // nobody can command through it.
 
 /// How many may watch at once.
@@ -338,7 +338,7 @@ pub(super) const WATCHERS_MAX: usize = 8;
 const BYTES_S: u32 = 32 * 1024;
 /// The most that is written at once.
 const PART_BYTES: usize = 4 * 1024;
-/// How much of the past a watcher is told.
+/// How much of the past a watcher gets.
 const PAST_BYTES: usize = 64 * 1024;
 /// A watcher that takes nothing for so long is gone.
 const TAKES_WITHIN: Duration = Duration::from_secs(10);
@@ -369,7 +369,7 @@ impl Watchers {
                     tokio::time::sleep(Duration::from_millis(200)).await;
                     continue;
                 };
-                // Tasks that have ended are let go.
+                // Tasks that have ended are dropped.
                 while feeds.try_join_next().is_some() {}
                 if let Ok(seat) = Arc::clone(&seats).try_acquire_owned() {
                     let shared = Arc::clone(&shared);

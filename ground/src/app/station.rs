@@ -24,7 +24,7 @@ use crate::demo::Demo;
 use crate::model::{BookLine, ChecklistEntry, LastPlace, LogHealth, Model, Seat, Settings, role_name};
 use crate::update::{Action, Msg, update};
 
-/// How often the vehicle is told the end of the closed book, because a frame may be lost.
+/// How often the end of the closed book is sent to the vehicle, because a frame may be lost.
 const TOLD_AT_THE_END: usize = 3;
 const TICK: Duration = Duration::from_millis(100);
 /// How often link rates are reported; they are means over ten seconds.
@@ -363,7 +363,7 @@ impl Station {
         })
     }
 
-    /// Writes the files for maps. A failure is told once.
+    /// Writes the files for maps. A failure is reported once.
     fn keep_place(&mut self, model: &mut Model, place: &LastPlace, now: Duration) {
         let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
             return;
@@ -424,7 +424,7 @@ impl Station {
         Some(Msg::Book { head, is_signed })
     }
 
-    /// Closes the book. The vehicle is told its end without waiting for an answer.
+    /// Closes the book. Its end is sent to the vehicle without waiting for an answer.
     pub(super) fn close_book(&mut self, model: &mut Model, wire: &mut Wire) {
         let unix_ns = self.clock.unix_ns();
         let Some(last) = self.book.as_mut().map(|book| book.close(unix_ns)) else { return };
@@ -489,7 +489,7 @@ impl Station {
     }
 }
 
-/// The boot that the screens show; 0 if the vehicle has told none.
+/// The boot that the screens show; 0 if the vehicle has reported none.
 fn boot_of(model: &Model) -> u32 {
     model.vehicle.boot.number().unwrap_or(0)
 }

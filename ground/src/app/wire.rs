@@ -228,7 +228,7 @@ impl Wire {
                     self.open[number].sender.believe(origin);
                 }
                 LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
-                // Counted and shown in the report of the link; a sender that is locked out is told of.
+                // Counted and shown in the report of the link; a sender that is locked out is reported.
                 LinkEvent::Rejected(frame, why) => {
                     msgs.extend(self.lockouts.refused(&frame, why, now, stamp).map(Msg::LinkSays));
                 }
@@ -266,7 +266,7 @@ impl Wire {
 
     /// Sends a message over every link and returns the message that counts the bytes. For a slow line it may wait. On a link
     /// that listens, what is meant for the vehicle goes only to where its shown `boot` was heard; a heartbeat, an abort, a
-    /// hold and a disarm go to everybody there. 0: the vehicle has told no boot.
+    /// hold and a disarm go to everybody there. 0: the vehicle has reported no boot.
     pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
         let (now, stamp) = (self.clock.now(), self.unix_stamp());
@@ -371,7 +371,7 @@ fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
     }
 }
 
-/// How many places are told apart; a reboot gives a vehicle that connects by itself another one.
+/// How many places are distinguished; a reboot gives a vehicle that connects by itself another one.
 const PLACES_MAX: usize = 64;
 
 /// From where the vehicle is heard: a number for each link and address.

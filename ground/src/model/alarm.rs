@@ -21,7 +21,7 @@ pub enum AlarmKind {
     Signatures,
     /// The transport does not work.
     LinkDown,
-    /// An attached screen is told nothing any more. The station itself does not know this alarm.
+    /// An attached screen gets nothing any more. The station itself does not know this alarm.
     StationSilent,
     /// Two vehicles are heard under the vehicle's id.
     TwoVehicles,

@@ -226,8 +226,8 @@ impl Model {
     pub fn why_checklist(&self, now: Duration) -> Option<String> {
         let checklist = self.checklist.as_ref()?;
         if let Some(mission) = &checklist.mission {
-            match &self.vehicle.mission {
-                Some(FlownMission { name, .. }) if name == mission => {}
+            match self.vehicle.mission() {
+                Some(FlownMission { name, .. }) if name == *mission => {}
                 Some(FlownMission { name: flies, .. }) => {
                     return Some(format!("the checklist is for {mission}, the vehicle flies {flies}"));
                 }

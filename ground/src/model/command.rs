@@ -177,7 +177,7 @@ impl CommandKind {
 
 /// Whether the interlocks show an abort, on the pad, in the air or under thrust.
 pub fn is_aborted(interlocks: TdInterlock) -> bool {
-    interlocks.intersects(TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_DEGRADED)
+    interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED)
 }
 
 /// The vehicle's answer to a command.
@@ -286,7 +286,7 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         return Some(format!("not a Touchdown vehicle: {}", foreign.name()));
     }
     if vehicle.status.is_none() {
-        return Some("it is not known yet what the vehicle is: it has told no flight status".to_owned());
+        return Some("it is not known yet what the vehicle is: it has sent no flight status".to_owned());
     }
     let Address { system_id, component_id } = us;
     let same = "another station uses our id";
@@ -403,7 +403,7 @@ fn why_no_key(model: &Model) -> Option<String> {
 /// Why the vehicle is not the one that this station is prepared for.
 pub fn why_other_mission(model: &Model) -> Option<String> {
     let ours = model.settings.mission?;
-    let Some(flown) = &model.vehicle.mission else {
+    let Some(flown) = model.vehicle.mission() else {
         return Some(format!("the vehicle has not said whether it flies {ours} (--mission)"));
     };
     if flown.hash != ours {

@@ -143,7 +143,7 @@ pub fn role_name(role: TdRole) -> &'static str {
 impl Model {
     /// How many people an arming and a start take; `None` without operators.
     pub fn people(&self) -> Option<u8> {
-        self.vehicle.told::<TD_CREW_DATA>().map(|crew| crew.value.people)
+        self.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value.people)
     }
 
     /// The number of the key that this station signs with; 0 without an operator's key.
@@ -172,7 +172,7 @@ impl Model {
 
     /// The ask that waits.
     pub fn ask(&self, now: Duration) -> Option<Ask> {
-        let crew = self.vehicle.told::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
         let left = Duration::from_millis(crew.value.ask_left_ms.into()).saturating_sub(crew.age(now));
         let waits = crew.value.act != TdAct::TD_ACT_NONE && !left.is_zero();
         waits.then_some(Ask {
@@ -194,7 +194,7 @@ impl Model {
 
     /// Who has to tap, and how long is left.
     pub fn tapping(&self, now: Duration) -> Option<(u8, Duration)> {
-        let crew = self.vehicle.told::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
         let counting = self.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
         let left = Duration::from_millis(crew.value.tap_left_ms.into()).saturating_sub(crew.age(now));
         (crew.value.tapped_by > 0 && counting).then_some((crew.value.tapped_by, left))
@@ -202,6 +202,6 @@ impl Model {
 
     /// The operator who commands, by the number of their key; `None` if nobody has armed it.
     pub fn commanded_by(&self) -> Option<u8> {
-        self.vehicle.told::<TD_CREW_DATA>().map(|crew| crew.value.commanded_by).filter(|number| *number > 0)
+        self.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value.commanded_by).filter(|number| *number > 0)
     }
 }

@@ -29,7 +29,7 @@ const STEADY_WITHIN: Duration = Duration::from_secs(3);
 /// Fewer frames than [`STRAY_FROM`] fit into this time.
 const FRESH_WITHIN: Duration = Duration::from_millis(500);
 const STRAY_FROM: i64 = 64;
-/// How many places of one run are told apart.
+/// How many places of one run are distinguished.
 const PLACES_MAX: usize = 4;
 /// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
 /// between them.
@@ -42,9 +42,9 @@ const CONTRADICTIONS: usize = 3;
 /// What a flight status says of its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Word {
-    /// The vehicle's unique id; 0: not told.
+    /// The vehicle's unique id; 0: not reported.
     pub uid: u16,
-    /// The number of its boot; 0: not told.
+    /// The number of its boot; 0: not reported.
     pub boot: u32,
     /// The time on its clock, ms.
     pub clock_ms: u32,
@@ -299,7 +299,7 @@ impl Heard {
     }
 
     /// Which run another message comes from: the only one at this place, else by its clock or its sequence number; `None` before the
-    /// first flight status. Whatever fits several goes to the shown one.
+    /// first flight status. What fits several goes to the shown one.
     pub fn speaker(
         &self,
         place: u16,
@@ -346,7 +346,7 @@ impl Heard {
 
     /// Decides which run is shown. Returns the one that takes the screen.
     ///
-    /// The shown one keeps it for as long as it is heard, and a single frame of whomever never takes it. It goes to a run that
+    /// The shown one keeps it for as long as it is heard, and a single frame of another one never takes it. It goes to a run that
     /// was chosen by name; to the next run of the same vehicle, after a reset; and from an idle vehicle to one from the same
     /// place that is armed or flies.
     pub fn settle(&mut self, now: Duration) -> Option<RunId> {

@@ -64,13 +64,13 @@ impl History {
             raise(&mut maxima.tilt_rad, attitude.value.tilt_rad);
             raise(&mut maxima.turn_rate_rad_s, attitude.value.turn_rate_rad_s());
         }
-        if let Some(gimbal) = vehicle.gimbal.filter(|gimbal| !gimbal.is_stale(now)) {
+        if let Some(gimbal) = vehicle.gimbal().filter(|gimbal| !gimbal.is_stale(now)) {
             for axis in [gimbal.value.pitch, gimbal.value.yaw] {
                 raise(&mut maxima.gimbal_rad, axis.measured_rad.abs());
             }
         }
         if let Some(controller) =
-            vehicle.told::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
+            vehicle.last::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
         {
             raise(&mut maxima.solve_time_s, f64::from(controller.value.solve_time_us) * 1e-6);
             let mut less = maxima.margin_min_s.map(|margin| -margin);

@@ -15,7 +15,7 @@ use super::{Model, Sample, words};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Boot {
     number: Option<NonZeroU32>,
-    /// The vehicle's unique id; 0: not told.
+    /// The vehicle's unique id; 0: not reported.
     uid: u16,
     /// Whether every HEARTBEAT so far had the HIL flag set; `None` before the first.
     hil: Option<bool>,
@@ -34,7 +34,7 @@ impl Boot {
         (self.uid > 0).then_some(self.uid)
     }
 
-    /// The boot number as a parameter of a command. 0 names no boot: the vehicle has told none, or one that a parameter
+    /// The boot number as a parameter of a command. 0 names no boot: the vehicle has reported none, or one that a parameter
     /// cannot hold exactly.
     pub fn parameter(&self) -> f32 {
         let number = self.number().filter(|number| *number <= LARGEST_BOOT_NUMBER);

@@ -22,7 +22,7 @@ pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 /// Nothing is armed or started for this long after another station was heard under our address.
 const SAME_ID_FOR: Duration = Duration::from_secs(10);
 
-/// An attached screen that was told nothing for longer than this has a silent station: twenty of its ticks. Less than the
+/// An attached screen that got nothing for longer than this has a silent station: twenty of its ticks. Less than the
 /// silence after which a vehicle is lost, so that the two are not mistaken for each other.
 const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
 
@@ -55,7 +55,7 @@ pub struct Link {
     pub signing: Option<SigningCounters>,
     /// When a frame was last refused for its signature.
     pub(crate) refused_at: Option<Duration>,
-    /// The crew was told that nothing is heard.
+    /// It was reported that nothing is heard.
     pub(crate) unheard_reported: bool,
     /// The last report of a radio about itself, and its time. It says nothing about the vehicle.
     pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
@@ -225,11 +225,11 @@ pub struct Refused {
 /// What the vehicle reports about its uplink, and what its answers prove.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Uplink {
-    /// When the vehicle last reported about this station.
-    told_at: Option<Duration>,
+    /// Whether the vehicle reports about this station.
+    is_reported: bool,
     /// When it last accepted a frame of this station, as it reports.
     accepted_at: Option<Duration>,
-    /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle that does not report its uplink.
+    /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle of another make.
     answered_at: Option<Duration>,
     /// Whether this station armed the vehicle.
     pub armed_by_us: bool,
@@ -237,8 +237,6 @@ pub struct Uplink {
     pub armed_by_other: Option<Address>,
     /// The session of that station.
     other_session: u32,
-    /// Whether this vehicle tells the sessions of its stations.
-    pub(crate) tells_sessions: bool,
     /// The last refused frame.
     pub refused: Option<Refused>,
 }
@@ -249,7 +247,7 @@ impl Uplink {
         let ago = |age_ms: u16| {
             (age_ms != u16::MAX).then(|| now.saturating_sub(Duration::from_millis(age_ms.into())))
         };
-        self.told_at = Some(now);
+        self.is_reported = true;
         self.accepted_at = ago(told.accepted_age_ms);
         self.armed_by_us = told.commands == 1;
         if self.armed_by_us {
@@ -279,13 +277,13 @@ impl Uplink {
     }
 
     /// Whether the vehicle reports its uplink at all.
-    pub fn is_told(&self) -> bool {
-        self.told_at.is_some()
+    pub(crate) fn is_reported(&self) -> bool {
+        self.is_reported
     }
 
     /// The state of the uplink: whether the vehicle hears this station.
     pub fn state(&self, now: Duration) -> LinkState {
-        LinkState::of(if self.is_told() { self.accepted_at } else { self.answered_at }, now)
+        LinkState::of(if self.is_reported { self.accepted_at } else { self.answered_at }, now)
     }
 
     /// Whether it is proven that the vehicle hears this station.

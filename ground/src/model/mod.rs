@@ -59,7 +59,7 @@ pub(crate) use command::AutoStep;
 
 /// The settings of a run, which do not change during it.
 ///
-/// An attached screen is told those of its station, except for those that are a screen's own.
+/// An attached screen gets those of its station, except for those that are a screen's own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The name of the link, as in `udpin:0.0.0.0:14550`.
@@ -266,8 +266,6 @@ pub struct Model {
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
-    /// The vehicle's last answer said that a second person has to confirm.
-    pub(crate) asked_to_confirm: bool,
     /// A key to quit was pressed; the program quits at this time unless another key comes first.
     pub(crate) quit_at: Option<Duration>,
     pub(crate) outbox: Vec<Action>,

@@ -12,7 +12,7 @@ use super::{Acknowledgement, CommandKind, Model, Seat};
 
 /// A check with motion takes 13 s. If neither answer nor end of one that was asked for is heard, it may run for so long.
 const LONGEST: Duration = Duration::from_secs(20);
-/// What the vehicle told before it knew of a command may arrive so much later than the command was given.
+/// What the vehicle reported before it had a command may arrive so much later than the command was given.
 const LATE: Duration = Duration::from_secs(3);
 /// Whoever presses the key again to end a check that has just ended does not want another one.
 const JUST_ENDED: Duration = Duration::from_secs(3);
@@ -56,9 +56,9 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
 /// A check, as far as its messages have arrived.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PadCheck {
-    /// What the vehicle last told of it. Its own value may be one that is in [`Self::values`] too.
+    /// What the vehicle last reported. Its own value may be one that is in [`Self::values`] too.
     pub told: TD_PAD_CHECK_DATA,
-    /// When the vehicle last told of it.
+    /// When the vehicle last reported it.
     pub told_at: Duration,
     /// When the vehicle was first heard to say that it is over, after it was heard to run.
     pub ended_at: Option<Duration>,

@@ -142,7 +142,7 @@ impl Model {
     pub fn last_place(&self, now: Duration) -> Option<LastPlace> {
         let left_at = self.vehicle.left_pad_at?;
         let motion = self.vehicle.best_motion().filter(|motion| motion.received_at >= left_at);
-        let (heard, height_m, at) = match (motion, self.vehicle.verdict) {
+        let (heard, height_m, at) = match (motion, self.vehicle.verdict()) {
             (Some(Sample { value, received_at }), _) => {
                 let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: HEARD_ERROR_M };
                 (spot, value.altitude_m, received_at)
@@ -170,7 +170,7 @@ impl Model {
     }
 
     /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
-    /// anywhere inside the fence of its mission. `None` if it has told no fence.
+    /// anywhere inside the fence of its mission. `None` if it has reported no fence.
     pub fn meant_to_come_down(&self) -> Option<Spot> {
         let fence_m = f64::from(self.vehicle.limits()?.x_m);
         let predicted = self.vehicle.descent().map(|descent| descent.value);

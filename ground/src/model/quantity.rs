@@ -69,10 +69,10 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("pitch", "deg", 1, |m, _| m.vehicle.of_attitude(|a| a.pitch_rad.to_degrees())),
     quantity("turn rate", "deg/s", 1, |m, _| m.vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees())),
     quantity("gimbal pitch", "deg", 2, |m, _| {
-        m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees()))
+        m.vehicle.gimbal().map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees()))
     }),
     quantity("gimbal yaw", "deg", 2, |m, _| {
-        m.vehicle.gimbal.map(|gimbal| gimbal.map(|g| g.yaw.measured_rad.to_degrees()))
+        m.vehicle.gimbal().map(|gimbal| gimbal.map(|g| g.yaw.measured_rad.to_degrees()))
     }),
     quantity("fin 1", "deg", 1, |m, _| fin(&m.vehicle, 0)),
     quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
@@ -92,9 +92,11 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("solve time", "ms", 2, |m, _| solver(m, |c| f64::from(c.solve_time_us) / 1_000.0)),
     quantity("solver margin", "ms", 1, |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0)),
     quantity("cost", "", 1, |m, _| solver(m, |c| f64::from(c.cost))),
-    quantity("battery", "V", 2, |m, _| m.vehicle.battery.map(|battery| battery.map(|battery| battery.volts))),
+    quantity("battery", "V", 2, |m, _| {
+        m.vehicle.battery().map(|battery| battery.map(|battery| battery.volts))
+    }),
     quantity("battery left", "%", 0, |m, _| {
-        let battery = m.vehicle.battery?;
+        let battery = m.vehicle.battery()?;
         battery.value.percent.map(|percent| Sample::new(percent.into(), battery.received_at))
     }),
     // Known only of a check that has seen everything.
@@ -113,11 +115,11 @@ fn body(model: &Model, pick: fn(&BodySpeed) -> f64) -> Option<Sample<f64>> {
 }
 
 fn fin(vehicle: &Vehicle, number: usize) -> Option<Sample<f64>> {
-    vehicle.fins.map(|fins| fins.map(|fins| fins[number].measured_rad.to_degrees()))
+    vehicle.fins().map(|fins| fins.map(|fins| fins[number].measured_rad.to_degrees()))
 }
 
 fn solver(model: &Model, pick: fn(&TD_CONTROLLER_DATA) -> f64) -> Option<Sample<f64>> {
-    model.vehicle.told::<TD_CONTROLLER_DATA>().map(|c| Sample::new(pick(&c.value), c.received_at))
+    model.vehicle.last::<TD_CONTROLLER_DATA>().map(|c| Sample::new(pick(&c.value), c.received_at))
 }
 
 #[cfg(test)]

@@ -219,7 +219,7 @@ impl Model {
 
 /// The operator who held the countdown, or whose silence did.
 fn held_by(vehicle: &Vehicle) -> Option<String> {
-    let number = vehicle.told::<TD_CREW_DATA>().map(|crew| crew.value.held_by)?;
+    let number = vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value.held_by)?;
     let (role, name) = vehicle.operators.get(&number)?;
     Some(format!("{} {name}", role_name(*role)))
 }
@@ -280,9 +280,9 @@ impl Ending {
         }
     }
 
-    /// The end of this flight; `None` while it goes on, or while nothing has been told of its end.
+    /// The end of this flight; `None` while it goes on, or while its end has not been reported.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
-        if let Some(verdict) = vehicle.verdict {
+        if let Some(verdict) = vehicle.verdict() {
             return Some(Self::judged(vehicle, &verdict.value));
         }
         let phase = vehicle.phase()?.value;
@@ -314,7 +314,7 @@ impl Ending {
 
     /// What is known of this end: what follows the word.
     pub fn detail(self, vehicle: &Vehicle) -> String {
-        let verdict = vehicle.verdict.map(|verdict| verdict.value);
+        let verdict = vehicle.verdict().map(|verdict| verdict.value);
         let speed_m_s = verdict.map(|verdict| libm::hypot(verdict.touchdown.u_m_s, verdict.touchdown.w_m_s));
         match (self, verdict) {
             (Self::Landed, _) if vehicle.limits().as_ref().is_some_and(are_of_legs) => {
@@ -335,7 +335,7 @@ impl Ending {
     }
 }
 
-/// Whether its parachute was open when last told.
+/// Whether its parachute was open at its last report.
 fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
     vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
 }
@@ -449,8 +449,8 @@ pub fn latch_words(model: &Model) -> Option<String> {
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
 }
 
-/// The first grave text of the vehicle about the time of its latch, because an older vehicle tells no cause: what follows is
-/// about the consequences.
+/// The first grave text of the vehicle about the time of its latch, for a cause that only a text tells: what follows is about the
+/// consequences.
 fn text_of_the_latch(model: &Model) -> Option<String> {
     let since = model.outcome.aborted_at?.saturating_sub(TEXT_APART);
     let mut events = model.events.newest(TEXTS_SEARCHED);
@@ -474,12 +474,7 @@ pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
     let offered = model.vehicle.status.as_ref()?.value.abort_effect;
     let chute = offered == TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
     let before_ignition = chute
-        || matches!(
-            offered,
-            TdAbortEffect::TD_ABORT_EFFECT_BURN
-                | TdAbortEffect::TD_ABORT_EFFECT_IMPACT
-                | TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT
-        );
+        || matches!(offered, TdAbortEffect::TD_ABORT_EFFECT_BURN | TdAbortEffect::TD_ABORT_EFFECT_IMPACT);
     if !before_ignition {
         return None;
     }
@@ -490,12 +485,7 @@ pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
     let passes_s = (descent.age(now) + 2 * one_way).as_secs_f64();
     let left_s = f64::from(d.time_to_ignition_s);
     if left_s.is_finite() && left_s < passes_s {
-        return Some(if offered == TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT {
-            // An older vehicle may then abandon its landing.
-            "TOO LATE: arrives after ignition"
-        } else {
-            "TOO LATE: arrives after ignition, lands here"
-        });
+        return Some("TOO LATE: arrives after ignition, lands here");
     }
     let (above_m, down_m_s) =
         (f64::from(d.height_m) - f64::from(d.commit_height_m), -f64::from(d.vertical_speed_m_s));

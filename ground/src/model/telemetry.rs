@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use mavlink::MessageData;
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavLandedState, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
-    TD_FLIGHT_STATUS_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
+    HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
+    TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
+    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 
@@ -49,17 +51,6 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             let motion = Motion::vertical(f64::from(data.relative_alt) / 1e3, -f64::from(data.vz) / 1e2);
             vehicle.hud = Some(Sample::new(motion, now));
         }
-        MavMessage::TD_FINS(data) => {
-            let fin = |k: usize| deflection(data.commanded[k], data.measured[k]);
-            vehicle.fins = Some(Sample::new([fin(0), fin(1), fin(2), fin(3)], now));
-        }
-        MavMessage::TD_GIMBAL(data) => {
-            let gimbal = Gimbal {
-                pitch: deflection(data.pitch_commanded, data.pitch_measured),
-                yaw: deflection(data.yaw_commanded, data.yaw_measured),
-            };
-            vehicle.gimbal = Some(Sample::new(gimbal, now));
-        }
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
             let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
             let touchdown = touchdown(state, data.limits_violated);
@@ -67,38 +58,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s, touchdown }, now));
         }
         MavMessage::TD_PREDICTED_PATH(data) => vehicle.path = Some(Sample::new(path(data), now)),
-        MavMessage::TD_LANDING_VERDICT(data) => {
-            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
-            let touchdown = touchdown(state, data.limits_violated);
-            vehicle.verdict = Some(Sample::new(Verdict { landed: data.landed == 1, touchdown }, now));
-        }
         MavMessage::TD_OPERATOR(data) => {
             vehicle.operators.insert(data.number, (data.role, name(&data.name[..])));
-        }
-        MavMessage::TD_MISSION(data) => {
-            let start = match data.start {
-                TdStart::TD_START_UNKNOWN => None,
-                TdStart::TD_START_PAD => Some("pad"),
-                TdStart::TD_START_APOGEE => Some("apogee"),
-                TdStart::TD_START_DRONE => Some("drone"),
-            };
-            let (hash, name) = (MissionHash(data.hash), name(&data.name[..]));
-            vehicle.mission = Some(FlownMission { hash, name, start });
-        }
-        MavMessage::EXTENDED_SYS_STATE(data) => {
-            let on_ground = data.landed_state == MavLandedState::MAV_LANDED_STATE_ON_GROUND;
-            vehicle.on_ground = Some(Sample::new(on_ground, now));
-        }
-        MavMessage::SYS_STATUS(data) => {
-            let ready =
-                data.onboard_control_sensors_health.contains(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK);
-            vehicle.ready_to_arm = Some(Sample::new(ready, now));
-            let volts = (data.voltage_battery != u16::MAX).then(|| f64::from(data.voltage_battery) / 1e3);
-            let percent = u8::try_from(data.battery_remaining).ok();
-            vehicle.battery = volts.map(|volts| Sample::new(Battery { volts, percent }, now));
-        }
-        MavMessage::STORAGE_INFORMATION(data) => {
-            vehicle.log_space_mib = Some(Sample::new(data.available_capacity.into(), now));
         }
         MavMessage::TD_PAD_CHECK(data) => {
             vehicle.pad_check = Some(PadCheck::with(vehicle.pad_check.take(), data, now));
@@ -107,9 +68,63 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     }
     // The flight may have passed unheard: what comes after it shows that it was.
     match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
-        Some(true) if vehicle.verdict.is_none() => vehicle.left_pad_at = None,
+        Some(true) if vehicle.verdict().is_none() => vehicle.left_pad_at = None,
         Some(_) => _ = vehicle.left_pad_at.get_or_insert(now),
         None => {}
+    }
+}
+
+// What is converted when it is asked for.
+impl Vehicle {
+    pub fn fins(&self) -> Option<Sample<[Deflection; 4]>> {
+        self.converted(|data: &TD_FINS_DATA| {
+            std::array::from_fn(|k| deflection(data.commanded[k], data.measured[k]))
+        })
+    }
+
+    pub fn gimbal(&self) -> Option<Sample<Gimbal>> {
+        self.converted(|data: &TD_GIMBAL_DATA| Gimbal {
+            pitch: deflection(data.pitch_commanded, data.pitch_measured),
+            yaw: deflection(data.yaw_commanded, data.yaw_measured),
+        })
+    }
+
+    /// The vehicle's own verdict on its landing.
+    pub fn verdict(&self) -> Option<Sample<Verdict>> {
+        self.converted(|data: &TD_LANDING_VERDICT_DATA| {
+            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
+            Verdict { landed: data.landed == 1, touchdown: touchdown(state, data.limits_violated) }
+        })
+    }
+
+    /// `None` if the vehicle has no battery that it measures.
+    pub fn battery(&self) -> Option<Sample<Battery>> {
+        let status = self.last::<SYS_STATUS_DATA>().filter(|data| data.value.voltage_battery != u16::MAX)?;
+        Some(status.map(|data| Battery {
+            volts: f64::from(data.voltage_battery) / 1e3,
+            percent: u8::try_from(data.battery_remaining).ok(),
+        }))
+    }
+
+    /// Free space for the vehicle's log, MiB.
+    pub fn log_space_mib(&self) -> Option<Sample<f64>> {
+        self.converted(|data: &STORAGE_INFORMATION_DATA| data.available_capacity.into())
+    }
+
+    /// What it flies.
+    pub fn mission(&self) -> Option<FlownMission> {
+        let data = self.last::<TD_MISSION_DATA>()?.value;
+        let start = match data.start {
+            TdStart::TD_START_UNKNOWN => None,
+            TdStart::TD_START_PAD => Some("pad"),
+            TdStart::TD_START_APOGEE => Some("apogee"),
+            TdStart::TD_START_DRONE => Some("drone"),
+        };
+        Some(FlownMission { hash: MissionHash(data.hash), name: name(&data.name[..]), start })
+    }
+
+    fn converted<M: MessageData, T>(&self, convert: impl FnOnce(&M) -> T) -> Option<Sample<T>> {
+        self.last().map(|message| message.map(convert))
     }
 }
 

@@ -122,32 +122,19 @@ pub struct Verdict {
 /// The last value of everything that the vehicle reports.
 #[derive(Debug, Clone, Default)]
 pub struct Vehicle {
-    /// The payload of the last message of each id, for [`Vehicle::told`].
-    pub(super) told: BTreeMap<u32, Sample<Vec<u8>>>,
+    /// The payload of the last message of each id, for [`Vehicle::last`].
+    pub(super) payloads: BTreeMap<u32, Sample<Vec<u8>>>,
     pub heartbeat: Option<Sample<Heartbeat>>,
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
-    pub fins: Option<Sample<[Deflection; 4]>>,
-    pub gimbal: Option<Sample<Gimbal>>,
     pub prediction: Option<Sample<Prediction>>,
     /// `TD_PREDICTED_PATH`: x and altitude, m.
     pub path: Option<Sample<Vec<(f64, f64)>>>,
-    pub verdict: Option<Sample<Verdict>>,
     /// `TD_OPERATOR`: role and name, by the number of the key.
     pub operators: BTreeMap<u8, (TdRole, String)>,
-    /// `TD_MISSION`: the hash and the name of what it flies.
-    pub mission: Option<FlownMission>,
-    /// `EXTENDED_SYS_STATE`: on the ground or not.
-    pub on_ground: Option<Sample<bool>>,
-    /// `SYS_STATUS`: whether the vehicle's arming checks pass.
-    pub ready_to_arm: Option<Sample<bool>>,
-    /// `SYS_STATUS`: the battery; `None` if the vehicle has none to tell of.
-    pub battery: Option<Sample<Battery>>,
-    /// `STORAGE_INFORMATION`: free space for its log, MiB.
-    pub log_space_mib: Option<Sample<f64>>,
     /// `TD_PAD_CHECK`: the last check on the pad.
     pub pad_check: Option<PadCheck>,
     /// The recent change of its velocity.
@@ -159,7 +146,7 @@ pub struct Vehicle {
     pub left_pad_at: Option<Duration>,
     /// The present boot of the vehicle.
     pub boot: Boot,
-    /// What was said of approaching before a power cycle, and when: a waiting time goes on whatever boots.
+    /// What was said of approaching before a power cycle, and when: a waiting time goes on through a boot.
     pub(crate) before: Option<Sample<KeepAway>>,
     /// The vehicle with another autopilot that was heard under this id.
     pub foreign: Option<Foreign>,
@@ -167,26 +154,26 @@ pub struct Vehicle {
 
 impl Vehicle {
     /// The last message of this type. What is converted or put together from several is a field above.
-    pub fn told<M: MessageData>(&self) -> Option<Sample<M>> {
-        let payload = self.told.get(&M::ID)?;
+    pub fn last<M: MessageData>(&self) -> Option<Sample<M>> {
+        let payload = self.payloads.get(&M::ID)?;
         let message = M::deser(MavlinkVersion::V2, &payload.value).ok()?;
         Some(Sample::new(message, payload.received_at))
     }
 
     /// Where the landing motor is to be lit, and what is steered by until then.
     pub fn descent(&self) -> Option<Sample<TD_DESCENT_DATA>> {
-        self.told()
+        self.last()
     }
 
     /// What counts as a landing for this vehicle.
     pub fn limits(&self) -> Option<TD_TOUCHDOWN_LIMITS_DATA> {
-        self.told().map(|limits| limits.value)
+        self.last().map(|limits| limits.value)
     }
 
     pub(super) fn keep(&mut self, message: &MavMessage, now: Duration) {
         let mut payload = [0; 255];
         let len = message.ser(MavlinkVersion::V2, &mut payload);
-        self.told.insert(message.message_id(), Sample::new(payload[..len].to_vec(), now));
+        self.payloads.insert(message.message_id(), Sample::new(payload[..len].to_vec(), now));
     }
 
     /// The phase, from the newer of its two sources.
@@ -213,7 +200,7 @@ impl Vehicle {
         self.heartbeat.map(|heartbeat| Sample::new(heartbeat.value.armed, heartbeat.received_at))
     }
 
-    /// The vehicle, if it is none of ours: it has another autopilot, and has told no flight status.
+    /// The vehicle, if it is none of ours: it has another autopilot, and has sent no flight status.
     pub fn as_foreign(&self) -> Option<&Foreign> {
         self.foreign.as_ref().filter(|_| self.status.is_none())
     }
@@ -327,7 +314,7 @@ impl Vehicle {
     /// The planned path while it is current: under thrust, and during the rehearsal on the pad.
     pub fn planned(&self) -> &[(f64, f64)] {
         let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
-        self.path.as_ref().filter(|_| counts && self.verdict.is_none()).map_or(&[], |path| &path.value)
+        self.path.as_ref().filter(|_| counts && self.verdict().is_none()).map_or(&[], |path| &path.value)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width, whatever arrives.
+//! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width for every value.
 
 use std::fmt::Debug;
 
@@ -43,8 +43,6 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
         TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD => "disarm and inhibit on the pad",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE => "parachute at apogee, landing motor inhibited",
         TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW => "parachute NOW, landing motor inhibited",
-        // Sent by older vehicles, which do not distinguish the two.
-        TdAbortEffect::TD_ABORT_EFFECT_BURN_OR_INHIBIT => "too low for a chute: burn if the gate is open",
         TdAbortEffect::TD_ABORT_EFFECT_LAND_UPRIGHT => "TOO LATE: no cut-off exists, only stays upright",
         TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE => "lands here, no cut-off exists",
         TdAbortEffect::TD_ABORT_EFFECT_BURN => "burns and lands here, too low for a chute",

@@ -9,8 +9,8 @@ use protocol::log::record::EventLevel;
 use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Danger, Ending, KeepAway, LinkState,
-    LogStanding, Model, PadCheck, RED_AFTER, Role, Speaker, dead_reckoning::may_have_left, hold_words,
-    is_on_pad, latch_words, refused_frames, why_not_reached, words,
+    LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words, is_on_pad,
+    latch_words, refused_frames, why_not_reached, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -134,10 +134,8 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
         }
         LinkState::NeverHeard | LinkState::Lost(_) => false,
     };
-    // Old recordings contain no uplink reports, so there is no uplink to lose.
-    let recorded = model.settings.role == Role::Replaying && !model.link.uplink.is_told();
     // Another autopilot owes us no report.
-    silent && told && !recorded && model.vehicle.as_foreign().is_none()
+    silent && told && model.vehicle.as_foreign().is_none()
 }
 
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
@@ -176,26 +174,18 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
     found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
     found.extend(latch_words(model).map(|words| (AlarmKind::Aborted, words)));
-    if let Some(locks) = vehicle.interlocks() {
-        let latched = [
-            (TdInterlock::TD_INTERLOCK_NO_LIGHT, AlarmKind::NoLight, "NO LIGHT: the motor did not light"),
-            (TdInterlock::TD_INTERLOCK_DEGRADED, AlarmKind::Degraded, "DEGRADED: the stabiliser flies"),
-        ];
-        for (bit, kind, words) in latched {
-            if locks.contains(bit) {
-                found.push((kind, words.to_owned()));
-            }
-        }
+    if vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT)) {
+        found.push((AlarmKind::NoLight, "NO LIGHT: the motor did not light".to_owned()));
     }
     if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Landed) {
         found.push((AlarmKind::NotLanded, ending.sentence(vehicle)));
     }
     let powered = vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED);
-    if !powered || vehicle.verdict.is_some() {
+    if !powered || vehicle.verdict().is_some() {
         return;
     }
     if let Some(controller) =
-        vehicle.told::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
+        vehicle.last::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
     {
         if controller.value.deadline_margin_us < 0 {
             found.push((AlarmKind::DeadlineMissed, "controller DEADLINE MISSED".to_owned()));
@@ -203,7 +193,6 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
         let lit_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
         if controller.value.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER
             && now.saturating_sub(lit_at) >= FIRST_PLAN_WITHIN
-            && !found.iter().any(|(kind, _)| *kind == AlarmKind::Degraded)
         {
             found.push((AlarmKind::Degraded, "DEGRADED: the stabiliser flies".to_owned()));
         }
@@ -215,7 +204,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
 
 /// A battery below the vehicle's own limit, which it tells on its pad; or nearly empty, anywhere.
 fn battery(model: &Model) -> Option<String> {
-    let battery = model.vehicle.battery?.value;
+    let battery = model.vehicle.battery()?.value;
     let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
     let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
@@ -241,7 +230,7 @@ fn vehicle_log(model: &Model) -> Option<String> {
         return Some("VEHICLE LOG not running".to_owned());
     }
     let space =
-        model.vehicle.log_space_mib.map_or_else(String::new, |space| format!(": {:.0} MiB", space.value));
+        model.vehicle.log_space_mib().map_or_else(String::new, |space| format!(": {:.0} MiB", space.value));
     fails(model, TdCheck::TD_CHECK_LOG_SPACE).then(|| format!("VEHICLE LOG has too little space{space}"))
 }
 
@@ -285,7 +274,7 @@ pub(super) fn ring_bells(model: &mut Model) {
 
 fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
     let talk = model.settings.talk;
-    // A screen that attaches late is told the past, and does not repeat it.
+    // A screen that attaches late gets the past, and does not repeat it.
     if amount > talk.amount || model.alarms.are_in_history() {
         return;
     }

@@ -88,14 +88,13 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
-    model.asked_to_confirm = answer.asks();
     let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
         track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledgement::GivenUp);
     if !awaited && given_up {
         // The answer to a command that was given up is still recorded.
-        let (command, result) = (answer.command, answer.result);
-        on_event(model, CommandEvent::Answered { command, result }, now);
+        let CommandAnswer { command, result, .. } = answer;
+        on_event(model, CommandEvent::Answered { command, result, asks: answer.asks() }, now);
         return;
     }
     poll(model, now);
@@ -109,7 +108,6 @@ fn track_of(model: &mut Model, command: u16) -> Option<&mut TrackedCommand> {
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     // With several links the event names the one that carried the answer.
     let over = model.link.heard_over().map_or_else(String::new, |link| format!(", over {link}"));
-    let asked_to_confirm = model.asked_to_confirm;
     let track = match event {
         CommandEvent::Sent { command, .. }
         | CommandEvent::InProgress { command, .. }
@@ -141,8 +139,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged = Acknowledgement::InProgress;
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
-        CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => {
-            let asked = asked_to_confirm && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+        CommandEvent::Answered { result, asks, .. } | CommandEvent::AnsweredLate { result, asks, .. } => {
+            let asked = asks && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
             track.acknowledged =
                 if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
@@ -162,13 +160,14 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         }
     };
     let answered = match event {
-        CommandEvent::Answered { result, .. } | CommandEvent::AnsweredLate { result, .. } => Some(result),
+        CommandEvent::Answered { result, asks: false, .. }
+        | CommandEvent::AnsweredLate { result, asks: false, .. } => Some(result),
         _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
     model.record_operator(now, operator_kind, &seat, &told);
     model.tell(now, Speaker::Ground, level, text);
-    if let Some(result) = answered.filter(|_| !asked_to_confirm) {
+    if let Some(result) = answered {
         on_final_answer(model, kind, result, now);
     }
 }
@@ -395,7 +394,7 @@ fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
 
 pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
     let unfit = why_unfit(model, now);
-    let Some(why) = unfit.filter(|_| counts_down(model) && armed_here(model)) else {
+    let Some(why) = unfit.filter(|_| counts_down(model) && model.link.uplink.armed_by_us) else {
         if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_told) {
             let why = if unfit.is_some() { "the countdown has ended" } else { "its reason is gone" };
             model.info(now, format!("the hold is no longer sent: {why}"));
@@ -422,16 +421,6 @@ pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
 fn counts_down(model: &Model) -> bool {
     let on_pad = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
     on_pad && model.vehicle.countdown_s().is_some()
-}
-
-/// Whether this station armed the vehicle; a countdown of another station is not held. The vehicle knows it; an older one does
-/// not tell it.
-fn armed_here(model: &Model) -> bool {
-    if model.link.uplink.is_told() {
-        return model.link.uplink.armed_by_us;
-    }
-    let arm = model.commands.of(CommandKind::Arm);
-    arm.is_some_and(|track| track.accepted() || track.observed_at.is_some())
 }
 
 /// Sends a command once, without following it.

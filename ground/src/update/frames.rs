@@ -188,21 +188,15 @@ pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
 /// any frame yet.
 ///
 /// A station believes what is said about its own session alone: another station may have its address. The session is unknown
-/// in a replay, and an older vehicle tells none.
+/// in a replay.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     let to_all = target == Address { system_id: 0, component_id: 0 };
-    let status = model.vehicle.status.as_ref();
-    let is_old = status.is_some_and(|status| status.value.last_hold_ds == 0);
     let Model { settings, link, .. } = model;
-    link.uplink.tells_sessions |= data.session != 0;
     if !settings.us.accepts(target) {
         return link.uplink.overhear(data);
     }
-    let is_ours = to_all
-        || data.session == settings.session
-        || settings.role == Role::Replaying
-        || (data.session == 0 && is_old && !link.uplink.tells_sessions);
+    let is_ours = to_all || data.session == settings.session || settings.role == Role::Replaying;
     let another = data.session != 0 && data.accepted_age_ms <= SAME_ID_WITHIN_MS;
     if settings.role != Role::Replaying && (data.same_id > 0 || (!is_ours && another)) {
         let age = if is_ours { 0 } else { data.accepted_age_ms };

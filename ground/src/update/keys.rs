@@ -395,7 +395,7 @@ fn words(model: &Model, prompt: Prompt) -> Vec<&'static str> {
 }
 
 /// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
-/// moment both ask: the vehicle takes the first ask, and the other one is told of it.
+/// moment both ask: the vehicle takes the first ask, and the other one hears of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     climb(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);

@@ -12,7 +12,7 @@ pub mod vehicle_changes;
 
 use std::time::Duration;
 
-use protocol::book::{Head, SignedHead};
+use protocol::book::SignedHead;
 use protocol::frame::{Frame, Framer, FramerCounters};
 use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
@@ -55,7 +55,6 @@ pub enum Msg {
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
     Book {
-        #[serde(with = "head_bytes")]
         head: SignedHead,
         /// False without a key: then the signature is empty.
         is_signed: bool,
@@ -138,24 +137,6 @@ mod frame_bytes {
         let mut framer = Framer::new();
         framer.push_datagram(<&[u8]>::deserialize(from)?);
         framer.next_frame().ok_or_else(|| de::Error::custom("not a frame"))
-    }
-}
-
-/// The end of the book for a screen, with its signature in two halves.
-mod head_bytes {
-    use super::{Deserialize, Deserializer, Head, Serialize, Serializer, SignedHead, de};
-
-    pub(super) fn serialize<S: Serializer>(signed: &SignedHead, to: S) -> Result<S::Ok, S::Error> {
-        let (first, second) = signed.signature.split_at(32);
-        (signed.head, first, second).serialize(to)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<SignedHead, D::Error> {
-        let (head, first, second): (Head, &[u8], &[u8]) = Deserialize::deserialize(from)?;
-        let signature = [first, second].concat().try_into();
-        signature
-            .map(|signature| SignedHead { head, signature })
-            .map_err(|_bytes| de::Error::custom("no signature"))
     }
 }
 

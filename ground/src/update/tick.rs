@@ -41,7 +41,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let known = model.link.first_heartbeat_at.is_some();
     // What seems to be old is measured again soon: the vehicle's clock may have lost time.
     let seems_old = !matches!(model.link.down(now), LinkState::Alive(age) if age < SEEMS_OLD);
-    let often = seems_old || !model.link.uplink.is_told();
+    let often = seems_old || !model.link.uplink.is_reported();
     let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
     if known && is_due(&mut model.due.timesync, timesync_every, now) {
         ask_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
@@ -186,10 +186,10 @@ fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
     let attitude = vehicle.attitude.map(|attitude| attitude.value);
     let body = vehicle.body_speed().map(|speed| speed.value);
     let status = vehicle.status.as_ref().map(|status| &status.value);
-    let controller = vehicle.told::<TD_CONTROLLER_DATA>();
+    let controller = vehicle.last::<TD_CONTROLLER_DATA>();
     let controller = controller.as_ref().map(|controller| &controller.value);
-    let gimbal = vehicle.gimbal.map(|gimbal| gimbal.value.pitch);
-    let fins = vehicle.fins.map_or_else(Vec::new, |fins| fins.value.to_vec());
+    let gimbal = vehicle.gimbal().map(|gimbal| gimbal.value.pitch);
+    let fins = vehicle.fins().map_or_else(Vec::new, |fins| fins.value.to_vec());
     let angles = |pick: fn(&Deflection) -> f64| fins.iter().map(pick).collect();
     let link = model.link.stats.figures(now);
     Telemetry {

@@ -34,7 +34,7 @@ impl Announced {
             aborted: vehicle.interlocks().is_some_and(is_aborted)
                 || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),
-            verdict: vehicle.verdict.map(|verdict| verdict.value),
+            verdict: vehicle.verdict().map(|verdict| verdict.value),
         }
     }
 }
@@ -246,7 +246,7 @@ pub(super) struct CrewTold {
 
 impl CrewTold {
     pub(super) fn of(model: &Model) -> Self {
-        let crew = model.vehicle.told::<TD_CREW_DATA>();
+        let crew = model.vehicle.last::<TD_CREW_DATA>();
         let crew = crew.as_ref().map(|crew| &crew.value);
         Self {
             people: crew.map_or(0, |crew| crew.people),
@@ -256,7 +256,7 @@ impl CrewTold {
             tapped_by: crew.map_or(0, |crew| crew.tapped_by),
             commanded_by: crew.map_or(0, |crew| crew.commanded_by),
             held_by: crew.map_or(0, |crew| crew.held_by),
-            mission: model.vehicle.mission.clone(),
+            mission: model.vehicle.mission(),
         }
     }
 }

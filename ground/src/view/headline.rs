@@ -96,7 +96,7 @@ fn one(item: &Item, form: usize, (size, labelled): (Size, u16), theme: Theme, fr
     let style = theme.style(item.role);
     let text = &item.text[form];
     if theme.ascii && size.pixels == PixelSize::Quadrant {
-        // Quarter blocks cannot be told apart in ASCII.
+        // Quarter blocks cannot be distinguished in ASCII.
         let spaced: String = text.chars().flat_map(|c| [c, ' ']).collect();
         let middle = Rect { y: below.y + 1, height: 1, ..below };
         return frame.render_widget(Line::styled(spaced, style), middle.intersection(below));

@@ -43,7 +43,7 @@ pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
 
 /// The panel's rows.
 pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let told = model.vehicle.told::<TD_CONTROLLER_DATA>();
+    let told = model.vehicle.last::<TD_CONTROLLER_DATA>();
     let controller = told.as_ref();
     let number = |value: Option<f64>| {
         value
@@ -106,7 +106,7 @@ const BAR_COLUMNS: usize = 21;
 
 /// One row for each of the four fins.
 pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let fins = model.vehicle.fins;
+    let fins = model.vehicle.fins();
     let (mark, role) = fins.map_or((" ", TextRole::Label), |fins| age_mark(&fins, now));
     (0..4)
         .map(|k| {
@@ -131,7 +131,7 @@ pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
 
 /// The rows of the gimbal's two planes: command and measured angle, and a bar with both.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let gimbal = model.vehicle.gimbal;
+    let gimbal = model.vehicle.gimbal();
     let limit = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
     let plane = |name, pick: fn(&Gimbal) -> Deflection| {
@@ -189,7 +189,7 @@ fn gimbal_bar(commanded_deg: Option<f64>, measured_deg: Option<f64>, scale_deg: 
 
 /// Title and rows: the verdict once there is one, before that the prediction. The last row says it in words.
 pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    if let Some(verdict) = model.vehicle.verdict {
+    if let Some(verdict) = model.vehicle.verdict() {
         let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
         rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
         let by_legs = model.vehicle.limits().as_ref().is_some_and(are_of_legs);
@@ -223,7 +223,7 @@ pub fn touchdown_panel_with_bars(
 ) -> (&'static str, Vec<Line<'static>>) {
     let (title, mut rows) = touchdown_panel(model, theme, now);
     let vehicle = &model.vehicle;
-    let judged = vehicle.verdict.map(|verdict| verdict.value.touchdown);
+    let judged = vehicle.verdict().map(|verdict| verdict.value.touchdown);
     let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
     let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits()) else { return (title, rows) };
     let limits = limit_rows(&touchdown, Some(&limits));

@@ -321,7 +321,7 @@ pub fn fins_title(model: &Model, now: Duration) -> String {
 /// Draws the picture. `!` marks a fin that is not where it was commanded; `P` on the border is the direction to the
 /// pad.
 pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let Some(fins) = model.vehicle.fins else {
+    let Some(fins) = model.vehicle.fins() else {
         draw_lines(frame, area, &[theme.line(" no data", TextRole::Label)]);
         return;
     };

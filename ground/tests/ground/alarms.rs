@@ -5,7 +5,7 @@ use std::time::Duration;
 use ground::key::Key;
 use ground::model::{AlarmKind, CommandKind, RING_EVERY, Role, Settings};
 use ground::update::{Action, Msg};
-use protocol::dialect::{MavCmd, TdAbortEffect, TdControlLevel, TdInterlock, TdPhase};
+use protocol::dialect::{MavCmd, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdPhase};
 use protocol::signing::SigningCounters;
 
 use crate::keys::ladder;
@@ -217,19 +217,22 @@ fn alarms_are_listed_and_acknowledged_one_by_one() {
     let mut rig = Rig::crewed();
     rig.interlocks |= TdInterlock::TD_INTERLOCK_NO_LIGHT;
     rig.run(0.1);
-    rig.interlocks |= TdInterlock::TD_INTERLOCK_DEGRADED;
+    rig.checks_failed = TdCheck::TD_CHECK_LOG_SPACE.bits();
     rig.run(2.0);
     rig.key(Key::Char('9'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("[9Alarms]") && screen.contains("2 of 2 not seen"), "{screen}");
     assert!(
-        screen.contains(" ALARM        DEGRADED") && screen.contains(">ALARM        NO LIGHT"),
+        screen.contains(" ALARM        VEHICLE LOG") && screen.contains(">ALARM        NO LIGHT"),
         "{screen}"
     );
     rig.keys(&[Key::Up, Key::Char(' ')]);
     rig.run(0.1);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("alarm seen:  NO LIGHT") && screen.contains("ALARM        DEGRADED"), "{screen}");
+    assert!(
+        screen.contains("alarm seen:  NO LIGHT") && screen.contains("ALARM        VEHICLE LOG"),
+        "{screen}"
+    );
     assert_eq!(rig.model.alarms.unacknowledged(), 1);
     assert!(rig.events().contains("alarm acknowledged: NO LIGHT"));
     // On any other page Space acknowledges the alarm in the alarm line.

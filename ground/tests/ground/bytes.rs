@@ -82,7 +82,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
             let phase = model.vehicle.phase().map_or(TdPhase::TD_PHASE_SAFE, |phase| phase.value);
             drawn.push((now, bytes, phase));
         }
-        if model.vehicle.verdict.is_some() {
+        if model.vehicle.verdict().is_some() {
             over_at.get_or_insert(now + Duration::from_secs(3));
         }
         if over_at.is_some_and(|at| now >= at) {

@@ -158,14 +158,15 @@ fn a_latch_has_its_reason_beside_it() {
     assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text == words));
 }
 
-/// An older vehicle tells no cause: its grave text about that time is the reason, or there is none.
+/// A cause without a value of its own: the grave text about that time is the reason, or there is none.
 #[test]
-fn an_older_vehicles_text_is_the_reason_of_its_latch() {
+fn a_text_is_the_reason_of_a_latch_without_one() {
     let latched = |before: &str, at_the_latch: Option<&str>| {
         let mut rig = Rig::crewed();
         rig.text_of(MavSeverity::MAV_SEVERITY_CRITICAL, before);
         rig.run(30.0);
         rig.phase = TdPhase::TD_PHASE_COAST;
+        rig.latch = TdLatch::TD_LATCH_OTHER;
         rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
         rig.run(0.3);
         rig.text("only a warning");

@@ -283,9 +283,9 @@ fn a_hold_shows_its_reason_and_what_happens_next() {
     assert!(!rig.screen(80, 24).contains("\"HOLD: a station"));
 }
 
-/// An older vehicle does not report boot number, motor and hold.
+/// Nothing is known of it yet.
 #[test]
-fn an_older_vehicle_counts_as_live() {
+fn an_unknown_vehicle_counts_as_live() {
     let mut rig = Rig::crewed();
     rig.model = ground::model::Model::new(settings(false, true));
     rig.heartbeat();

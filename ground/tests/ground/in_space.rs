@@ -90,7 +90,7 @@ fn the_way_to_the_pad_is_on_the_picture_at_every_bearing() {
 }
 
 /// A flight in space from 300 m to the landing burn.
-pub(crate) fn burning_in_space() -> Rig {
+fn burning_in_space() -> Rig {
     let mut rig = armed();
     rig.limits_of_legs();
     let mut fall = |phase, heights: std::ops::Range<u16>, lean: (f64, f64)| {

@@ -1,7 +1,5 @@
 //! What keys can and cannot do: arming, start, abort and quitting, on a simulated clock.
 
-use std::time::Duration;
-
 use crate::rig::{Rig, is_abort, is_arm, typed};
 use ground::key::Key;
 use ground::model::{ABORT_TIME_LIMIT, CommandKind, Role, WORD_TIME_LIMIT};
@@ -94,21 +92,6 @@ fn the_arming_dialog_expires() {
     rig.key(Key::Enter);
     assert!(!rig.take_commands().iter().any(is_arm));
     assert!(rig.events().contains("time is up"));
-}
-
-#[test]
-fn arming_is_not_sent_on_a_lost_link_or_off_the_pad() {
-    let mut rig = Rig::crewed();
-    rig.speaks = false;
-    rig.run(5.0);
-    rig.keys(&ladder());
-    assert!(!rig.take_commands().iter().any(is_arm));
-    let mut rig = Rig::crewed();
-    rig.phase = TdPhase::TD_PHASE_POWERED;
-    rig.run(1.0);
-    rig.keys(&ladder());
-    assert!(!rig.take_commands().iter().any(is_arm));
-    assert!(rig.events().contains("cannot arm: phase POWERED"));
 }
 
 #[test]
@@ -283,22 +266,6 @@ fn an_abort_is_repeated_until_acknowledged_and_its_attempts_are_shown() {
     assert!(rig.take_commands().is_empty(), "latched");
 }
 
-/// The stabiliser shows DEGRADED with and without an abort.
-#[test]
-fn an_abort_goes_on_until_the_latch_itself_is_seen() {
-    let mut rig = Rig::crewed();
-    rig.interlocks |= TdInterlock::TD_INTERLOCK_DEGRADED;
-    rig.run(0.5);
-    rig.abort();
-    rig.answer(ABORT, ACCEPTED);
-    rig.take_commands();
-    rig.run(3.0);
-    assert!(rig.take_commands().len() >= 14, "five times a second");
-    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
-    rig.run(3.0);
-    assert!(rig.take_commands().is_empty());
-}
-
 /// The vehicle refuses for good, so repeating changes nothing.
 #[test]
 fn a_finally_refused_abort_is_not_repeated() {
@@ -400,31 +367,6 @@ fn a_paste_is_dropped_with_an_event_and_cancels_the_dialog() {
     assert_eq!(rig.model.dialog, None);
     rig.key(Key::Enter);
     assert!(rig.take_commands().is_empty());
-}
-
-#[test]
-fn a_held_q_neither_quits_nor_leaves_while_armed() {
-    for delay_ms in [250, 500, 600] {
-        let mut rig = armed_on_pad();
-        rig.hold(Key::Char('q'), delay_ms, 33, 20);
-        rig.run(1.0);
-        assert!(!leaves(&rig), "first repeat after {delay_ms} ms");
-    }
-}
-
-/// A long paste without marks, in pieces of any size: no key of it quits, not even while disarmed.
-#[test]
-fn a_q_in_a_paste_does_not_quit() {
-    let text = typed(&"the quick brown fox quits q".repeat(40));
-    for piece in [1, 2, 7, 1_000] {
-        let mut rig = Rig::crewed();
-        for keys in text.chunks(piece) {
-            rig.now += Duration::from_millis(1);
-            rig.msg(if let [key] = keys { Msg::Key(*key) } else { Msg::Keys(keys.to_vec()) });
-        }
-        rig.run(1.0);
-        assert!(!rig.wants_to_quit(), "pieces of {piece}");
-    }
 }
 
 #[test]
@@ -539,17 +481,6 @@ fn sigint_does_not_end_a_live_station_at_risk_and_sigterm_does() {
         rig.model.settings.demonstration = demonstration;
         rig.msg(Msg::Terminate("SIGINT"));
         assert!(rig.wants_to_quit());
-    }
-}
-
-#[test]
-fn a_wrong_letter_closes_the_arming_dialog() {
-    for word in ["AARMA", "AARN", "AAM", "AB"] {
-        let mut rig = Rig::crewed();
-        rig.keys(&typed(word));
-        assert_eq!(rig.model.dialog, None, "{word}");
-        rig.keys(&[Key::Backspace, Key::Enter]);
-        assert!(!rig.take_commands().iter().any(is_arm));
     }
 }
 

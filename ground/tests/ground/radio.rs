@@ -76,14 +76,6 @@ fn a_reboot_drops_old_values() {
 }
 
 #[test]
-fn an_escape_sequence_cannot_reach_the_terminal() {
-    let mut rig = Rig::crewed();
-    rig.text("\u{1b}[2Jgone\u{7}");
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("[2Jgone") && !screen.contains('\u{1b}') && !screen.contains('\u{7}'));
-}
-
-#[test]
 fn timesync_is_answered_and_the_round_trip_is_shown() {
     let mut rig = Rig::crewed();
     rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 77, ..Default::default() }));
@@ -192,7 +184,7 @@ fn an_abort_under_thrust_is_an_aborted_flight_even_if_it_lands() {
     let mut rig = Rig::new(settings(false, false));
     rig.phase = TdPhase::TD_PHASE_POWERED;
     rig.run(2.0);
-    rig.interlocks = TdInterlock::TD_INTERLOCK_ARMED | TdInterlock::TD_INTERLOCK_DEGRADED;
+    rig.interlocks = TdInterlock::TD_INTERLOCK_ARMED | TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     rig.run(3.0);
     assert!(!rig.wants_to_quit(), "it still flies");
     rig.phase = TdPhase::TD_PHASE_SAFED;
@@ -252,17 +244,5 @@ proptest! {
         rig.hear(&MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: text.into(), ..Default::default() }));
         let screen = rig.screen(80, 24);
         prop_assert!(!screen.chars().any(|c| c.is_control() && c != '\n'));
-    }
-}
-
-#[test]
-fn the_smallest_terminals_are_drawn() {
-    let mut rig = Rig::crewed();
-    rig.state(0.0, 15.0, 0.0, 0.0, 90.0);
-    rig.plan(TdLimit::empty());
-    for columns in 1..90 {
-        for rows in 1..30 {
-            rig.screen(columns, rows);
-        }
     }
 }

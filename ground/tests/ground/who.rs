@@ -143,10 +143,10 @@ fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
     rig.run(1.0);
     rig.msg(Msg::HeardFrom(2));
     rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
-    assert_eq!(rig.model.vehicle.mission, None);
+    assert_eq!(rig.model.vehicle.mission(), None);
     rig.msg(Msg::HeardFrom(1));
     rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
-    assert_eq!(rig.model.vehicle.mission.as_ref().map(|mission| mission.hash.0), Some([8; 8]));
+    assert_eq!(rig.model.vehicle.mission().as_ref().map(|mission| mission.hash.0), Some([8; 8]));
 }
 
 #[test]
@@ -513,7 +513,7 @@ fn a_heartbeat_alone_does_not_make_a_vehicle_ours() {
     answer_timesync(&mut rig);
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("it has told no flight status"), "{}", rig.events());
+    assert!(rig.events().contains("it has sent no flight status"), "{}", rig.events());
     rig.flight_status();
     rig.uplink();
     rig.keys(&ladder());

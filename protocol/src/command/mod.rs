@@ -153,7 +153,7 @@ impl CommandAnswer {
         Self { detail, ..self }
     }
 
-    /// The number of the command that it answers, if it is told.
+    /// The number of the command that it answers, if the answer has it.
     fn number(&self) -> Option<u32> {
         Some(self.detail.unsigned_abs()).filter(|number| *number >= FIRST_NUMBER)
     }

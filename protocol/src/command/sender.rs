@@ -43,12 +43,18 @@ pub enum CommandEvent {
         progress: u8,
     },
     /// The final answer.
-    Answered { command: u16, result: u8 },
+    Answered {
+        command: u16,
+        result: u8,
+        /// A second person has to confirm.
+        asks: bool,
+    },
     /// The final answer to a command that is no longer waited for, because it was given up or replaced by another
     /// command with its number.
     AnsweredLate {
         command: u16,
         result: u8,
+        asks: bool,
         /// The ticket that [`CommandSender::submit`] returned.
         ticket: Ticket,
     },
@@ -277,8 +283,9 @@ impl CommandSender {
             && let Some(late) = self.late.iter_mut().find(late)
         {
             if final_answer && !core::mem::replace(&mut late.is_answered, true) {
-                let (command, result, ticket) = (answer.command, answer.result, late.ticket);
-                self.events.push(CommandEvent::AnsweredLate { command, result, ticket });
+                let (asks, ticket) = (answer.asks(), late.ticket);
+                let CommandAnswer { command, result, .. } = *answer;
+                self.events.push(CommandEvent::AnsweredLate { command, result, asks, ticket });
             }
             return true;
         }
@@ -289,7 +296,8 @@ impl CommandSender {
             self.note_answer(index, *answer, final_answer);
         } else if final_answer {
             self.pending.remove(index);
-            self.events.push(CommandEvent::Answered { command: answer.command, result: answer.result });
+            let CommandAnswer { command, result, .. } = *answer;
+            self.events.push(CommandEvent::Answered { command, result, asks: answer.asks() });
         } else {
             self.pending[index].in_progress = true;
             self.pending[index].due_at = now + PROGRESS_TIMEOUT;
@@ -308,7 +316,7 @@ impl CommandSender {
         *known = Some(answer.result);
         let CommandAnswer { command, result, progress, .. } = answer;
         self.events.push(if final_answer {
-            CommandEvent::Answered { command, result }
+            CommandEvent::Answered { command, result, asks: answer.asks() }
         } else {
             CommandEvent::InProgress { command, progress }
         });
@@ -465,14 +473,14 @@ mod tests {
             aborts_ms(&[(100, accepted), (150, accepted), (160, MavResult::MAV_RESULT_FAILED)], 500);
         assert_eq!(sent, [0, 50, 100, 150, 350], "less often once it is accepted");
         let command = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16;
-        assert_eq!(events, [CommandEvent::Answered { command, result: 0 }]);
+        assert_eq!(events, [CommandEvent::Answered { command, result: 0, asks: false }]);
     }
 
     #[test]
     fn each_answer_belongs_to_the_command_whose_number_it_has() {
         let (command, result) = (ARM as u16, 0);
-        let late = CommandEvent::AnsweredLate { command, result, ticket: Ticket(1) };
-        let answered = CommandEvent::Answered { command, result };
+        let late = CommandEvent::AnsweredLate { command, result, asks: false, ticket: Ticket(1) };
+        let answered = CommandEvent::Answered { command, result, asks: false };
         for disarmed_ms in [200, 3_000] {
             let [first, second, third] = [100, 200, 700].map(|after| disarmed_ms + after);
             // A repeated arming is answered twice.

@@ -25,7 +25,7 @@ const AHEAD: Duration = Duration::from_millis(20);
 const HOLDS: Duration = Duration::from_millis(300);
 /// So many frames that are not dropped for others may wait.
 const MOST_KEPT: usize = 64;
-/// The share of its budget that a line keeps whatever a radio reports: anybody can forge a report.
+/// The share of its budget that a line keeps in spite of a radio's reports: anybody can forge a report.
 const LEAST: f64 = 0.25;
 /// A radio that has not reported for this long has no say any more.
 const REPORT_HOLDS: Duration = Duration::from_secs(10);

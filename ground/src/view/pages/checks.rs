@@ -83,7 +83,7 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
 
 /// Battery and storage, outside of a check too.
 fn supply(model: &Model, theme: Theme) -> Line<'static> {
-    let battery = model.vehicle.battery.map_or_else(
+    let battery = model.vehicle.battery().map_or_else(
         || "not told".to_owned(),
         |battery| {
             let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
@@ -92,7 +92,7 @@ fn supply(model: &Model, theme: Theme) -> Line<'static> {
     );
     let space = model
         .vehicle
-        .log_space_mib
+        .log_space_mib()
         .map_or_else(|| "not told".to_owned(), |space| format!("{} MiB free", fixed(space.value, 0)));
     let (label, plain) = (theme.style(TextRole::Label), theme.style(TextRole::Plain));
     Line::from(vec![

@@ -28,7 +28,7 @@ const FIN_ROWS: u16 = 5;
 
 /// Draws the headline, the panels, the events and the side view.
 pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let first = if model.vehicle.verdict.is_some() {
+    let first = if model.vehicle.verdict().is_some() {
         headline::headline(model, now, headline::verdict_headline)
     } else {
         headline::headline(model, now, headline::burn_headline)
@@ -214,7 +214,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 /// The verdict, then limits and greatest values, then the timeline.
 pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let (title, mut limits) = panels::touchdown_panel_with_bars(model, theme, now, PLAN_COLUMNS);
-    if model.vehicle.verdict.is_some() {
+    if model.vehicle.verdict().is_some() {
         // In the first line it has more room.
         limits.pop();
     }

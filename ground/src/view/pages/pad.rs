@@ -162,8 +162,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.extend(
         model
             .vehicle
-            .mission
-            .as_ref()
+            .mission()
             .map(|mission| {
                 let fits = usize::from(CHECK_COLUMNS).saturating_sub(24);
                 theme.plain(format!(
@@ -234,19 +233,19 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_SPEED => number(vehicle.motion.map(|m| m.value.speed_m_s()), 2, "m/s"),
         TdCheck::TD_CHECK_FINS => {
             let error =
-                vehicle.fins.map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
+                vehicle.fins().map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
             number(error, 1, "deg")
         }
         TdCheck::TD_CHECK_CONTROLLER_WARM => {
-            vehicle.told::<TD_CONTROLLER_DATA>().map_or_else(String::new, |c| {
+            vehicle.last::<TD_CONTROLLER_DATA>().map_or_else(String::new, |c| {
                 words::lower_case(&c.value.solver_status, "TD_SOLVER_STATUS_").chars().take(10).collect()
             })
         }
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => vehicle.prediction.map_or_else(String::new, |prediction| {
             prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
         }),
-        TdCheck::TD_CHECK_BATTERY => number(vehicle.battery.map(|battery| battery.value.volts), 2, "V"),
-        TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib.map(|space| space.value), 0, "MiB"),
+        TdCheck::TD_CHECK_BATTERY => number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"),
+        TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib().map(|space| space.value), 0, "MiB"),
         _ => String::new(),
     }
 }
