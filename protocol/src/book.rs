@@ -221,7 +221,7 @@ fn signed_bytes(head: &Head) -> Vec<u8> {
 
 /// A signed head that was found in a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FoundHead {
+pub struct RecordedHead {
     /// As in `the vehicle's log flight.mcap`.
     pub from: String,
     pub by_vehicle: bool,
@@ -263,7 +263,7 @@ pub struct Audit {
 
 /// Checks the entries of one book, in the order of the log, against the signed heads of it. `trusted` is the key that the auditor
 /// trusts; without it the key in the first entry is taken.
-pub fn audit(entries: &[v1::BookEntry], heads: &[FoundHead], trusted: Option<PublicKey>) -> Audit {
+pub fn audit(entries: &[v1::BookEntry], heads: &[RecordedHead], trusted: Option<PublicKey>) -> Audit {
     let mut audit = Audit {
         key: entries.first().and_then(|first| key_in(&first.text)),
         closed: entries.last().is_some_and(|entry| entry.kind == CLOSED),
@@ -275,7 +275,7 @@ pub fn audit(entries: &[v1::BookEntry], heads: &[FoundHead], trusted: Option<Pub
 
 fn check(
     entries: &[v1::BookEntry],
-    heads: &[FoundHead],
+    heads: &[RecordedHead],
     trusted: Option<PublicKey>,
     audit: &mut Audit,
 ) -> Result<(), Broken> {
@@ -298,9 +298,9 @@ fn check(
         return Err(Broken::OtherKey { found: key.to_string() });
     }
     let key = trusted.or(audit.key);
-    let mut heads: Vec<&FoundHead> = heads.iter().collect();
+    let mut heads: Vec<&RecordedHead> = heads.iter().collect();
     heads.sort_by_key(|found| found.signed.head.entries);
-    for FoundHead { from, by_vehicle, signed } in heads {
+    for RecordedHead { from, by_vehicle, signed } in heads {
         let (from, count) = (from.clone(), signed.head.entries);
         if key.is_some_and(|key| !key.signed(signed)) {
             return Err(Broken::BadSignature { from, entries: count });

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use protocol::book::{
-    Audit, Book, BookKey, Broken, CLOSED, FoundHead, Head, Line, OPENED, PublicKey, SignedHead, audit,
+    Audit, Book, BookKey, Broken, CLOSED, Head, Line, OPENED, PublicKey, RecordedHead, SignedHead, audit,
 };
 use protocol::log::v1::BookEntry;
 use protocol::signing::Key;
@@ -14,8 +14,8 @@ fn key(byte: u8) -> BookKey {
 struct Written {
     entries: Vec<BookEntry>,
     /// After every third entry; in the log, and in that of the vehicle.
-    own: Vec<FoundHead>,
-    vehicle: Vec<FoundHead>,
+    own: Vec<RecordedHead>,
+    vehicle: Vec<RecordedHead>,
 }
 
 fn book(texts: &[String], key: &BookKey) -> Written {
@@ -28,8 +28,8 @@ fn book(texts: &[String], key: &BookKey) -> Written {
         written.entries.push(book.enter(&Line { unix_ns: 1_000 + place as u64, kind, who, text }));
         let signed = key.sign(book.head().expect("an entry"));
         if place % 3 == 0 || kind == CLOSED {
-            written.own.push(FoundHead { from: "the log".to_owned(), by_vehicle: false, signed });
-            written.vehicle.push(FoundHead { from: "the vehicle".to_owned(), by_vehicle: true, signed });
+            written.own.push(RecordedHead { from: "the log".to_owned(), by_vehicle: false, signed });
+            written.vehicle.push(RecordedHead { from: "the vehicle".to_owned(), by_vehicle: true, signed });
         }
     }
     written
@@ -130,7 +130,7 @@ proptest! {
         let heads = numbers.iter().map(|number| {
             let head = Head { book: 0, entries: *number, hash: [byte; 32] };
             let signed = SignedHead { head, signature: [byte; 64] };
-            FoundHead { from: String::new(), by_vehicle: byte % 2 == 0, signed }
+            RecordedHead { from: String::new(), by_vehicle: byte % 2 == 0, signed }
         });
         let _ = audit(&entries, &heads.collect::<Vec<_>>(), PublicKey::from_bytes(&[byte; 32]));
     }

@@ -10,7 +10,6 @@ mod command;
 mod crew;
 pub mod dead_reckoning;
 mod dialog;
-mod heard;
 mod history;
 mod identity;
 mod link;
@@ -20,6 +19,7 @@ mod pad_check;
 mod page;
 mod place;
 pub mod quantity;
+mod runs;
 mod safety;
 pub mod telemetry;
 mod vehicle;
@@ -43,7 +43,6 @@ pub use checklist::*;
 pub use command::*;
 pub use crew::*;
 pub use dialog::*;
-pub use heard::*;
 pub use history::*;
 pub use identity::*;
 pub use link::*;
@@ -52,6 +51,7 @@ pub use motion::*;
 pub use pad_check::*;
 pub use page::*;
 pub use place::*;
+pub use runs::*;
 pub use safety::*;
 pub use vehicle::*;
 
@@ -211,7 +211,7 @@ pub struct Model {
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
     /// Which runs of which vehicles are heard.
-    pub heard: Heard,
+    pub runs: Runs,
     /// The vehicles of the runs that are not shown.
     pub(crate) others: BTreeMap<RunId, Vehicle>,
     pub link: Link,

@@ -184,7 +184,7 @@ pub fn margin_db(radio: &RADIO_STATUS_DATA) -> Option<f64> {
 
 /// What a test came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RangeFound {
+pub struct RangeTestResult {
     /// Share of the vehicle's frames that did not arrive here.
     pub loss_down: f64,
     /// Share of the questions that did not arrive at the vehicle.
@@ -195,7 +195,7 @@ pub struct RangeFound {
     pub stopped: Option<&'static str>,
 }
 
-impl RangeFound {
+impl RangeTestResult {
     pub fn passed(&self) -> bool {
         self.stopped.is_none()
             && self.loss_down <= LOSS_MOST
@@ -229,7 +229,7 @@ impl RangeFound {
 pub struct RangeTest {
     pub by: Seat,
     pub began_at: Duration,
-    pub found: Option<RangeFound>,
+    pub found: Option<RangeTestResult>,
     counts_before: FrameCounts,
     counts: FrameCounts,
     asked: u32,
@@ -265,7 +265,7 @@ impl RangeTest {
     }
 
     /// What has been found so far.
-    pub fn so_far(&self, stopped: Option<&'static str>) -> RangeFound {
+    pub fn so_far(&self, stopped: Option<&'static str>) -> RangeTestResult {
         let (arrived, lost) = (
             self.counts.arrived.saturating_sub(self.counts_before.arrived),
             self.counts.lost.saturating_sub(self.counts_before.lost),
@@ -276,7 +276,7 @@ impl RangeTest {
         // If the way down loses all of them, nothing is known of the way up, which is no pass.
         let (answered, could_arrive) = (f64::from(self.answered), f64::from(self.asked) * (1.0 - loss_down));
         let loss_up = if could_arrive > 0.0 { (1.0 - answered / could_arrive).max(0.0) } else { 1.0 };
-        RangeFound { loss_down, loss_up, margin_db: self.margin_db, stopped }
+        RangeTestResult { loss_down, loss_up, margin_db: self.margin_db, stopped }
     }
 
     /// Lets time pass. Returns the time stamp of a question to send now, ns.
@@ -328,7 +328,7 @@ mod tests {
     }
 
     /// A test over a link that loses one of so many down, and answers one of so many not.
-    fn tested(lost_of: u64, unanswered_of: u64, margins: &[RADIO_STATUS_DATA]) -> RangeFound {
+    fn tested(lost_of: u64, unanswered_of: u64, margins: &[RADIO_STATUS_DATA]) -> RangeTestResult {
         let counts = |n: u64| FrameCounts {
             arrived: 1_000 + n * 10,
             lost: 7 + (n * 10).checked_div(lost_of).unwrap_or(0),

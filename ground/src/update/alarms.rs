@@ -95,7 +95,7 @@ fn identity_conditions(model: &Model, now: Duration) -> Vec<(AlarmKind, String)>
     let mut found = Vec::new();
     let id = model.settings.vehicle.system_id;
     if let Some(other) = model.beside(now) {
-        let text = if model.heard.is_chosen(now) {
+        let text = if model.runs.is_chosen(now) {
             format!("TWO VEHICLES under id {id}: also {other}; the shown one was chosen")
         } else {
             format!("TWO VEHICLES under id {id}: also {other}; nothing is armed or started: switch one off")

@@ -79,24 +79,24 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     let is_nobodys = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
-        MavMessage::HEARTBEAT(_) if model.heard.is_stray(frame.sequence(), now) => true,
-        _ => model.heard.is_strange(model.link.place, now),
+        MavMessage::HEARTBEAT(_) if model.runs.is_stray(frame.sequence(), now) => true,
+        _ => model.runs.is_strange(model.link.place, now),
     };
     if is_nobodys {
         return;
     }
     if let MavMessage::TD_FLIGHT_STATUS(status) = &message
-        && model.heard.disowns(&word(status, frame, model.link.place), now)
+        && model.runs.disowns(&word(status, frame, model.link.place), now)
     {
         return;
     }
     let speaker = speaker(model, frame, &message, now);
-    if let Some(other) = speaker.filter(|run| model.heard.shown() != Some(*run)) {
+    if let Some(other) = speaker.filter(|run| model.runs.shown() != Some(*run)) {
         // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
         if !matches!(message, MavMessage::STATUSTEXT(_)) {
             let vehicle = model.others.entry(other).or_default();
             telemetry::apply(vehicle, &message, now);
-            model.heard.note(other, is_busy(vehicle, now));
+            model.runs.note(other, is_busy(vehicle, now));
             vehicle_changes::settle(model, now);
             return;
         }
@@ -126,10 +126,10 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         _ => {}
     }
     let before = vehicle_changes::Announced::of(&model.vehicle);
-    let crew_before = vehicle_changes::CrewTold::of(model);
+    let crew_before = vehicle_changes::CrewReport::of(model);
     telemetry::apply(&mut model.vehicle, &message, now);
-    if let Some(shown) = model.heard.shown() {
-        model.heard.note(shown, is_busy(&model.vehicle, now));
+    if let Some(shown) = model.runs.shown() {
+        model.runs.note(shown, is_busy(&model.vehicle, now));
     }
     vehicle_changes::on_change(model, before, now);
     vehicle_changes::enter_crew_changes(model, &crew_before);
@@ -151,11 +151,11 @@ fn word(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, place: u16) -> Word {
 fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<RunId> {
     match message {
         MavMessage::TD_FLIGHT_STATUS(status) => {
-            Some(model.heard.hear(&word(status, frame, model.link.place), now))
+            Some(model.runs.hear(&word(status, frame, model.link.place), now))
         }
         // What another autopilot says beside ours is noted at the shown one.
-        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.heard.shown(),
-        _ => model.heard.speaker(model.link.place, (time_boot_ms(message), frame.sequence()), now),
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.runs.shown(),
+        _ => model.runs.speaker(model.link.place, (time_boot_ms(message), frame.sequence()), now),
     }
 }
 

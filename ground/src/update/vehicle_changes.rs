@@ -41,18 +41,18 @@ impl Announced {
 
 /// Shows another run if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
-    let Some(former) = model.heard.shown() else { return };
-    let Some(shown) = model.heard.settle(now) else { return };
+    let Some(former) = model.runs.shown() else { return };
+    let Some(shown) = model.runs.settle(now) else { return };
     let vehicle = model.others.remove(&shown).unwrap_or_default();
     let mut before = std::mem::replace(&mut model.vehicle, vehicle);
     let away = KeepAway::of(&before, now);
     model.vehicle.before = away.map(|away| Sample::new(away, now)).or(model.vehicle.before);
     model.vehicle.foreign = before.foreign.take();
-    let is_reset = model.heard.follows(shown, former);
+    let is_reset = model.runs.follows(shown, former);
     let did = is_reset.then(|| reset_words(&before));
     model.others.insert(former, before);
-    let Model { heard, others, .. } = model;
-    others.retain(|id, _| heard.knows(*id));
+    let Model { runs, others, .. } = model;
+    others.retain(|id, _| runs.knows(*id));
     on_shown(model, did, now);
     on_change(model, Announced::default(), now);
 }
@@ -60,7 +60,7 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
 /// The crew shows and commands this boot, of several vehicles under one id.
 pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     let name = words::boot(boot);
-    if model.heard.choose(boot, now) {
+    if model.runs.choose(boot, now) {
         model.record_operator(now, "chose", by, &format!("the vehicle of boot {name}{}", by.in_brackets()));
         model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
         settle(model, now);
@@ -235,7 +235,7 @@ pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
 
 /// What the vehicle says of its crew and its mission, as far as the book has it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct CrewTold {
+pub(super) struct CrewReport {
     people: u8,
     ask: Option<(TdAct, u16, u8)>,
     tapped_by: u8,
@@ -244,7 +244,7 @@ pub(super) struct CrewTold {
     mission: Option<FlownMission>,
 }
 
-impl CrewTold {
+impl CrewReport {
     pub(super) fn of(model: &Model) -> Self {
         let crew = model.vehicle.last::<TD_CREW_DATA>();
         let crew = crew.as_ref().map(|crew| &crew.value);
@@ -262,8 +262,8 @@ impl CrewTold {
 }
 
 /// Enters what has changed.
-pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewTold) {
-    let after = CrewTold::of(model);
+pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport) {
+    let after = CrewReport::of(model);
     if after == *before {
         return;
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 use prost::Message as _;
-use protocol::book::{Audit, FoundHead, PublicKey, SignedHead, audit, shown as shown_hash};
+use protocol::book::{Audit, PublicKey, RecordedHead, SignedHead, audit, shown as shown_hash};
 use protocol::dialect::MavMessage;
 use protocol::frame::Framer;
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
@@ -75,16 +75,16 @@ impl AuditFound {
 /// A log cannot be read.
 pub fn audit_logs(paths: &[impl AsRef<Path>], trusted: Option<PublicKey>) -> Result<AuditFound, ReadError> {
     let logs = paths.iter().map(|path| read(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
-    let by_vehicle: Vec<&FoundHead> =
+    let by_vehicle: Vec<&RecordedHead> =
         logs.iter().flat_map(|log| &log.heads).filter(|head| head.by_vehicle).collect();
     let mut books = Vec::new();
     let mut present = Vec::new();
     for log in logs.iter().filter(|log| log.has_book()) {
-        let own: Vec<&FoundHead> = log.heads.iter().filter(|head| !head.by_vehicle).collect();
+        let own: Vec<&RecordedHead> = log.heads.iter().filter(|head| !head.by_vehicle).collect();
         // The name of a book is in its heads, too: its first entry may have been changed.
         let names: Vec<u64> = own.iter().map(|head| head.signed.head.book).collect();
         let of_it = by_vehicle.iter().filter(|head| names.contains(&head.signed.head.book));
-        let heads: Vec<FoundHead> = own.iter().chain(of_it).map(|head| (*head).clone()).collect();
+        let heads: Vec<RecordedHead> = own.iter().chain(of_it).map(|head| (*head).clone()).collect();
         books.push(found(log, &audit(&log.entries, &heads, trusted), trusted));
         present.extend(names);
     }
@@ -140,7 +140,7 @@ struct Contents {
     /// The entries of the station's book, in the order of the file.
     entries: Vec<BookEntry>,
     /// The signed hashes of the station's own book, and those that the vehicle received.
-    heads: Vec<FoundHead>,
+    heads: Vec<RecordedHead>,
     damage: Option<String>,
 }
 
@@ -178,7 +178,7 @@ impl Contents {
             TOPIC_BOOK_HEAD => {
                 let signed = BookHead::decode(data).ok().and_then(|record| SignedHead::of_record(&record));
                 let from = "the log itself".to_owned();
-                self.heads.extend(signed.map(|signed| FoundHead { from, by_vehicle: false, signed }));
+                self.heads.extend(signed.map(|signed| RecordedHead { from, by_vehicle: false, signed }));
             }
             TOPIC_RAW_RX
                 if channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "vehicle") =>
@@ -189,7 +189,7 @@ impl Contents {
                 if let Some(MavMessage::TD_BOOK_HEAD(head)) = message {
                     let from = format!("the vehicle's log {}", self.name);
                     let signed = SignedHead::of_message(&head);
-                    self.heads.push(FoundHead { from, by_vehicle: true, signed });
+                    self.heads.push(RecordedHead { from, by_vehicle: true, signed });
                 }
             }
             _ => {}

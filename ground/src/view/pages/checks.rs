@@ -7,7 +7,7 @@ use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPa
 use ratatui::text::{Line, Span};
 
 use crate::model::{
-    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeFound, RangeTest, Spot, Standing,
+    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeTest, RangeTestResult, Spot, Standing,
     dead_reckoning::may_have_left, shown, standing,
 };
 use crate::view::{TextRole, Theme, fixed, seconds};
@@ -183,7 +183,7 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
 }
 
 /// In one line: the smallest whole screen has no more.
-fn result(test: &RangeTest, found: &RangeFound, theme: Theme, now: Duration) -> Line<'static> {
+fn result(test: &RangeTest, found: &RangeTestResult, theme: Theme, now: Duration) -> Line<'static> {
     let (words, role) = match (test.is_running(), found.stopped, found.passed()) {
         (true, ..) => (format!("RUNS {:.0} s", test.left(now).as_secs_f64()), TextRole::Caution),
         (false, Some(_), _) => ("STOPPED".to_owned(), TextRole::Caution),

@@ -240,17 +240,17 @@ pub enum Beside {
 
 /// The runs that are heard.
 #[derive(Debug, Clone, Default)]
-pub struct Heard {
-    runs: Vec<Run>,
+pub struct Runs {
+    list: Vec<Run>,
     shown: Option<RunId>,
     /// The run that the crew has chosen by name.
     chosen: Option<RunId>,
     next_id: u32,
 }
 
-impl Heard {
+impl Runs {
     fn of(&self, id: RunId) -> Option<&Run> {
-        self.runs.iter().find(|run| run.id == id)
+        self.list.iter().find(|run| run.id == id)
     }
 
     fn shown_run(&self) -> Option<&Run> {
@@ -269,7 +269,7 @@ impl Heard {
     /// Whether a flight status only claims to be of the shown run. It is noted: two vehicles may have one boot and unique id.
     pub fn disowns(&mut self, word: &Word, now: Duration) -> bool {
         let shown = self.shown;
-        let run = self.runs.iter_mut().find(|run| Some(run.id) == shown);
+        let run = self.list.iter_mut().find(|run| Some(run.id) == shown);
         let Some(run) = run.filter(|run| run.fits(word, now) && run.is_out_of_step(word, now)) else {
             return false;
         };
@@ -279,21 +279,21 @@ impl Heard {
 
     /// Takes a flight status, and says which run it comes from. The first one is shown.
     pub fn hear(&mut self, word: &Word, now: Duration) -> RunId {
-        let fitting = self.runs.iter_mut().filter(|run| run.fits(word, now));
+        let fitting = self.list.iter_mut().filter(|run| run.fits(word, now));
         if let Some(run) = fitting.min_by_key(|run| run.away_ms(word.clock_ms, now).abs()) {
             run.hear(word, now);
             return run.id;
         }
         let id = RunId(self.next_id);
         self.next_id = self.next_id.wrapping_add(1);
-        if self.runs.len() == RUNS_MAX {
+        if self.list.len() == RUNS_MAX {
             let kept = [self.shown, self.chosen];
             let oldest = (0..RUNS_MAX)
-                .filter(|place| !kept.contains(&Some(self.runs[*place].id)))
-                .min_by_key(|place| (self.runs[*place].is_busy, self.runs[*place].heard_at));
-            self.runs.remove(oldest.unwrap_or(0));
+                .filter(|place| !kept.contains(&Some(self.list[*place].id)))
+                .min_by_key(|place| (self.list[*place].is_busy, self.list[*place].heard_at));
+            self.list.remove(oldest.unwrap_or(0));
         }
-        self.runs.push(Run::new(id, word, now));
+        self.list.push(Run::new(id, word, now));
         self.shown.get_or_insert(id);
         id
     }
@@ -307,7 +307,7 @@ impl Heard {
         now: Duration,
     ) -> Option<RunId> {
         let shown = self.shown_run()?;
-        let mut here = self.runs.iter().filter(|run| run.is_heard(now) && run.is_at(place));
+        let mut here = self.list.iter().filter(|run| run.is_heard(now) && run.is_at(place));
         if let (Some(only), None) = (here.next(), here.next()) {
             return Some(only.id);
         }
@@ -315,7 +315,7 @@ impl Heard {
             Some(clock_ms) => run.away_ms(clock_ms, now).abs(),
             None => run.behind(sequence),
         };
-        let others = self.runs.iter().filter(|run| run.id != shown.id && run.is_steady(now));
+        let others = self.list.iter().filter(|run| run.id != shown.id && run.is_steady(now));
         let nearest = others.min_by_key(|run| off(run)).filter(|run| off(run) < off(shown));
         Some(nearest.unwrap_or(shown).id)
     }
@@ -324,7 +324,7 @@ impl Heard {
     /// Somebody else beats under this id, and has not said yet who it is.
     pub fn is_stray(&self, sequence: u8, now: Duration) -> bool {
         self.shown_run().is_some_and(|shown| is_within(shown.heard_at, FRESH_WITHIN, now))
-            && self.runs.iter().filter(|run| run.is_heard(now)).all(|run| run.behind(sequence) > STRAY_FROM)
+            && self.list.iter().filter(|run| run.is_heard(now)).all(|run| run.behind(sequence) > STRAY_FROM)
     }
 
     /// Whether a place is another address of the link over which the shown run reports, and no run has reported from it: somebody
@@ -334,12 +334,12 @@ impl Heard {
             let beside = |known: &Place| link_of(known.number) == link_of(place);
             is_within(run.heard_at, ALIVE_WITHIN, now) && run.places.iter().any(beside)
         };
-        self.shown_run().is_some_and(reports_beside) && !self.runs.iter().any(|run| run.is_at(place))
+        self.shown_run().is_some_and(reports_beside) && !self.list.iter().any(|run| run.is_at(place))
     }
 
     /// Notes whether a run is armed, in a countdown, in flight, or down and not yet safe.
     pub fn note(&mut self, id: RunId, is_busy: bool) {
-        if let Some(run) = self.runs.iter_mut().find(|run| run.id == id) {
+        if let Some(run) = self.list.iter_mut().find(|run| run.id == id) {
             run.is_busy = is_busy;
         }
     }
@@ -363,7 +363,7 @@ impl Heard {
                 && (is_alone || (near && run.is_busy && !shown.is_busy && run.is_steady(now)))
         };
         let next = chosen.unwrap_or_else(|| {
-            let taking = self.runs.iter().filter(takes);
+            let taking = self.list.iter().filter(takes);
             taking.max_by_key(|run| (run.is_busy, run.heard_at)).map_or(shown.id, |run| run.id)
         });
         self.chosen = chosen;
@@ -374,7 +374,7 @@ impl Heard {
     /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of its number.
     pub fn choose(&mut self, boot: u32, now: Duration) -> bool {
         let named: Vec<RunId> =
-            self.runs.iter().filter(|run| run.boot == boot && run.is_heard(now)).map(|run| run.id).collect();
+            self.list.iter().filter(|run| run.boot == boot && run.is_heard(now)).map(|run| run.id).collect();
         if let [only] = named[..] {
             self.chosen = Some(only);
         }
@@ -388,8 +388,8 @@ impl Heard {
             let is_same = run.shares_a_place(shown) && (run.follows(shown) || shown.follows(run));
             run.id != shown.id && run.is_heard(now) && !is_same
         };
-        let others = self.runs.iter().filter(is_other).map(|run| Beside::Run(run.id, run.boot));
-        let twin = self.runs.iter().any(|run| run.is_heard(now) && run.is_of_two(now));
+        let others = self.list.iter().filter(is_other).map(|run| Beside::Run(run.id, run.boot));
+        let twin = self.list.iter().any(|run| run.is_heard(now) && run.is_of_two(now));
         others.chain(twin.then_some(Beside::Twin)).collect()
     }
 
@@ -397,7 +397,7 @@ impl Heard {
     /// other one has.
     pub fn is_chosen(&self, now: Duration) -> bool {
         let Some(shown) = self.shown_run() else { return false };
-        let same = self.runs.iter().filter(|run| run.boot == shown.boot && run.is_heard(now)).count();
+        let same = self.list.iter().filter(|run| run.boot == shown.boot && run.is_heard(now)).count();
         self.chosen == self.shown && shown.boot > 0 && same == 1 && !shown.is_of_two(now)
     }
 
@@ -420,7 +420,7 @@ impl Model {
         let is_heard = |at: Duration| is_within(at, GONE_AFTER, now);
         let ours = self.vehicle.status.as_ref().is_some_and(|status| is_heard(status.received_at));
         let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
-        let words = self.heard.beside(now).into_iter().map(|other| match other {
+        let words = self.runs.beside(now).into_iter().map(|other| match other {
             Beside::Run(_, 0) => "one without a boot number".to_owned(),
             Beside::Run(id, boot) => {
                 let state =
@@ -435,18 +435,18 @@ impl Model {
 
     /// A row for each vehicle while there are several: its boot, phase, whether it is armed, its countdown and its age.
     pub fn vehicle_rows(&self, now: Duration) -> Vec<String> {
-        let beside = self.heard.beside(now);
+        let beside = self.runs.beside(now);
         let row = |lead: &str, vehicle: &Vehicle, age: Option<Duration>| {
             let boot = vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
             let age = age.map_or_else(String::new, |age| format!(" {}s", age.as_secs()));
             format!("{lead} {boot} {}{age}", state_words(vehicle))
         };
         let others = beside.iter().filter_map(|other| match other {
-            Beside::Run(id, _) => Some(row("also", self.others.get(id)?, self.heard.age(*id, now))),
+            Beside::Run(id, _) => Some(row("also", self.others.get(id)?, self.runs.age(*id, now))),
             Beside::Twin => Some("also one with the same boot and unique id".to_owned()),
         });
-        let shown = self.heard.shown().filter(|_| !beside.is_empty());
-        let shown = shown.map(|id| row("this", &self.vehicle, self.heard.age(id, now)));
+        let shown = self.runs.shown().filter(|_| !beside.is_empty());
+        let shown = shown.map(|id| row("this", &self.vehicle, self.runs.age(id, now)));
         shown.into_iter().chain(others).collect()
     }
 
@@ -456,7 +456,7 @@ impl Model {
             Beside::Run(_, boot) if boot > 0 => Some(boot),
             _ => None,
         };
-        self.heard.beside(now).into_iter().filter_map(boot).collect()
+        self.runs.beside(now).into_iter().filter_map(boot).collect()
     }
 
     /// The vehicles that are heard: the shown one, and those beside it.
@@ -464,7 +464,7 @@ impl Model {
         let heard = self
             .others
             .iter()
-            .filter(move |(id, _)| self.heard.age(**id, now).is_some_and(|age| age < GONE_AFTER));
+            .filter(move |(id, _)| self.runs.age(**id, now).is_some_and(|age| age < GONE_AFTER));
         std::iter::once(&self.vehicle).chain(heard.map(|(_, vehicle)| vehicle))
     }
 }
@@ -520,43 +520,43 @@ mod tests {
         }
     }
 
-    fn boots(heard: &Heard, now: Duration) -> usize {
-        heard.beside(now).len()
+    fn boots(runs: &Runs, now: Duration) -> usize {
+        runs.beside(now).len()
     }
 
     #[test]
     fn a_second_vehicle_is_one_at_once_and_does_not_take_the_screen() {
-        let mut heard = Heard::default();
+        let mut runs = Runs::default();
         let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 20_000)];
-        let shown = heard.hear(&first.word(10_000), at(10_000));
+        let shown = runs.hear(&first.word(10_000), at(10_000));
         for ms in (10_000..60_000).step_by(100) {
-            heard.hear(&first.word(ms), at(ms));
+            runs.hear(&first.word(ms), at(ms));
             if ms >= 20_000 {
-                heard.hear(&second.word(ms), at(ms));
-                assert_eq!(boots(&heard, at(ms)), 1, "{ms}");
+                runs.hear(&second.word(ms), at(ms));
+                assert_eq!(boots(&runs, at(ms)), 1, "{ms}");
             }
-            assert_eq!((heard.settle(at(ms)), heard.shown()), (None, Some(shown)));
+            assert_eq!((runs.settle(at(ms)), runs.shown()), (None, Some(shown)));
         }
         // The shown one is switched off: 10 s later the other one is alone, and has the screen.
         for ms in (60_000..71_000).step_by(100) {
-            let run = heard.hear(&second.word(ms), at(ms));
-            let takes = heard.settle(at(ms));
+            let run = runs.hear(&second.word(ms), at(ms));
+            let takes = runs.settle(at(ms));
             assert_eq!(takes, (ms == 69_900).then_some(run), "{ms}");
         }
-        assert_eq!(boots(&heard, at(70_000)), 0);
+        assert_eq!(boots(&runs, at(70_000)), 0);
     }
 
     #[test]
     fn a_reset_with_a_fixed_boot_number_is_seen_by_the_clock() {
-        let mut heard = Heard::default();
+        let mut runs = Runs::default();
         let [mut before, mut after] = [Sender::new(1, 7, 0), Sender::new(1, 7, 30_500)];
         for ms in (0..30_000).step_by(100) {
-            heard.hear(&before.word(ms), at(ms));
+            runs.hear(&before.word(ms), at(ms));
         }
         let taken = (31_000..34_000).step_by(100).find(|ms| {
-            heard.hear(&after.word(*ms), at(*ms));
-            assert_eq!(boots(&heard, at(*ms)), 0, "{ms}");
-            heard.settle(at(*ms)).is_some()
+            runs.hear(&after.word(*ms), at(*ms));
+            assert_eq!(boots(&runs, at(*ms)), 0, "{ms}");
+            runs.settle(at(*ms)).is_some()
         });
         assert_eq!(taken, Some(31_900), "2 s after its last word");
     }
@@ -566,31 +566,31 @@ mod tests {
         for (apart_ms, places) in
             [(0, [0, 0]), (300, [0, 0]), (3_000, [0, 1]), (60_000, [0, 0]), (60_000, [0, 1])]
         {
-            let mut heard = Heard::default();
+            let mut runs = Runs::default();
             let mut both = [Sender::new(1, 7, 0), Sender::new(1, 7, apart_ms)];
             (both[0].place, both[1].place, both[1].sequence) = (places[0], places[1], 100);
             for ms in (100_000..103_000).step_by(100) {
                 let two = &mut both;
                 for sender in two {
-                    heard.hear(&sender.word(ms), at(ms));
+                    runs.hear(&sender.word(ms), at(ms));
                 }
-                heard.settle(at(ms));
+                runs.settle(at(ms));
             }
-            assert!(boots(&heard, at(103_000)) > 0, "{apart_ms} {places:?}");
-            assert!(!heard.choose(7, at(103_000)) || !heard.is_chosen(at(103_000)), "no command can name it");
+            assert!(boots(&runs, at(103_000)) > 0, "{apart_ms} {places:?}");
+            assert!(!runs.choose(7, at(103_000)) || !runs.is_chosen(at(103_000)), "no command can name it");
         }
     }
 
     /// From another address of the same link, with the boot, the unique id and about the clock of the vehicle.
     #[test]
     fn a_status_that_only_claims_to_be_the_vehicle_s_is_not_taken_and_seen_as_a_second_one() {
-        let mut heard = Heard::default();
+        let mut runs = Runs::default();
         let mut ours = Sender { place: 0x101, ..Sender::new(1, 7, 0) };
         let mut disowned = 0;
         for ms in (10_000..20_000).step_by(100) {
             let word = ours.word(ms);
-            assert!(!heard.disowns(&word, at(ms)));
-            heard.hear(&word, at(ms));
+            assert!(!runs.disowns(&word, at(ms)));
+            runs.hear(&word, at(ms));
             // The same over another link, and a copy that another way of the same link brings first.
             for (place, later) in [(0x201, 0), (0x102, 1)] {
                 let copy = Word {
@@ -599,7 +599,7 @@ mod tests {
                     clock_ms: word.clock_ms + u32::from(later),
                     ..word
                 };
-                assert!(!heard.disowns(&copy, at(ms)), "{place}");
+                assert!(!runs.disowns(&copy, at(ms)), "{place}");
             }
             if ms % 1_000 == 0 {
                 let forged = Word {
@@ -608,40 +608,40 @@ mod tests {
                     sequence: word.sequence.wrapping_add(200),
                     ..word
                 };
-                disowned += usize::from(heard.disowns(&forged, at(ms)));
+                disowned += usize::from(runs.disowns(&forged, at(ms)));
             }
         }
-        assert_eq!((disowned, boots(&heard, at(20_000))), (10, 1));
+        assert_eq!((disowned, boots(&runs, at(20_000))), (10, 1));
     }
 
     /// As when a router gives it another port: at once, or after a pause.
     #[test]
     fn a_vehicle_that_gets_another_address_stays_one() {
         for pause_ms in [0, 1_000] {
-            let mut heard = Heard::default();
+            let mut runs = Runs::default();
             let mut ours = Sender { place: 0x101, ..Sender::new(1, 7, 0) };
             for ms in (10_000..20_000).step_by(100).filter(|ms| !(15_000..15_000 + pause_ms).contains(ms)) {
                 ours.place = if ms < 15_000 { 0x101 } else { 0x102 };
                 let word = ours.word(ms);
-                assert!(!heard.disowns(&word, at(ms)), "{ms} after {pause_ms}");
-                heard.hear(&word, at(ms));
-                assert_eq!(boots(&heard, at(ms)), 0);
+                assert!(!runs.disowns(&word, at(ms)), "{ms} after {pause_ms}");
+                runs.hear(&word, at(ms));
+                assert_eq!(boots(&runs, at(ms)), 0);
             }
         }
     }
 
     #[test]
     fn a_chosen_boot_is_shown_while_it_is_heard() {
-        let mut heard = Heard::default();
+        let mut runs = Runs::default();
         let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 0)];
         for ms in (10_000..20_000).step_by(100) {
-            heard.hear(&first.word(ms), at(ms));
-            heard.hear(&second.word(ms), at(ms));
+            runs.hear(&first.word(ms), at(ms));
+            runs.hear(&second.word(ms), at(ms));
             if ms == 15_000 {
-                assert!(!heard.choose(8, at(ms)) && heard.choose(9, at(ms)));
+                assert!(!runs.choose(8, at(ms)) && runs.choose(9, at(ms)));
             }
-            assert_eq!(heard.settle(at(ms)).is_some(), ms == 15_000);
-            assert_eq!(heard.is_chosen(at(ms)), ms >= 15_000);
+            assert_eq!(runs.settle(at(ms)).is_some(), ms == 15_000);
+            assert_eq!(runs.is_chosen(at(ms)), ms >= 15_000);
         }
     }
 
@@ -655,10 +655,10 @@ mod tests {
             gaps_ms in prop::collection::vec(1_u64..1_900, 20..60),
             is_busy in any::<bool>(),
         ) {
-            let mut heard = Heard::default();
+            let mut runs = Runs::default();
             let mut ours = Sender::new(9, 9, 0);
-            let shown = heard.hear(&ours.word(100_000), at(100_000));
-            heard.note(shown, true);
+            let shown = runs.hear(&ours.word(100_000), at(100_000));
+            runs.note(shown, true);
             let mut now_ms = 100_000;
             let mut others = others.iter().cycle();
             for gap_ms in gaps_ms {
@@ -669,13 +669,13 @@ mod tests {
                     if let Some((uid, boot, clock_ms, place, _, sequence)) = others.next() {
                         let clock_ms = *clock_ms as u32;
                         let word = Word { uid: *uid, boot: *boot, clock_ms, sequence: *sequence, place: *place };
-                        let run = heard.hear(&word, at(now_ms));
-                        heard.note(run, is_busy);
-                        prop_assert_eq!(heard.settle(at(now_ms)), None);
+                        let run = runs.hear(&word, at(now_ms));
+                        runs.note(run, is_busy);
+                        prop_assert_eq!(runs.settle(at(now_ms)), None);
                     }
-                    prop_assert!(heard.runs.len() <= RUNS_MAX && heard.shown() == Some(shown));
+                    prop_assert!(runs.list.len() <= RUNS_MAX && runs.shown() == Some(shown));
                 }
-                prop_assert_eq!(heard.hear(&ours.word(now_ms), at(now_ms)), shown);
+                prop_assert_eq!(runs.hear(&ours.word(now_ms), at(now_ms)), shown);
             }
         }
 
@@ -685,22 +685,22 @@ mod tests {
             forged in prop::collection::vec((0_u16..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
             is_busy in any::<bool>(),
         ) {
-            let mut heard = Heard::default();
+            let mut runs = Runs::default();
             let mut ours = Sender::new(1, 1, 0);
-            let shown = heard.hear(&ours.word(100_000), at(100_000));
+            let shown = runs.hear(&ours.word(100_000), at(100_000));
             let mut forged = forged.into_iter();
             for ms in (100_100..120_000).step_by(100) {
                 if ms % 4_000 == 0 && let Some((uid, boot, clock_ms, place, sequence)) = forged.next() {
-                    let run = heard.hear(&Word { uid, boot, clock_ms, sequence, place }, at(ms));
+                    let run = runs.hear(&Word { uid, boot, clock_ms, sequence, place }, at(ms));
                     if run != shown {
-                        heard.note(run, is_busy);
+                        runs.note(run, is_busy);
                     }
                 }
                 let word = ours.word(ms);
-                prop_assert_eq!(heard.hear(&word, at(ms)), shown);
+                prop_assert_eq!(runs.hear(&word, at(ms)), shown);
                 // Everything else that ours says is still taken for ours.
-                prop_assert_eq!(heard.speaker(word.place, (None, word.sequence.wrapping_add(1)), at(ms)), Some(shown));
-                prop_assert_eq!(heard.settle(at(ms)), None);
+                prop_assert_eq!(runs.speaker(word.place, (None, word.sequence.wrapping_add(1)), at(ms)), Some(shown));
+                prop_assert_eq!(runs.settle(at(ms)), None);
             }
         }
 
@@ -723,15 +723,15 @@ mod tests {
                 }
                 on_ms += 1_000 * runs_s + 600;
             }
-            let mut heard = Heard::default();
+            let mut runs = Runs::default();
             for (now, word) in &sent {
-                heard.hear(word, *now);
-                heard.settle(*now);
-                prop_assert_eq!(heard.beside(*now), vec![]);
+                runs.hear(word, *now);
+                runs.settle(*now);
+                prop_assert_eq!(runs.beside(*now), vec![]);
             }
             let (now, word) = sent[sent.len() - 1];
-            let last = heard.hear(&word, now);
-            prop_assert_eq!(heard.shown(), Some(last));
+            let last = runs.hear(&word, now);
+            prop_assert_eq!(runs.shown(), Some(last));
         }
     }
 }
