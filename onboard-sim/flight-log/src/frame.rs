@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use flight::computer::crew::{Asked, Ending, Request};
 use flight::computer::pilot::{Pilot, Sensed};
 use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
+use flight::estimation::estimator::AidStatus;
 use flight::estimation::motor_estimate::MotorEstimate;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::arming::Uplink;
@@ -209,7 +210,22 @@ pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
 /// What the pilot thought after a frame: its estimate, with the motor's. `None` before it has one.
 pub fn thought_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
     let estimate = pilot.estimate()?;
-    Some(flight_v1::Estimate { motor: motor_to_log(pilot.motor()), ..estimate.to_log() })
+    let aids = pilot.estimator().aids();
+    Some(flight_v1::Estimate {
+        motor: motor_to_log(pilot.motor()),
+        barometer: aid_to_log(&aids.barometer),
+        gnss_velocity: aid_to_log(&aids.gnss_velocity),
+        gnss_position: aid_to_log(&aids.gnss_position),
+        lidar: aid_to_log(&aids.lidar),
+        wind: aid_to_log(&aids.wind),
+        ..estimate.to_log()
+    })
+}
+
+/// The status of an aid that measured in this frame.
+fn aid_to_log(status: &AidStatus) -> Option<flight_v1::AidStatus> {
+    let &AidStatus { innovation, test_ratio, used, refused, refused_in_a_row, fresh } = status;
+    fresh.then_some(flight_v1::AidStatus { innovation, test_ratio, used, refused, refused_in_a_row })
 }
 
 /// The motor's estimate as a record; none before ignition.

@@ -70,13 +70,13 @@ pub trait Logged: Sized {
 
 /// A structure whose record has the same fields. After `;` come fields of the record alone, which begin empty.
 macro_rules! record {
-    ($logged:ident as $record:path { $($field:ident),+ $(; $beside:ident)? }) => {
+    ($logged:ident as $record:path { $($field:ident),+ $(; $($beside:ident),+)? }) => {
         impl Logged for $logged {
             type Record = $record;
 
             fn to_log(&self) -> Self::Record {
                 let Self { $($field),+ } = self;
-                $record { $($field: $field.to_log(),)+ $($beside: None)? }
+                $record { $($field: $field.to_log(),)+ $($($beside: None),+)? }
             }
 
             fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
@@ -95,7 +95,8 @@ record!(Sigmas as flight_v1::Sigmas {
 });
 record!(HeightSources as flight_v1::HeightSources { inertial_m, inertial_sigma_m, barometric_m });
 record!(Estimate as flight_v1::Estimate {
-    time_s, state, specific_force_m_s2, wind_m_s, gyro_bias_rad_s, accelerometer_bias_m_s2, sigmas, heights, health; motor
+    time_s, state, specific_force_m_s2, wind_m_s, gyro_bias_rad_s, accelerometer_bias_m_s2, sigmas, heights, health;
+    motor, barometer, gnss_velocity, gnss_position, lidar, wind
 });
 record!(LogState as computer_v1::LogState { running, space_bytes });
 record!(Station as computer_v1::Station { system, component, number });

@@ -231,13 +231,14 @@ fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
     }
 }
 
-/// The outputs that are valid, by the estimator's own doubts; its test ratios are not kept and are sent as unknown.
+/// The outputs that are valid, by the estimator's own doubts, and by how much of its gate each sensor's last measurement was off.
 pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     // Where the truth is the estimate there is no estimator to speak of.
     state.sensors.last?;
     let estimate = state.airborne()?.estimate;
     let sigmas_m = &estimate.sigmas.position_m;
+    let aids = state.computer.pilot().estimator().aids();
     let (velocity, horizontal, vertical) = (
         F::ESTIMATOR_VELOCITY_HORIZ | F::ESTIMATOR_VELOCITY_VERT,
         F::ESTIMATOR_POS_HORIZ_REL | F::ESTIMATOR_POS_HORIZ_ABS,
@@ -259,11 +260,11 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     Some(MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
         time_usec: (1e6 * state.time_s) as u64,
         flags,
-        vel_ratio: f32::NAN,
-        pos_horiz_ratio: f32::NAN,
-        pos_vert_ratio: f32::NAN,
+        vel_ratio: aids.gnss_velocity.test_ratio as f32,
+        pos_horiz_ratio: aids.gnss_position.test_ratio as f32,
+        pos_vert_ratio: aids.barometer.test_ratio as f32,
         mag_ratio: f32::NAN,
-        hagl_ratio: f32::NAN,
+        hagl_ratio: aids.lidar.test_ratio as f32,
         tas_ratio: f32::NAN,
         pos_horiz_accuracy: sigmas_m.xy().max() as f32,
         pos_vert_accuracy: sigmas_m.z as f32,

@@ -1,10 +1,9 @@
-//! Whether the estimate is good enough to light a motor, and if not, why: the innovation gates and the two heights that
-//! show it.
+//! Whether the estimate is good enough to light a motor, and if not, why; with the two heights that show it.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-use super::{EstimatorConfig, Sigmas};
+use super::{Aids, EstimatorConfig, Sigmas};
 
 /// Number of frames without a usable inertial sample that the last sample bridges.
 const BRIDGED_FRAMES: u32 = 4;
@@ -73,7 +72,7 @@ impl fmt::Display for Doubt {
 /// The verdict; the worst reason comes first. Ages are times since the event, s.
 pub(super) fn judge(
     config: &EstimatorConfig,
-    gates: &Gates,
+    aids: &Aids,
     sigmas: &Sigmas,
     restart_age_s: f64,
     surprise_age_s: f64,
@@ -81,7 +80,7 @@ pub(super) fn judge(
     let limits = &config.health;
     let doubts = [
         (restart_age_s < DOUBT_AFTER_RESTART_S, Doubt::Restarted),
-        (gates.imu.rejected_in_a_row > BRIDGED_FRAMES, Doubt::Imu),
+        (aids.imu.refused_in_a_row > BRIDGED_FRAMES, Doubt::Imu),
         (surprise_age_s < DOUBT_AFTER_RESTART_S, Doubt::Surprised),
         (sigmas.velocity_m_s.max() > limits.velocity_m_s, Doubt::Velocity),
         (sigmas.position_m.z > limits.height_m, Doubt::Height),
@@ -92,49 +91,6 @@ pub(super) fn judge(
         .into_iter()
         .find_map(|(applies, doubt)| applies.then_some(Health::Doubtful(doubt)))
         .unwrap_or(Health::Good)
-}
-
-// Innovation gates: a measurement that does not fit is rejected and counted. If a sensor is rejected many times in a
-// row, the filter is wrong.
-
-/// The counts of one gate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct GateCounters {
-    /// Measurements used.
-    pub accepted: u32,
-    /// Measurements rejected, because they did not fit or were not numbers.
-    pub rejected: u32,
-    /// Measurements rejected since the last accepted measurement.
-    pub rejected_in_a_row: u32,
-}
-
-/// The counts of all gates, one for each sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Gates {
-    /// Inertial samples; an impossible sample is replaced by the sample before it.
-    pub imu: GateCounters,
-    pub barometer: GateCounters,
-    /// Satellite velocity, three numbers a fix.
-    pub gnss_velocity: GateCounters,
-    /// Satellite position, three numbers a fix.
-    pub gnss_position: GateCounters,
-    pub lidar: GateCounters,
-    /// Sideways force, for the wind.
-    pub wind: GateCounters,
-}
-
-impl GateCounters {
-    /// Counts a verdict and returns it.
-    pub(super) fn count(&mut self, accepted: bool) -> bool {
-        if accepted {
-            self.accepted = self.accepted.saturating_add(1);
-            self.rejected_in_a_row = 0;
-        } else {
-            self.rejected = self.rejected.saturating_add(1);
-            self.rejected_in_a_row = self.rejected_in_a_row.saturating_add(1);
-        }
-        accepted
-    }
 }
 
 /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too

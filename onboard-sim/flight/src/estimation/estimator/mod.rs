@@ -11,31 +11,35 @@
 //! * [`Estimate`] is the output: state, wind, standard deviations, two heights, health.
 //! * [`alignment`] finds the initial attitude on the pad.
 //!
-//! A measurement that does not fit is rejected and counted ([`Gates`]). If the state is not a number, the filter
+//! A measurement that does not fit is rejected and counted ([`Aids`]). If the state is not a number, the filter
 //! restarts from the last good state with a larger uncertainty.
 
 pub mod alignment;
+mod barometer;
 mod config;
+mod correction;
 mod covariance;
+mod gnss;
 mod health;
+mod lidar;
 mod strapdown;
 #[cfg(test)]
 mod tests;
-mod updates;
 mod wind;
 
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
+pub use self::correction::{AidStatus, Aids};
 use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
     Covariance, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
 };
-pub use self::health::{Doubt, GateCounters, Gates, Health, HeightSources};
+use self::gnss::FixAge;
+pub use self::health::{Doubt, Health, HeightSources};
 use self::health::{HeightChannel, Surprise};
 use self::strapdown::{History, Noise, Nominal, Pending};
-use self::updates::FixAge;
 use self::wind::Sideways;
 pub use self::wind::VehicleNow;
 use crate::vehicle::rigid::RigidState;
@@ -133,7 +137,7 @@ pub struct Estimator {
     history: History,
     heights: HeightChannel,
     sideways: Sideways,
-    gates: Gates,
+    aids: Aids,
     surprise: Surprise,
     fix_age: FixAge,
     last_imu: ImuSample,
@@ -162,7 +166,7 @@ impl Estimator {
             history: History::new(time_s),
             heights: HeightChannel::new(state.position_m.z, start.height_m, start.gnss_vertical_offset_m),
             sideways: Sideways::default(),
-            gates: Gates::default(),
+            aids: Aids::default(),
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
@@ -191,6 +195,7 @@ impl Estimator {
     /// Runs one frame: propagates the state with the inertial sample, then corrects it with the other measurements.
     pub fn step(&mut self, measurements: &Measurements, vehicle: &VehicleNow) -> Estimate {
         self.frames += 1;
+        self.aids.begin_frame();
         self.carry_forward(&measurements.imu, vehicle.motor_burning);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.take_barometer(altitude_m);
@@ -234,7 +239,7 @@ impl Estimator {
             accelerometer_bias_m_s2: self.nominal.accelerometer_bias_m_s2,
             health: health::judge(
                 &self.config,
-                &self.gates,
+                &self.aids,
                 &sigmas,
                 time_s - self.restarted_at_s,
                 time_s - self.surprised_at_s,
@@ -244,9 +249,9 @@ impl Estimator {
         }
     }
 
-    /// The counts of the gates.
-    pub fn gates(&self) -> &Gates {
-        &self.gates
+    /// The status of what corrects it.
+    pub fn aids(&self) -> &Aids {
+        &self.aids
     }
 
     /// How often the filter has restarted because its state was not a number.

@@ -162,7 +162,7 @@ impl Estimator {
     /// attitude in the middle of the frame.
     pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool) {
         let interval_s = self.config.frame_s;
-        if self.gates.imu.count(imu.is_plausible()) {
+        if self.aids.imu.count(imu.is_plausible()) {
             self.last_imu = *imu;
         }
         let state = &mut self.nominal;

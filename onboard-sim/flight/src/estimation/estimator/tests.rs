@@ -50,9 +50,9 @@ fn the_estimate_of_a_hover_does_not_drift() {
     assert!((estimate.state.position_m - Vector3::new(0.0, 0.0, 5.0)).norm() < 1e-6, "{estimate:?}");
     assert!(estimate.state.velocity_m_s.norm() < 1e-6);
     assert!(estimate.health.is_good());
-    let gates = estimator.gates();
-    assert_eq!((gates.imu.accepted, gates.barometer.accepted, gates.lidar.accepted), (2000, 500, 1000));
-    assert_eq!((gates.gnss_velocity.accepted, gates.gnss_position.rejected), (150, 0));
+    let aids = estimator.aids();
+    assert_eq!((aids.imu.used, aids.barometer.used, aids.lidar.used), (2000, 500, 1000));
+    assert_eq!((aids.gnss_velocity.used, aids.gnss_position.refused), (150, 0));
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn an_outlier_is_rejected_and_counted() {
     let after = estimator.step(&wild, &VEHICLE);
     assert!((after.state.position_m.z - before).abs() < 1e-3, "{after:?}");
     assert!(after.state.velocity_m_s.norm() < 1e-3, "{after:?}");
-    let gates = estimator.gates();
-    assert_eq!((gates.barometer.rejected, gates.lidar.rejected, gates.gnss_velocity.rejected), (1, 1, 3));
+    let aids = estimator.aids();
+    assert_eq!((aids.barometer.refused, aids.lidar.refused, aids.gnss_velocity.refused), (1, 1, 3));
 }
 
 #[test]
@@ -130,8 +130,8 @@ fn fixes_from_the_future_or_long_ago_are_rejected() {
             valid_at_s,
         });
         estimator.step(&measurements, &VEHICLE);
-        assert_eq!(estimator.gates().gnss_velocity.rejected, 3 * frame);
-        assert_eq!(estimator.gates().gnss_velocity.accepted, 0);
+        assert_eq!(estimator.aids().gnss_velocity.refused, 3 * frame);
+        assert_eq!(estimator.aids().gnss_velocity.used, 0);
     }
 }
 

@@ -98,7 +98,7 @@ impl Estimator {
             let correction = self.correct(&sensitivity, mean[axis] - felt[axis], noise, |index| {
                 (WIND..WIND + 2).contains(&index)
             });
-            self.gates.wind.count(correction.accepted);
+            self.aids.wind.take(&correction);
         }
     }
 

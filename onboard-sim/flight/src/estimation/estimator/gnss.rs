@@ -1,19 +1,14 @@
-//! Corrections by barometer, satellites and lidar, one scalar after the other.
+//! The satellite receiver: fixes of position and velocity that arrive late.
 
+use serde::Serialize;
+
+use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS, without_last_if};
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
-    GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, POSITION, SLOPE, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY,
 };
 use super::strapdown::Since;
 use super::{Estimator, EstimatorConfig, GnssFix};
-use serde::Serialize;
 
-/// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
-/// 20 in 0.2 s.
-const ASKEW_SAMPLES: f64 = 20.0;
-/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
-/// ground too far away.
-const LIDAR_COS_TILT: f64 = 0.65;
 /// Standard deviations that the filter adds when satellite velocities do not fit on average: of the velocity. All four make
 /// room for what a fault of the inertial unit has done.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
@@ -23,14 +18,6 @@ const DOUBT_ATTITUDE_RAD: f64 = 0.04;
 const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
 /// Of the accelerometer's bias.
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
-/// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
-const BAROMETER_REJECTIONS: u32 = 25;
-/// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row the filter assumes that the
-/// estimated position is wrong.
-const POSITION_REJECTIONS: u32 = 10;
-/// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong, m.
-const DOUBT_POSITION_M: f64 = 3.0;
-
 /// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10 ms are 0.15 m.
 const SHOWS_AGE_M_S: f64 = 15.0;
 /// The filter's belief before the flight counts as much as this many fixes.
@@ -70,103 +57,13 @@ impl FixAge {
     }
 }
 
-/// The result of a scalar correction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Correction {
-    /// Innovation squared divided by its variance; its expected value is 1.
-    pub(super) normalised_squared: f64,
-    /// Variance of the innovation.
-    pub(super) variance: f64,
-    pub(super) accepted: bool,
-}
-
-/// A sensitivity whose last entry is that of an error which the configuration may rule out.
-fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> &[(usize, f64)] {
-    &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
-}
-
 impl Estimator {
-    /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count in the variance but
-    /// are not changed.
-    pub(super) fn correct(
-        &mut self,
-        sensitivity: &[(usize, f64)],
-        innovation: f64,
-        noise_variance: f64,
-        moved: impl Fn(usize) -> bool,
-    ) -> Correction {
-        self.catch_up();
-        let (seen, with) = self.covariance.project(sensitivity);
-        let variance = seen + noise_variance;
-        let normalised_squared = innovation * innovation / variance;
-        let gate = self.config.gate_sigmas * self.config.gate_sigmas;
-        // The comparison is false for NaN, so NaN is rejected.
-        let accepted = normalised_squared <= gate && variance > 0.0 && variance.is_finite();
-        if accepted {
-            let mut gain = with;
-            for (index, value) in gain.iter_mut().enumerate() {
-                *value = if moved(index) { *value / variance } else { 0.0 };
-            }
-            self.nominal.inject(&gain.map(|share| share * innovation));
-            self.covariance.update(&gain, &with, variance);
-        }
-        Correction { normalised_squared, variance, accepted }
-    }
-
-    /// The barometer measures height plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
-    /// the flow across the axis.
-    pub(super) fn take_barometer(&mut self, altitude_m: f64) {
-        let gravity = self.config.gravity_m_s2;
-        let through_air = self.velocity_through_air_m_s();
-        let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
-        let state = &self.nominal;
-        let nose = state.world_from_body * nalgebra::Vector3::x();
-        let across = through_air - nose * nose.dot(&through_air);
-        let across_height_m = across.norm_squared() / (2.0 * gravity);
-        let by_velocity =
-            through_air * (-state.barometer_ram / gravity) + across * (state.barometer_suction / gravity);
-        let predicted_m = state.position_m.z + state.barometer_offset_m
-            - state.barometer_ram * speed_height_m
-            - state.barometer_late_s * state.velocity_m_s.z
-            + state.barometer_suction * across_height_m;
-        let mut sensitivity = [(BAROMETER_SUCTION, across_height_m); 10];
-        let known = [
-            (POSITION + 2, 1.0),
-            (VELOCITY, by_velocity.x),
-            (VELOCITY + 1, by_velocity.y),
-            (VELOCITY + 2, by_velocity.z),
-            (WIND, -by_velocity.x),
-            (WIND + 1, -by_velocity.y),
-            (BAROMETER_OFFSET, 1.0),
-            (BAROMETER_RAM, -speed_height_m),
-            (BAROMETER_LATE, -state.velocity_m_s.z),
-        ];
-        let known = without_last_if(self.config.barometer_late_s <= 0.0, &known);
-        sensitivity[..known.len()].copy_from_slice(known);
-        let sensitivity = &sensitivity[..known.len() + usize::from(self.config.barometer_suction > 0.0)];
-        let noise = self.config.barometer_m * self.config.barometer_m;
-        let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
-        self.gates.barometer.count(correction.accepted);
-        if altitude_m.is_finite() {
-            let state = &self.nominal;
-            let late_m = state.barometer_late_s * state.velocity_m_s.z;
-            self.heights.take_barometer(
-                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
-                    - state.barometer_suction * across_height_m,
-            );
-        }
-        if self.gates.barometer.rejected_in_a_row >= BAROMETER_REJECTIONS {
-            self.gates.barometer.rejected_in_a_row = 0;
-            self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
-        }
-    }
-
     /// A fix measures the past position and velocity, and the slow offset of the position.
     pub(super) fn take_gnss(&mut self, fix: &GnssFix) {
         self.catch_up();
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
-                self.gates.gnss_velocity.count(false);
+                self.aids.gnss_velocity.refuse();
                 continue;
             };
             // The past velocity is the present one minus the gain since. The gain depends on the attitude and the
@@ -190,7 +87,7 @@ impl Estimator {
             let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s
                 + late * late * self.fix_age.variance_s2;
             let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
-            self.gates.gnss_velocity.count(correction.accepted);
+            self.aids.gnss_velocity.take_next(axis, &correction);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
             {
                 self.doubt_motion();
@@ -198,7 +95,7 @@ impl Estimator {
         }
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
-                self.gates.gnss_position.count(false);
+                self.aids.gnss_position.refuse();
                 continue;
             };
             let then_m_s = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
@@ -215,14 +112,14 @@ impl Estimator {
             let aged_m2 = then_m_s * then_m_s * self.fix_age.variance_s2;
             let innovation_m = fix.position_m[axis] - predicted;
             let correction = self.correct(sensitivity, innovation_m, sigma * sigma + aged_m2, |_| true);
-            self.gates.gnss_position.count(correction.accepted);
+            self.aids.gnss_position.take_next(axis, &correction);
             self.fix_age.take(innovation_m, correction.variance - aged_m2, then_m_s);
             if axis == 2 && fix.position_m.z.is_finite() {
                 self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z, aged_m2);
             }
         }
-        if self.gates.gnss_position.rejected_in_a_row >= POSITION_REJECTIONS {
-            self.gates.gnss_position.rejected_in_a_row = 0;
+        if self.aids.gnss_position.refused_in_a_row >= POSITION_REJECTIONS {
+            self.aids.gnss_position.refused_in_a_row = 0;
             for axis in 0..3 {
                 self.covariance.widen(POSITION + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
                 self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
@@ -233,53 +130,6 @@ impl Estimator {
     /// The motion since a fix was valid, by its time tag less the tag's estimated error.
     fn since_fix(&self, fix: &GnssFix) -> Option<Since> {
         self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &self.nominal.velocity_m_s)
-    }
-
-    /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
-    /// height divided by the cosine of the tilt.
-    pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
-        let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
-        if nose.z < LIDAR_COS_TILT {
-            self.gates.lidar.count(false);
-            return;
-        }
-        let state = &self.nominal;
-        let climb_m_s = state.velocity_m_s.z;
-        // Where the beam meets the ground, from the pad.
-        let reach = state.position_m.z / nose.z;
-        let hit_m = state.position_m.xy() - nose.xy() * reach;
-        let height_m = state.position_m.z - state.lidar_late_s * climb_m_s - state.slope.dot(&hit_m);
-        let slant_m = height_m / nose.z;
-        let mut sensitivity = [(POSITION + 2, 1.0 / nose.z); 6];
-        sensitivity[1] = (ATTITUDE, -slant_m / nose.z * nose.y);
-        sensitivity[2] = (ATTITUDE + 1, slant_m / nose.z * nose.x);
-        let mut known = 3;
-        if self.config.lidar_late_s > 0.0 {
-            sensitivity[known] = (LIDAR_LATE, -climb_m_s / nose.z);
-            known += 1;
-        }
-        if self.config.ground_slope_deg > 0.0 {
-            sensitivity[known] = (SLOPE, -hit_m.x / nose.z);
-            sensitivity[known + 1] = (SLOPE + 1, -hit_m.y / nose.z);
-            known += 2;
-        }
-        let measured_m = range_m + behind_cg_m;
-        // The beam leans as the airframe does, not as the inertial unit does: the same error in many samples.
-        let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
-        let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
-        // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
-        let correction = self.correct(&sensitivity[..known], measured_m - slant_m, noise, |index| {
-            !(ATTITUDE..ATTITUDE + 3).contains(&index)
-        });
-        self.gates.lidar.count(correction.accepted);
-        if measured_m.is_finite() {
-            let late_m = self.nominal.lidar_late_s * climb_m_s;
-            self.heights.take_lidar(&self.config, measured_m * nose.z + late_m, nose.z);
-        }
-        if self.gates.lidar.rejected_in_a_row >= POSITION_REJECTIONS {
-            self.gates.lidar.rejected_in_a_row = 0;
-            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
-        }
     }
 
     /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on average, so an error

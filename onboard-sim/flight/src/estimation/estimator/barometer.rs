@@ -1,0 +1,60 @@
+//! The barometer: height by the static pressure, with its own offset and the errors of the flow around it.
+
+use super::Estimator;
+use super::correction::{DOUBT_POSITION_M, without_last_if};
+use super::covariance::{
+    BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION, POSITION, VELOCITY, WIND,
+};
+
+/// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
+const BAROMETER_REJECTIONS: u32 = 25;
+
+impl Estimator {
+    /// The barometer measures height plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
+    /// the flow across the axis.
+    pub(super) fn take_barometer(&mut self, altitude_m: f64) {
+        let gravity = self.config.gravity_m_s2;
+        let through_air = self.velocity_through_air_m_s();
+        let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
+        let state = &self.nominal;
+        let nose = state.world_from_body * nalgebra::Vector3::x();
+        let across = through_air - nose * nose.dot(&through_air);
+        let across_height_m = across.norm_squared() / (2.0 * gravity);
+        let by_velocity =
+            through_air * (-state.barometer_ram / gravity) + across * (state.barometer_suction / gravity);
+        let predicted_m = state.position_m.z + state.barometer_offset_m
+            - state.barometer_ram * speed_height_m
+            - state.barometer_late_s * state.velocity_m_s.z
+            + state.barometer_suction * across_height_m;
+        let mut sensitivity = [(BAROMETER_SUCTION, across_height_m); 10];
+        let known = [
+            (POSITION + 2, 1.0),
+            (VELOCITY, by_velocity.x),
+            (VELOCITY + 1, by_velocity.y),
+            (VELOCITY + 2, by_velocity.z),
+            (WIND, -by_velocity.x),
+            (WIND + 1, -by_velocity.y),
+            (BAROMETER_OFFSET, 1.0),
+            (BAROMETER_RAM, -speed_height_m),
+            (BAROMETER_LATE, -state.velocity_m_s.z),
+        ];
+        let known = without_last_if(self.config.barometer_late_s <= 0.0, &known);
+        sensitivity[..known.len()].copy_from_slice(known);
+        let sensitivity = &sensitivity[..known.len() + usize::from(self.config.barometer_suction > 0.0)];
+        let noise = self.config.barometer_m * self.config.barometer_m;
+        let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
+        self.aids.barometer.take(&correction);
+        if altitude_m.is_finite() {
+            let state = &self.nominal;
+            let late_m = state.barometer_late_s * state.velocity_m_s.z;
+            self.heights.take_barometer(
+                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
+                    - state.barometer_suction * across_height_m,
+            );
+        }
+        if self.aids.barometer.refused_in_a_row >= BAROMETER_REJECTIONS {
+            self.aids.barometer.refused_in_a_row = 0;
+            self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
+        }
+    }
+}

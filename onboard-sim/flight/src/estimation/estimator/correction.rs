@@ -1,0 +1,142 @@
+//! A correction by one scalar, and the status record of everything that corrects.
+
+use serde::Serialize;
+
+use super::Estimator;
+
+/// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row the filter assumes that the
+/// estimated position is wrong.
+pub(super) const POSITION_REJECTIONS: u32 = 10;
+/// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong, m.
+pub(super) const DOUBT_POSITION_M: f64 = 3.0;
+
+/// The result of a scalar correction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Correction {
+    /// Measured less predicted.
+    pub(super) innovation: f64,
+    /// Innovation squared divided by its variance; its expected value is 1.
+    pub(super) normalised_squared: f64,
+    /// Variance of the innovation.
+    pub(super) variance: f64,
+    /// The largest normalised square that is used.
+    pub(super) gate: f64,
+    pub(super) accepted: bool,
+}
+
+/// The status of one aid, the same for every one. A measurement that does not fit is refused and counted. If an aid is refused
+/// many times in a row, the filter is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct AidStatus {
+    /// The last measurement less its prediction, in the aid's unit; of a fix, that of its worst number. 0 if it was no number.
+    pub innovation: f64,
+    /// Its size over the largest that is used: above 1 it was refused. Infinite if it was no number.
+    pub test_ratio: f64,
+    /// Measurements used.
+    pub used: u32,
+    /// Measurements refused, because they did not fit or were not numbers.
+    pub refused: u32,
+    /// Measurements refused since the last one that was used.
+    pub refused_in_a_row: u32,
+    /// It measured in the last frame.
+    pub fresh: bool,
+}
+
+/// The status of all aids.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Aids {
+    /// Inertial samples; an impossible sample is replaced by the sample before it.
+    pub imu: AidStatus,
+    pub barometer: AidStatus,
+    /// Satellite velocity, three numbers a fix.
+    pub gnss_velocity: AidStatus,
+    /// Satellite position, three numbers a fix.
+    pub gnss_position: AidStatus,
+    pub lidar: AidStatus,
+    /// Sideways force, for the wind.
+    pub wind: AidStatus,
+}
+
+impl Aids {
+    /// Another frame begins.
+    pub(super) fn begin_frame(&mut self) {
+        let Self { imu, barometer, gnss_velocity, gnss_position, lidar, wind } = self;
+        for aid in [imu, barometer, gnss_velocity, gnss_position, lidar, wind] {
+            aid.fresh = false;
+        }
+    }
+}
+
+impl AidStatus {
+    /// Takes a correction.
+    pub(super) fn take(&mut self, correction: &Correction) {
+        self.take_next(0, correction);
+    }
+
+    /// Takes the correction by one number of a fix; number 0 begins a fix.
+    pub(super) fn take_next(&mut self, number: usize, correction: &Correction) {
+        let &Correction { innovation, normalised_squared, gate, accepted, .. } = correction;
+        // No NaN is kept: its bits are not the same on every processor.
+        let (innovation, test_ratio) = if normalised_squared.is_finite() {
+            (innovation, libm::sqrt(normalised_squared / gate))
+        } else {
+            (0.0, f64::INFINITY)
+        };
+        if number == 0 || test_ratio > self.test_ratio {
+            (self.innovation, self.test_ratio) = (innovation, test_ratio);
+        }
+        self.count(accepted);
+    }
+
+    /// Refuses a measurement that cannot be predicted.
+    pub(super) fn refuse(&mut self) {
+        self.count(false);
+    }
+
+    /// Counts a verdict and returns it.
+    pub(super) fn count(&mut self, accepted: bool) -> bool {
+        self.fresh = true;
+        if accepted {
+            self.used = self.used.saturating_add(1);
+            self.refused_in_a_row = 0;
+        } else {
+            self.refused = self.refused.saturating_add(1);
+            self.refused_in_a_row = self.refused_in_a_row.saturating_add(1);
+        }
+        accepted
+    }
+}
+
+/// A sensitivity whose last entry is that of an error which the configuration may rule out.
+pub(super) fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> &[(usize, f64)] {
+    &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
+}
+
+impl Estimator {
+    /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count in the variance but
+    /// are not changed.
+    pub(super) fn correct(
+        &mut self,
+        sensitivity: &[(usize, f64)],
+        innovation: f64,
+        noise_variance: f64,
+        moved: impl Fn(usize) -> bool,
+    ) -> Correction {
+        self.catch_up();
+        let (seen, with) = self.covariance.project(sensitivity);
+        let variance = seen + noise_variance;
+        let normalised_squared = innovation * innovation / variance;
+        let gate = self.config.gate_sigmas * self.config.gate_sigmas;
+        // The comparison is false for NaN, so NaN is rejected.
+        let accepted = normalised_squared <= gate && variance > 0.0 && variance.is_finite();
+        if accepted {
+            let mut gain = with;
+            for (index, value) in gain.iter_mut().enumerate() {
+                *value = if moved(index) { *value / variance } else { 0.0 };
+            }
+            self.nominal.inject(&gain.map(|share| share * innovation));
+            self.covariance.update(&gain, &with, variance);
+        }
+        Correction { innovation, normalised_squared, variance, gate, accepted }
+    }
+}

@@ -1,0 +1,61 @@
+//! The lidar: the slant range to the ground behind the vehicle.
+
+use super::Estimator;
+use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS};
+use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
+
+/// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
+/// 20 in 0.2 s.
+const ASKEW_SAMPLES: f64 = 20.0;
+/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
+/// ground too far away.
+const LIDAR_COS_TILT: f64 = 0.65;
+
+impl Estimator {
+    /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
+    /// height divided by the cosine of the tilt.
+    pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
+        let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
+        if nose.z < LIDAR_COS_TILT {
+            self.aids.lidar.refuse();
+            return;
+        }
+        let state = &self.nominal;
+        let climb_m_s = state.velocity_m_s.z;
+        // Where the beam meets the ground, from the pad.
+        let reach = state.position_m.z / nose.z;
+        let hit_m = state.position_m.xy() - nose.xy() * reach;
+        let height_m = state.position_m.z - state.lidar_late_s * climb_m_s - state.slope.dot(&hit_m);
+        let slant_m = height_m / nose.z;
+        let mut sensitivity = [(POSITION + 2, 1.0 / nose.z); 6];
+        sensitivity[1] = (ATTITUDE, -slant_m / nose.z * nose.y);
+        sensitivity[2] = (ATTITUDE + 1, slant_m / nose.z * nose.x);
+        let mut known = 3;
+        if self.config.lidar_late_s > 0.0 {
+            sensitivity[known] = (LIDAR_LATE, -climb_m_s / nose.z);
+            known += 1;
+        }
+        if self.config.ground_slope_deg > 0.0 {
+            sensitivity[known] = (SLOPE, -hit_m.x / nose.z);
+            sensitivity[known + 1] = (SLOPE + 1, -hit_m.y / nose.z);
+            known += 2;
+        }
+        let measured_m = range_m + behind_cg_m;
+        // The beam leans as the airframe does, not as the inertial unit does: the same error in many samples.
+        let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
+        let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
+        // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
+        let correction = self.correct(&sensitivity[..known], measured_m - slant_m, noise, |index| {
+            !(ATTITUDE..ATTITUDE + 3).contains(&index)
+        });
+        self.aids.lidar.take(&correction);
+        if measured_m.is_finite() {
+            let late_m = self.nominal.lidar_late_s * climb_m_s;
+            self.heights.take_lidar(&self.config, measured_m * nose.z + late_m, nose.z);
+        }
+        if self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
+            self.aids.lidar.refused_in_a_row = 0;
+            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
+        }
+    }
+}
