@@ -4,19 +4,27 @@
 //! one frame of the flight computer. Each sensor has its own stream of random numbers and keeps drawing while it is
 //! out, so a fault in one sensor does not change the noise of another.
 
+mod barometer;
+mod gnss;
+mod imu;
+mod lidar;
 mod noise;
 mod params;
+mod switches;
 
-use flight::computer::{FRAME_MS, FRAME_S};
-use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, ImuSample, Measurements};
+use flight::computer::FRAME_MS;
+use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, Measurements};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
+pub use self::barometer::BarometerParams;
+pub use self::gnss::GnssParams;
+pub use self::imu::ImuParams;
+pub use self::lidar::LidarParams;
 pub use self::noise::believed_start;
-use self::noise::{EJECTION_LASTS_S, Fate, Flaws, Normal, Wander};
-pub use self::params::{
-    BarometerParams, GnssParams, ImuParams, LidarParams, SensorParamError, SensorParams, SwitchParams,
-};
+use self::noise::{Flaws, Normal, Wander};
+pub use self::params::{SensorParamError, SensorParams};
+pub use self::switches::SwitchParams;
 use crate::world::whole::World;
 
 const MS_S: f64 = 1e-3;
@@ -225,170 +233,6 @@ impl Sensors {
             gnss: self.arrived(),
             lidar_range_m: self.lidar(truth).filter(|_| !faults.lidar_out),
         })
-    }
-
-    /// Fin openings as the feedback tells them, rad.
-    pub fn fins_rad(&self, fins_rad: &[f64; 4]) -> [f64; 4] {
-        core::array::from_fn(|fin| fins_rad[fin] + self.flaws.fin_feedback_rad[fin])
-    }
-
-    /// Whether the igniter's continuity is reported.
-    pub fn igniter_continuity(&self) -> bool {
-        !self.flaws.continuity_lost
-    }
-
-    /// Whether contact is reported, from whether there has been one.
-    pub fn contact(&mut self, touched: bool) -> bool {
-        if !touched {
-            return false;
-        }
-        let since_ms = *self.contact_ms.get_or_insert(self.elapsed_ms);
-        self.elapsed_ms - since_ms >= self.params.switches.contact_late_ms
-    }
-
-    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds.
-    fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
-        let (place, rate) = (&self.flaws.unit_m, &truth.state.rate_rad_s);
-        truth.specific_force_m_s2
-            + truth.angular_acceleration_rad_s2.cross(place)
-            + rate.cross(&rate.cross(place))
-    }
-
-    fn imu(&mut self, burning: bool, faults: &SensorFaults) -> ImuSample {
-        let imu = &self.params.imu;
-        let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
-        // White noise of this density, averaged over a frame.
-        let spread = 1.0 / libm::sqrt(FRAME_S);
-        let milli_g = 1e-3 * GRAVITY_M_S2;
-
-        let walk = imu.gyro_bias_walk_deg_s_sqrt_s.to_radians() * libm::sqrt(FRAME_S);
-        self.errors.gyro_bias_rad_s += self.imu_noise.next3() * walk;
-        let gyro_white = self.imu_noise.next3() * (imu.gyro_noise_deg_s_sqrt_hz.to_radians() * spread);
-        let (shaken_rad_s, shaken_m_s2) =
-            if burning { self.flaws.vibration(&self.params) } else { (Vector3::zeros(), Vector3::zeros()) };
-        let gyro = self.flaws.unit_from_body * mean(&mut self.rate_sum_rad_s)
-            + shaken_rad_s
-            + self.errors.gyro_bias_rad_s
-            + faults.gyro_bias_step_rad_s
-            + gyro_white;
-
-        let force_white = self.imu_noise.next3() * (imu.accelerometer_noise_mg_sqrt_hz * milli_g * spread);
-        let rectified_m_s2 = if burning { self.flaws.burning_bias_m_s2 } else { Vector3::zeros() };
-        let felt_m_s2 = self.flaws.unit_from_body * mean(&mut self.force_sum_m_s2);
-        let force = felt_m_s2.component_mul(&self.accelerometer_scale)
-            + self.flaws.cross_axis * felt_m_s2
-            + rectified_m_s2
-            + shaken_m_s2
-            + self.errors.accelerometer_bias_m_s2
-            + faults.accelerometer_bias_step_m_s2
-            + force_white;
-
-        let force = if faults.accelerometer_dead { Vector3::zeros() } else { force };
-
-        let clip = |value: Vector3<f64>, range: f64| value.map(|axis| axis.clamp(-range, range));
-        ImuSample {
-            gyro_rad_s: clip(gyro, imu.gyro_range_deg_s.to_radians()),
-            specific_force_m_s2: clip(force, imu.accelerometer_range_g * GRAVITY_M_S2),
-        }
-    }
-
-    fn barometer(&mut self, truth: &SensorTruth) -> Option<f64> {
-        let barometer = &self.params.barometer;
-        if !self.elapsed_ms.is_multiple_of(barometer.period_ms) {
-            return None;
-        }
-        let walk = barometer.offset_walk_m_sqrt_s * libm::sqrt(f64::from(barometer.period_ms) * MS_S);
-        self.errors.barometer_offset_m += walk * self.barometer_noise.next();
-        // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
-        let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
-        let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * self.flaws.barometer_late_s;
-        let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };
-        let ejection_m = truth
-            .ejected_for_s
-            .map_or(0.0, |for_s| self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S));
-        let across_m_s = truth.airspeed_across_m_s;
-        let suction_m = self.flaws.barometer_crossflow * across_m_s * across_m_s / (2.0 * GRAVITY_M_S2);
-        Some(
-            then_m + self.errors.barometer_offset_m + plume_m + ejection_m + suction_m
-                - self.errors.barometer_ram * speed_height_m
-                + barometer.noise_m * self.barometer_noise.next(),
-        )
-    }
-
-    fn watch_satellites(&mut self, truth: &SensorTruth, out: bool) {
-        let gnss = &self.params.gnss;
-        if self.elapsed_ms % gnss.period_ms != self.gnss_phase_ms {
-            return;
-        }
-        for axis in &mut self.wander {
-            axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.gnss_noise);
-        }
-        let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
-        let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
-        let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
-        let then = moved_back(truth, older_s);
-        let mut fix = GnssFix {
-            position_m: then.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
-            velocity_m_s: then.velocity_m_s + slow_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
-            valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
-        };
-        let (fate, off_m) = self.flaws.of_fix(&self.params);
-        if fate == Fate::Outlier {
-            fix.position_m += off_m;
-        }
-        if !out && fate != Fate::Lost {
-            self.on_its_way = Some((self.elapsed_ms + gnss.delay_ms, fix));
-        }
-    }
-
-    /// The fix that has arrived by this frame.
-    fn arrived(&mut self) -> Option<GnssFix> {
-        let now_ms = self.elapsed_ms;
-        self.on_its_way.take_if(|(at_ms, _)| *at_ms <= now_ms).map(|(_, fix)| fix)
-    }
-
-    fn lidar(&mut self, truth: &SensorTruth) -> Option<f64> {
-        let lidar = &self.params.lidar;
-        if !self.elapsed_ms.is_multiple_of(lidar.period_ms) {
-            return None;
-        }
-        let noise_m = lidar.noise_m * self.lidar_noise.next();
-        let (fate, anywhere) = self.flaws.of_range(&self.params);
-        let along_beam = truth.state.world_from_body * self.flaws.beam;
-        let tilt_rad = RigidState { world_from_body: along_beam, ..truth.state }.tilt_rad();
-        if tilt_rad > lidar.tilt_max_deg.to_radians() {
-            return None;
-        }
-        // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
-        // distance from it.
-        let then_m = truth.state.position_m.z
-            - truth.ground_m
-            - self.flaws.grass_m
-            - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
-        let slant_m = then_m / libm::cos(tilt_rad);
-        let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
-        // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
-        // with the square of the range.
-        let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
-        let blind = truth.burning
-            && truth.state.position_m.z - truth.ground_m - truth.cg_over_feet_m < lidar.blind_below_m;
-        match fate {
-            Fate::Lost => None,
-            _ if blind => None,
-            Fate::Outlier => Some(lidar.range_min_m + anywhere * (lidar.range_max_m - lidar.range_min_m)),
-            Fate::Arrives => (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m),
-        }
-    }
-}
-
-/// The motion some time ago, s, under the present acceleration.
-fn moved_back(truth: &SensorTruth, older_s: f64) -> RigidState {
-    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
-    acceleration_m_s2.z -= GRAVITY_M_S2;
-    RigidState {
-        position_m: truth.state.position_m - truth.state.velocity_m_s * older_s,
-        velocity_m_s: truth.state.velocity_m_s - acceleration_m_s2 * older_s,
-        ..truth.state
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 
-use super::{MS_S, SensorParams};
+use super::SensorParams;
 
 /// Standard normal numbers by Box and Muller, on `libm` so that they are the same on every machine.
 #[derive(Debug, Clone)]
@@ -111,11 +111,11 @@ pub(super) struct Flaws {
     /// From the vehicle's axes to those of the lidar's beam.
     pub(super) beam: UnitQuaternion<f64>,
     pub(super) grass_m: f64,
-    velocity_wander: [Wander; 3],
-    vibration: Normal,
-    gnss: Normal,
-    lidar: Normal,
-    satellites: Normal,
+    pub(super) velocity_wander: [Wander; 3],
+    pub(super) vibration: Normal,
+    pub(super) gnss: Normal,
+    pub(super) lidar: Normal,
+    pub(super) satellites: Normal,
 }
 
 impl Flaws {
@@ -156,39 +156,9 @@ impl Flaws {
             satellites,
         }
     }
-
-    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its wandering velocity error,
-    /// m/s.
-    pub(super) fn of_satellites(&mut self, params: &SensorParams) -> (f64, Vector3<f64>) {
-        let gnss = &params.gnss;
-        for axis in &mut self.velocity_wander {
-            axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.satellites);
-        }
-        let older_s = gnss.age_jitter_s * self.satellites.next();
-        (older_s, Vector3::from_fn(|axis, _| self.velocity_wander[axis].value))
-    }
-
-    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2.
-    pub(super) fn vibration(&mut self, params: &SensorParams) -> (Vector3<f64>, Vector3<f64>) {
-        let imu = &params.imu;
-        let rate = self.vibration.next3() * imu.vibration_deg_s.to_radians();
-        (rate, self.vibration.next3() * (imu.vibration_g * GRAVITY_M_S2))
-    }
-
-    /// What becomes of a fix, and how far an outlier is off, m.
-    pub(super) fn of_fix(&mut self, params: &SensorParams) -> (Fate, Vector3<f64>) {
-        let fate = fate(self.gnss.unit(), params.gnss.dropout_share, params.gnss.outlier_share);
-        (fate, self.gnss.next3() * params.gnss.outlier_m)
-    }
-
-    /// What becomes of a range, and where an outlier lies between the sensor's limits, 0 to 1.
-    pub(super) fn of_range(&mut self, params: &SensorParams) -> (Fate, f64) {
-        let fate = fate(self.lidar.unit(), params.lidar.dropout_share, params.lidar.outlier_share);
-        (fate, self.lidar.unit())
-    }
 }
 
-fn fate(chance: f64, lost: f64, outlier: f64) -> Fate {
+pub(super) fn fate(chance: f64, lost: f64, outlier: f64) -> Fate {
     if chance < lost {
         Fate::Lost
     } else if chance < lost + outlier {

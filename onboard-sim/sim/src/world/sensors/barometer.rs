@@ -1,0 +1,90 @@
+//! The barometer.
+
+use flight::estimation::estimator::GRAVITY_M_S2;
+use serde::Deserialize;
+
+use super::noise::EJECTION_LASTS_S;
+use super::params::{multiple_of_a_frame, not_below_zero};
+use super::{MS_S, SensorParamError, SensorTruth, Sensors};
+
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BarometerParams {
+    /// Time between samples, ms; a multiple of the frame's 5 ms.
+    pub period_ms: u32,
+    /// Noise of one sample, m.
+    pub noise_m: f64,
+    /// Offset at the start, m, from weather and warming since the pad.
+    pub offset_m: f64,
+    /// Wander of the offset, m in one second.
+    pub offset_walk_m_sqrt_s: f64,
+    /// Ram coefficient: the pressure error divided by the dynamic pressure.
+    pub ram_coefficient: f64,
+    /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and highest.
+    pub crossflow: [f64; 2],
+    /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
+    pub late_s: f64,
+    /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
+    pub plume_m: f64,
+    /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out through the vents.
+    pub ejection_m: f64,
+}
+
+impl Default for BarometerParams {
+    fn default() -> Self {
+        Self {
+            period_ms: 20,
+            noise_m: 0.08,
+            offset_m: 0.3,
+            offset_walk_m_sqrt_s: 0.03,
+            ram_coefficient: 0.05,
+            crossflow: [0.0; 2],
+            late_s: 0.0,
+            plume_m: 0.0,
+            ejection_m: 0.0,
+        }
+    }
+}
+
+impl BarometerParams {
+    /// The first parameter that is out of range.
+    pub(super) fn wrong(&self) -> Option<SensorParamError> {
+        not_below_zero(&[
+            ("barometer.crossflow, lowest", self.crossflow[0]),
+            ("barometer.crossflow, highest", self.crossflow[1]),
+            ("barometer.late_s", self.late_s),
+            ("barometer.plume_m", self.plume_m),
+            ("barometer.ejection_m", self.ejection_m),
+            ("barometer.noise_m", self.noise_m),
+            ("barometer.offset_m", self.offset_m),
+            ("barometer.offset_walk_m_sqrt_s", self.offset_walk_m_sqrt_s),
+            ("barometer.ram_coefficient", self.ram_coefficient),
+        ])
+        .or_else(|| multiple_of_a_frame("barometer.period_ms", self.period_ms))
+    }
+}
+
+impl Sensors {
+    pub(super) fn barometer(&mut self, truth: &SensorTruth) -> Option<f64> {
+        let barometer = &self.params.barometer;
+        if !self.elapsed_ms.is_multiple_of(barometer.period_ms) {
+            return None;
+        }
+        let walk = barometer.offset_walk_m_sqrt_s * libm::sqrt(f64::from(barometer.period_ms) * MS_S);
+        self.errors.barometer_offset_m += walk * self.barometer_noise.next();
+        // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
+        let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
+        let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * self.flaws.barometer_late_s;
+        let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };
+        let ejection_m = truth
+            .ejected_for_s
+            .map_or(0.0, |for_s| self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S));
+        let across_m_s = truth.airspeed_across_m_s;
+        let suction_m = self.flaws.barometer_crossflow * across_m_s * across_m_s / (2.0 * GRAVITY_M_S2);
+        Some(
+            then_m + self.errors.barometer_offset_m + plume_m + ejection_m + suction_m
+                - self.errors.barometer_ram * speed_height_m
+                + barometer.noise_m * self.barometer_noise.next(),
+        )
+    }
+}

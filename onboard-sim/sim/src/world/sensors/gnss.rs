@@ -1,0 +1,167 @@
+//! The satellite receiver, whose fixes come late.
+
+use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix};
+use flight::vehicle::rigid::RigidState;
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::noise::{Fate, Flaws, fate};
+use super::params::{above_zero, not_below_zero, shares};
+use super::{MS_S, SensorParamError, SensorParams, SensorTruth, Sensors};
+
+/// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GnssParams {
+    /// Time between fixes, ms.
+    pub period_ms: u32,
+    /// Age of a fix when it arrives, ms; below the period.
+    pub delay_ms: u32,
+    /// Velocity noise, each axis, m/s.
+    pub velocity_m_s: f64,
+    /// White position noise, horizontal, each axis, m.
+    pub horizontal_white_m: f64,
+    /// White position noise, vertical, m.
+    pub vertical_white_m: f64,
+    /// Wandering position error, horizontal, each axis, m.
+    pub horizontal_wander_m: f64,
+    /// Wandering position error, vertical, m.
+    pub vertical_wander_m: f64,
+    /// Correlation time of the wandering error, s.
+    pub wander_correlation_s: f64,
+    /// Time from the zeroing on the pad to the start of the simulation, s.
+    pub zeroed_before_s: f64,
+    /// Error of the fixes' time tags, the same for all of a flight, s.
+    pub time_tag_s: f64,
+    /// Error of each fix's time tag beside that, s.
+    pub age_jitter_s: f64,
+    /// Wandering velocity error, each axis, m/s, and its correlation time, s.
+    pub velocity_wander_m_s: f64,
+    pub velocity_wander_correlation_s: f64,
+    /// Probability that a fix is lost.
+    pub dropout_share: f64,
+    /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
+    pub outlier_share: f64,
+    pub outlier_m: f64,
+}
+
+impl Default for GnssParams {
+    fn default() -> Self {
+        Self {
+            period_ms: 200,
+            delay_ms: 120,
+            velocity_m_s: 0.05,
+            horizontal_white_m: 0.2,
+            vertical_white_m: 0.3,
+            horizontal_wander_m: 1.5,
+            vertical_wander_m: 2.5,
+            wander_correlation_s: 200.0,
+            zeroed_before_s: 20.0,
+            time_tag_s: 0.0,
+            age_jitter_s: 0.0,
+            velocity_wander_m_s: 0.0,
+            velocity_wander_correlation_s: 60.0,
+            dropout_share: 0.0,
+            outlier_share: 0.0,
+            outlier_m: 0.0,
+        }
+    }
+}
+
+impl GnssParams {
+    /// The first parameter that is out of range.
+    pub(super) fn wrong(&self) -> Option<SensorParamError> {
+        not_below_zero(&[
+            ("gnss.time_tag_s", self.time_tag_s),
+            ("gnss.age_jitter_s", self.age_jitter_s),
+            ("gnss.velocity_wander_m_s", self.velocity_wander_m_s),
+            ("gnss.outlier_m", self.outlier_m),
+            ("gnss.velocity_m_s", self.velocity_m_s),
+            ("gnss.horizontal_white_m", self.horizontal_white_m),
+            ("gnss.vertical_white_m", self.vertical_white_m),
+            ("gnss.horizontal_wander_m", self.horizontal_wander_m),
+            ("gnss.vertical_wander_m", self.vertical_wander_m),
+            ("gnss.zeroed_before_s", self.zeroed_before_s),
+        ])
+        .or_else(|| {
+            above_zero(&[
+                ("gnss.wander_correlation_s", self.wander_correlation_s),
+                ("gnss.velocity_wander_correlation_s", self.velocity_wander_correlation_s),
+            ])
+        })
+        .or_else(|| {
+            shares(&[("gnss.dropout_share", self.dropout_share), ("gnss.outlier_share", self.outlier_share)])
+        })
+        .or_else(|| {
+            (self.delay_ms >= self.period_ms).then(|| SensorParamError {
+                field: "gnss.delay_ms",
+                found: f64::from(self.delay_ms),
+                accepted: "below gnss.period_ms",
+            })
+        })
+    }
+}
+
+impl Sensors {
+    pub(super) fn watch_satellites(&mut self, truth: &SensorTruth, out: bool) {
+        let gnss = &self.params.gnss;
+        if self.elapsed_ms % gnss.period_ms != self.gnss_phase_ms {
+            return;
+        }
+        for axis in &mut self.wander {
+            axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.gnss_noise);
+        }
+        let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
+        let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
+        let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
+        let then = moved_back(truth, older_s);
+        let mut fix = GnssFix {
+            position_m: then.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
+            velocity_m_s: then.velocity_m_s + slow_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
+            valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
+        };
+        let (fate, off_m) = self.flaws.of_fix(&self.params);
+        if fate == Fate::Outlier {
+            fix.position_m += off_m;
+        }
+        if !out && fate != Fate::Lost {
+            self.on_its_way = Some((self.elapsed_ms + gnss.delay_ms, fix));
+        }
+    }
+
+    /// The fix that has arrived by this frame.
+    pub(super) fn arrived(&mut self) -> Option<GnssFix> {
+        let now_ms = self.elapsed_ms;
+        self.on_its_way.take_if(|(at_ms, _)| *at_ms <= now_ms).map(|(_, fix)| fix)
+    }
+}
+
+impl Flaws {
+    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its wandering velocity error,
+    /// m/s.
+    fn of_satellites(&mut self, params: &SensorParams) -> (f64, Vector3<f64>) {
+        let gnss = &params.gnss;
+        for axis in &mut self.velocity_wander {
+            axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.satellites);
+        }
+        let older_s = gnss.age_jitter_s * self.satellites.next();
+        (older_s, Vector3::from_fn(|axis, _| self.velocity_wander[axis].value))
+    }
+
+    /// What becomes of a fix, and how far an outlier is off, m.
+    fn of_fix(&mut self, params: &SensorParams) -> (Fate, Vector3<f64>) {
+        let fate = fate(self.gnss.unit(), params.gnss.dropout_share, params.gnss.outlier_share);
+        (fate, self.gnss.next3() * params.gnss.outlier_m)
+    }
+}
+
+/// The motion some time ago, s, under the present acceleration.
+fn moved_back(truth: &SensorTruth, older_s: f64) -> RigidState {
+    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
+    acceleration_m_s2.z -= GRAVITY_M_S2;
+    RigidState {
+        position_m: truth.state.position_m - truth.state.velocity_m_s * older_s,
+        velocity_m_s: truth.state.velocity_m_s - acceleration_m_s2 * older_s,
+        ..truth.state
+    }
+}

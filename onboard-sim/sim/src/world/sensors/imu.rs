@@ -1,0 +1,148 @@
+//! The inertial unit.
+
+use flight::computer::{FRAME_MS, FRAME_S};
+use flight::estimation::estimator::{GRAVITY_M_S2, ImuSample};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::noise::Flaws;
+use super::params::{above_zero, not_below_zero};
+use super::{SensorFaults, SensorParamError, SensorParams, SensorTruth, Sensors};
+
+/// Inertial measurement unit.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImuParams {
+    /// Gyro noise density, deg/s/sqrt(Hz).
+    pub gyro_noise_deg_s_sqrt_hz: f64,
+    /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times larger.)
+    pub gyro_bias_deg_s: f64,
+    /// Wander of the gyro bias, deg/s in one second.
+    pub gyro_bias_walk_deg_s_sqrt_s: f64,
+    /// Largest rate measured, deg/s.
+    pub gyro_range_deg_s: f64,
+    /// Accelerometer noise density, mg/sqrt(Hz).
+    pub accelerometer_noise_mg_sqrt_hz: f64,
+    /// Accelerometer bias, each axis, mg.
+    pub accelerometer_bias_mg: f64,
+    /// Scale error of each accelerometer axis, as a fraction.
+    pub accelerometer_scale_share: f64,
+    /// What each accelerometer axis feels of each other axis, as a fraction.
+    pub accelerometer_cross_axis_share: f64,
+    /// Largest specific force measured, g.
+    pub accelerometer_range_g: f64,
+    /// Vibration while the motor burns, rms of one frame's sample, each axis, g.
+    pub vibration_g: f64,
+    /// Vibration while the motor burns, rms of one frame's sample, each axis, deg/s.
+    pub vibration_deg_s: f64,
+    /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
+    pub vibration_bias_mg: f64,
+    /// Misalignment of the unit in the vehicle, about each axis, degrees.
+    pub mounting_deg: f64,
+    /// Distance of the unit from the centre of gravity, each axis, m.
+    pub off_cg_m: f64,
+}
+
+impl Default for ImuParams {
+    fn default() -> Self {
+        Self {
+            gyro_noise_deg_s_sqrt_hz: 0.05,
+            gyro_bias_deg_s: 0.02,
+            gyro_bias_walk_deg_s_sqrt_s: 0.002,
+            gyro_range_deg_s: 2000.0,
+            accelerometer_noise_mg_sqrt_hz: 0.65,
+            accelerometer_bias_mg: 3.0,
+            accelerometer_scale_share: 0.001,
+            accelerometer_cross_axis_share: 0.0,
+            accelerometer_range_g: 16.0,
+            vibration_g: 0.0,
+            vibration_deg_s: 0.0,
+            vibration_bias_mg: 0.0,
+            mounting_deg: 0.0,
+            off_cg_m: 0.0,
+        }
+    }
+}
+
+impl ImuParams {
+    /// The first parameter that is out of range.
+    pub(super) fn wrong(&self) -> Option<SensorParamError> {
+        not_below_zero(&[
+            ("imu.gyro_noise_deg_s_sqrt_hz", self.gyro_noise_deg_s_sqrt_hz),
+            ("imu.gyro_bias_deg_s", self.gyro_bias_deg_s),
+            ("imu.gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
+            ("imu.accelerometer_noise_mg_sqrt_hz", self.accelerometer_noise_mg_sqrt_hz),
+            ("imu.accelerometer_bias_mg", self.accelerometer_bias_mg),
+            ("imu.accelerometer_scale_share", self.accelerometer_scale_share),
+            ("imu.accelerometer_cross_axis_share", self.accelerometer_cross_axis_share),
+            ("imu.vibration_g", self.vibration_g),
+            ("imu.vibration_deg_s", self.vibration_deg_s),
+            ("imu.vibration_bias_mg", self.vibration_bias_mg),
+            ("imu.mounting_deg", self.mounting_deg),
+            ("imu.off_cg_m", self.off_cg_m),
+        ])
+        .or_else(|| {
+            above_zero(&[
+                ("imu.gyro_range_deg_s", self.gyro_range_deg_s),
+                ("imu.accelerometer_range_g", self.accelerometer_range_g),
+            ])
+        })
+    }
+}
+
+impl Sensors {
+    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds.
+    pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
+        let (place, rate) = (&self.flaws.unit_m, &truth.state.rate_rad_s);
+        truth.specific_force_m_s2
+            + truth.angular_acceleration_rad_s2.cross(place)
+            + rate.cross(&rate.cross(place))
+    }
+
+    pub(super) fn imu(&mut self, burning: bool, faults: &SensorFaults) -> ImuSample {
+        let imu = &self.params.imu;
+        let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
+        // White noise of this density, averaged over a frame.
+        let spread = 1.0 / libm::sqrt(FRAME_S);
+        let milli_g = 1e-3 * GRAVITY_M_S2;
+
+        let walk = imu.gyro_bias_walk_deg_s_sqrt_s.to_radians() * libm::sqrt(FRAME_S);
+        self.errors.gyro_bias_rad_s += self.imu_noise.next3() * walk;
+        let gyro_white = self.imu_noise.next3() * (imu.gyro_noise_deg_s_sqrt_hz.to_radians() * spread);
+        let (shaken_rad_s, shaken_m_s2) =
+            if burning { self.flaws.vibration(&self.params) } else { (Vector3::zeros(), Vector3::zeros()) };
+        let gyro = self.flaws.unit_from_body * mean(&mut self.rate_sum_rad_s)
+            + shaken_rad_s
+            + self.errors.gyro_bias_rad_s
+            + faults.gyro_bias_step_rad_s
+            + gyro_white;
+
+        let force_white = self.imu_noise.next3() * (imu.accelerometer_noise_mg_sqrt_hz * milli_g * spread);
+        let rectified_m_s2 = if burning { self.flaws.burning_bias_m_s2 } else { Vector3::zeros() };
+        let felt_m_s2 = self.flaws.unit_from_body * mean(&mut self.force_sum_m_s2);
+        let force = felt_m_s2.component_mul(&self.accelerometer_scale)
+            + self.flaws.cross_axis * felt_m_s2
+            + rectified_m_s2
+            + shaken_m_s2
+            + self.errors.accelerometer_bias_m_s2
+            + faults.accelerometer_bias_step_m_s2
+            + force_white;
+
+        let force = if faults.accelerometer_dead { Vector3::zeros() } else { force };
+
+        let clip = |value: Vector3<f64>, range: f64| value.map(|axis| axis.clamp(-range, range));
+        ImuSample {
+            gyro_rad_s: clip(gyro, imu.gyro_range_deg_s.to_radians()),
+            specific_force_m_s2: clip(force, imu.accelerometer_range_g * GRAVITY_M_S2),
+        }
+    }
+}
+
+impl Flaws {
+    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2.
+    fn vibration(&mut self, params: &SensorParams) -> (Vector3<f64>, Vector3<f64>) {
+        let imu = &params.imu;
+        let rate = self.vibration.next3() * imu.vibration_deg_s.to_radians();
+        (rate, self.vibration.next3() * (imu.vibration_g * GRAVITY_M_S2))
+    }
+}

@@ -1,0 +1,136 @@
+//! The lidar.
+
+use flight::vehicle::rigid::RigidState;
+use serde::Deserialize;
+
+use super::noise::{Fate, Flaws, fate};
+use super::params::{above_zero, multiple_of_a_frame, not_below_zero, shares};
+use super::{SensorParamError, SensorParams, SensorTruth, Sensors};
+
+/// Lidar, looking backwards along the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LidarParams {
+    /// Time between samples, ms; a multiple of the frame's 5 ms.
+    pub period_ms: u32,
+    /// Noise of one range, m.
+    pub noise_m: f64,
+    /// Shortest range, m.
+    pub range_min_m: f64,
+    /// Longest range, m, straight down; it shrinks as the beam leans.
+    pub range_max_m: f64,
+    /// Beyond this tilt the ground gives no echo, degrees.
+    pub tilt_max_deg: f64,
+    /// Its position along the axis, ahead of the feet, m.
+    pub ahead_of_feet_m: f64,
+    /// Below this height of the feet there is no echo while the motor burns, m: dust.
+    pub blind_below_m: f64,
+    /// Lean of the beam against the axis, each way, degrees.
+    pub beam_deg: f64,
+    /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on the ground.
+    pub grass_m: [f64; 2],
+    /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
+    pub late_s: f64,
+    /// Probability that a range is lost.
+    pub dropout_share: f64,
+    /// Probability that a range is an outlier: any value within the sensor's limits.
+    pub outlier_share: f64,
+}
+
+impl Default for LidarParams {
+    fn default() -> Self {
+        Self {
+            period_ms: 10,
+            noise_m: 0.06,
+            range_min_m: 0.05,
+            range_max_m: 12.0,
+            tilt_max_deg: 45.0,
+            ahead_of_feet_m: 0.15,
+            blind_below_m: 0.0,
+            beam_deg: 0.0,
+            grass_m: [0.0; 2],
+            late_s: 0.0,
+            dropout_share: 0.0,
+            outlier_share: 0.0,
+        }
+    }
+}
+
+impl LidarParams {
+    /// Its distance behind the centre of gravity, m, from that centre's height above the feet, m.
+    pub fn behind_cg_m(&self, cg_over_feet_m: f64) -> f64 {
+        cg_over_feet_m - self.ahead_of_feet_m
+    }
+
+    /// The first parameter that is out of range.
+    pub(super) fn wrong(&self) -> Option<SensorParamError> {
+        not_below_zero(&[
+            ("lidar.blind_below_m", self.blind_below_m),
+            ("lidar.beam_deg", self.beam_deg),
+            ("lidar.grass_m, lowest", self.grass_m[0]),
+            ("lidar.grass_m, highest", self.grass_m[1]),
+            ("lidar.late_s", self.late_s),
+            ("lidar.noise_m", self.noise_m),
+            ("lidar.range_min_m", self.range_min_m),
+            ("lidar.ahead_of_feet_m", self.ahead_of_feet_m),
+        ])
+        .or_else(|| above_zero(&[("lidar.range_max_m", self.range_max_m)]))
+        .or_else(|| {
+            shares(&[
+                ("lidar.dropout_share", self.dropout_share),
+                ("lidar.outlier_share", self.outlier_share),
+            ])
+        })
+        .or_else(|| multiple_of_a_frame("lidar.period_ms", self.period_ms))
+        .or_else(|| {
+            (!(0.0..90.0).contains(&self.tilt_max_deg)).then_some(SensorParamError {
+                field: "lidar.tilt_max_deg",
+                found: self.tilt_max_deg,
+                accepted: "0 to below 90",
+            })
+        })
+    }
+}
+
+impl Sensors {
+    pub(super) fn lidar(&mut self, truth: &SensorTruth) -> Option<f64> {
+        let lidar = &self.params.lidar;
+        if !self.elapsed_ms.is_multiple_of(lidar.period_ms) {
+            return None;
+        }
+        let noise_m = lidar.noise_m * self.lidar_noise.next();
+        let (fate, anywhere) = self.flaws.of_range(&self.params);
+        let along_beam = truth.state.world_from_body * self.flaws.beam;
+        let tilt_rad = RigidState { world_from_body: along_beam, ..truth.state }.tilt_rad();
+        if tilt_rad > lidar.tilt_max_deg.to_radians() {
+            return None;
+        }
+        // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
+        // distance from it.
+        let then_m = truth.state.position_m.z
+            - truth.ground_m
+            - self.flaws.grass_m
+            - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
+        let slant_m = then_m / libm::cos(tilt_rad);
+        let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
+        // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
+        // with the square of the range.
+        let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
+        let blind = truth.burning
+            && truth.state.position_m.z - truth.ground_m - truth.cg_over_feet_m < lidar.blind_below_m;
+        match fate {
+            Fate::Lost => None,
+            _ if blind => None,
+            Fate::Outlier => Some(lidar.range_min_m + anywhere * (lidar.range_max_m - lidar.range_min_m)),
+            Fate::Arrives => (lidar.range_min_m..=farthest_m).contains(&range_m).then_some(range_m),
+        }
+    }
+}
+
+impl Flaws {
+    /// What becomes of a range, and where an outlier lies between the sensor's limits, 0 to 1.
+    fn of_range(&mut self, params: &SensorParams) -> (Fate, f64) {
+        let fate = fate(self.lidar.unit(), params.lidar.dropout_share, params.lidar.outlier_share);
+        (fate, self.lidar.unit())
+    }
+}
