@@ -11,7 +11,7 @@ use campaign::run::threads;
 
 use crate::info::Completeness;
 use crate::log::{Cut, Gap, Recording};
-use crate::output::{Destination, NewFile, Overwrite};
+use crate::output::write_whole;
 use crate::verify::Verification;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
@@ -110,12 +110,7 @@ pub(crate) fn answer(
 /// Writes a new file; an existing one is kept.
 pub(crate) fn write_new(path: &Path, text: &str) -> Result<()> {
     refuse_existing(path)?;
-    NewFile::create(Destination { path, overwrite: Overwrite::Never }, Path::new(""))
-        .and_then(|mut file| {
-            file.write_all(text.as_bytes())?;
-            file.commit()
-        })
-        .with_context(|| format!("{}: cannot be written", path.display()))
+    Ok(write_whole(path.into(), Path::new(""), |file| file.write_all(text.as_bytes()))?)
 }
 
 /// Refuses a path where a file is, before the work for it is done.

@@ -45,6 +45,36 @@ impl<'a> From<&'a PathBuf> for Destination<'a> {
     }
 }
 
+/// A file cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot be written", path.display())]
+pub struct WriteError {
+    pub path: PathBuf,
+    /// Error from the operating system, or from the writer of a format.
+    pub source: io::Error,
+}
+
+impl WriteError {
+    /// The error at a path.
+    pub fn at(path: &Path) -> impl Fn(io::Error) -> Self {
+        |source| Self { path: path.to_owned(), source }
+    }
+}
+
+/// Writes a whole file: it gets its name if `write` succeeds. `input` is the file that is being read.
+///
+/// # Errors
+/// As [`NewFile::create`]; or it could not be written.
+pub fn write_whole(
+    destination: Destination<'_>,
+    input: &Path,
+    write: impl FnOnce(&mut NewFile) -> io::Result<()>,
+) -> Result<(), WriteError> {
+    let mut file = NewFile::create(destination, input)?;
+    write(&mut file).map_err(WriteError::at(destination.path))?;
+    file.commit()
+}
+
 /// A file being written, under a temporary name in the same directory until it is complete. If dropped, it is removed.
 #[derive(Debug)]
 pub struct NewFile {
@@ -65,7 +95,11 @@ impl NewFile {
     ///
     /// # Errors
     /// The file exists and may not be replaced, it is the input, or it cannot be created in its directory.
-    pub fn create(Destination { path, overwrite }: Destination, input: &Path) -> io::Result<Self> {
+    pub fn create(destination: Destination, input: &Path) -> Result<Self, WriteError> {
+        Self::begin(destination, input).map_err(WriteError::at(destination.path))
+    }
+
+    fn begin(Destination { path, overwrite }: Destination, input: &Path) -> io::Result<Self> {
         if same_file(path, input) {
             let words = "it is the file that is being read, and never overwritten";
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, words));
@@ -93,19 +127,20 @@ impl NewFile {
     ///
     /// # Errors
     /// It could not be written to the disk, or a file has appeared there in the meantime that may not be replaced.
-    pub fn commit(self) -> io::Result<()> {
+    pub fn commit(self) -> Result<(), WriteError> {
         let Self { path, overwrite, place } = self;
         let Place::Beside(file) = place else {
             return Ok(());
         };
-        file.as_file().sync_all()?;
+        let failed = WriteError::at(&path);
+        file.as_file().sync_all().map_err(&failed)?;
         let persisted = match overwrite {
             Overwrite::Always => file.persist(&path),
             Overwrite::Never => file.persist_noclobber(&path),
         };
         persisted.map(|_| ()).map_err(|error| match error.error.kind() {
-            io::ErrorKind::AlreadyExists => exists(),
-            _ => error.error,
+            io::ErrorKind::AlreadyExists => failed(exists()),
+            _ => failed(error.error),
         })
     }
 
@@ -160,9 +195,10 @@ mod tests {
     use super::*;
 
     fn write(path: &Path, text: &str, overwrite: Overwrite) -> io::Result<()> {
-        let mut file = NewFile::create(Destination { path, overwrite }, Path::new("input"))?;
-        file.write_all(text.as_bytes())?;
-        file.commit()
+        let written = write_whole(Destination { path, overwrite }, Path::new("input"), |file| {
+            file.write_all(text.as_bytes())
+        });
+        written.map_err(|error| error.source)
     }
 
     #[test]
@@ -192,7 +228,7 @@ mod tests {
         let path = directory.path().join("file");
         let file = NewFile::create((&path).into(), Path::new("input")).unwrap();
         std::fs::write(&path, "theirs").unwrap();
-        assert_eq!(file.commit().unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(file.commit().unwrap_err().source.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "theirs");
     }
 
@@ -204,7 +240,7 @@ mod tests {
         let again = directory.path().join(".").join("log");
         for overwrite in [Overwrite::Never, Overwrite::Always] {
             let refused = NewFile::create(Destination { path: &again, overwrite }, &input).unwrap_err();
-            assert!(refused.to_string().contains("is being read"), "{refused}");
+            assert!(refused.source.to_string().contains("is being read"), "{refused}");
         }
     }
 }

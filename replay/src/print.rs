@@ -7,8 +7,8 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::cli::refuse_existing;
-use crate::output::NewFile;
-use anyhow::{Context as _, Result};
+use crate::output::{NewFile, WriteError};
+use anyhow::Result;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use serde::Serialize;
 
@@ -150,13 +150,11 @@ pub(crate) fn junit_file(path: &Path) -> Result<NewFile> {
     if std::fs::metadata(path).is_ok_and(|found| found.is_file()) {
         refuse_existing(path)?;
     }
-    NewFile::create(path.into(), Path::new(""))
-        .with_context(|| format!("{}: cannot be written", path.display()))
+    Ok(NewFile::create(path.into(), Path::new(""))?)
 }
 
 /// Writes JUnit XML to a file of [`junit_file`].
 pub(crate) fn write_junit(suite: &str, cases: Vec<JunitCase>, mut file: NewFile) -> Result<()> {
-    let path = file.path().to_owned();
-    let written = print_junit(suite, cases, &mut file).and_then(|()| file.commit());
-    written.with_context(|| format!("{}: cannot be written", path.display()))
+    print_junit(suite, cases, &mut file).map_err(WriteError::at(file.path()))?;
+    Ok(file.commit()?)
 }

@@ -1,5 +1,6 @@
 //! Figures as SVG, drawn with `plotters`: the best kept plotting crate that writes SVG without fonts, images or a browser
-//! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
+//! (three small crates, 6 s of a build); ticks, axes and escaping are its own. The pictures of a flight's report are the
+//! same panels, with other colours.
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
@@ -7,9 +8,9 @@ use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
-use plotters::element::{Cross, EmptyElement, PathElement, Rectangle, Text};
+use plotters::element::{Circle, Cross, EmptyElement, PathElement, Rectangle, Text};
 use plotters::series::{DashedLineSeries, LineSeries};
-use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, WHITE};
+use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
 
 /// A figure cannot be drawn: its axes are not finite, or too small for their labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -19,14 +20,18 @@ pub struct FigureError {
     reason: String,
 }
 
-/// Okabe and Ito's colours that differ for every kind of colour vision, and in grey.
-const COLOURS: [RGBColor; 5] = [
+/// Okabe and Ito's colours that differ for every kind of colour vision, and in grey; and a grey.
+const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(0, 0, 0),
+    FAINT,
 ];
+const FAINT: RGBColor = RGBColor(130, 130, 130);
+/// Of a limit.
+const RED: RGBColor = RGBColor(179, 38, 30);
 
 /// Font and size, px, of titles and of everything else.
 const TITLE_FONT: (&str, i32) = ("sans-serif", 18);
@@ -61,7 +66,7 @@ fn drawn(
 /// Room for margins, ticks and names: beside and below the axes, px.
 const ROOM_PX: (u32, u32) = (24 + 62, 24 + 42);
 
-/// Axes over two ranges, with ticks and names; without a name an axis has no ticks.
+/// Axes over two ranges, with ticks and names.
 fn axes<'a, 'b>(
     area: &'a Area<'b>,
     [x, y]: [(f64, f64); 2],
@@ -78,14 +83,14 @@ fn axes<'a, 'b>(
     chart
         .configure_mesh()
         .x_labels(7)
-        .y_labels(if y_label.is_empty() { 0 } else { 8 })
+        .y_labels(8)
         .x_label_formatter(&number(x))
         .y_label_formatter(&number(y))
         .label_style(FONT)
         .axis_desc_style(FONT)
         .x_desc(x_label)
         .y_desc(y_label)
-        .light_line_style(RGBColor(245, 245, 245))
+        .light_line_style(TRANSPARENT)
         .bold_line_style(RGBColor(222, 222, 222))
         .draw()?;
     Ok(chart)
@@ -172,13 +177,21 @@ pub struct Line {
 }
 
 /// One pair of axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
     pub x_label: String,
     pub y_label: String,
     pub lines: Vec<Line>,
     /// Crosses, each with the colour of a curve.
     pub crosses: Vec<(f64, f64, usize)>,
+    /// Values of `y`.
+    pub limits: Vec<f64>,
+    /// Values of `x`, with their names.
+    pub marks: Vec<(f64, String)>,
+    /// Points with their names.
+    pub places: Vec<(f64, f64, String)>,
+    /// Both axes have one scale.
+    pub equal_scales: bool,
 }
 
 /// Panels in rows of `columns`, below a title. `cross_name` says what the crosses are.
@@ -191,11 +204,25 @@ pub fn lines_svg(
     columns: usize,
     cross_name: Option<&str>,
 ) -> Result<String, FigureError> {
-    let (panel_width_px, panel_height_px) = if panels.len() == 1 { LONE_PANEL_PX } else { PANEL_PX };
+    let size_px = if panels.len() == 1 { LONE_PANEL_PX } else { PANEL_PX };
+    sized_lines_svg(title, panels, columns, cross_name, size_px)
+}
+
+/// As [`lines_svg`], with panels of a size, px.
+///
+/// # Errors
+/// A panel has no finite point, or is too small.
+pub fn sized_lines_svg(
+    title: &str,
+    panels: &[Panel],
+    columns: usize,
+    cross_name: Option<&str>,
+    (panel_width_px, panel_height_px): (u32, u32),
+) -> Result<String, FigureError> {
     let rows = panels.len().div_ceil(columns.max(1));
     let (width_px, panels_px) = (columns as u32 * panel_width_px, rows as u32 * panel_height_px);
     let mut named: Vec<&Line> = Vec::new();
-    for line in panels.iter().flat_map(|panel| &panel.lines) {
+    for line in panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.name.is_empty()) {
         if !named.iter().any(|known| known.name == line.name) {
             named.push(line);
         }
@@ -217,8 +244,25 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
         of_lines.chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
     };
     let x = extent(points().map(|point| point.0)).ok_or("no finite point")?;
-    let y = extent(points().map(|point| point.1)).ok_or("no finite point")?;
-    let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
+    let y = extent(points().map(|point| point.1).chain(panel.limits.iter().copied()));
+    let mut ends = [x, y.ok_or("no finite point")?];
+    if panel.equal_scales {
+        let (width_px, height_px) = area.dim_in_pixel();
+        equalise(&mut ends, [width_px.saturating_sub(ROOM_PX.0), height_px.saturating_sub(ROOM_PX.1)]);
+    }
+    let mut chart = axes(area, ends, [&panel.x_label, &panel.y_label])?;
+    let [x, y] = ends;
+    let across = panel.limits.iter().map(|limit| PathElement::new([(x.0, *limit), (x.1, *limit)], RED));
+    chart.draw_series(across)?;
+    let marks = || panel.marks.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
+    chart.draw_series(marks().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], FAINT)))?;
+    chart.draw_series(
+        marks().map(|(at, name)| EmptyElement::at((*at, y.1)) + Text::new(name.clone(), (3, 2), FONT)),
+    )?;
+    chart.draw_series(panel.places.iter().map(|(x, y, name)| {
+        let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
+        named + Text::new(name.clone(), (6, -14), FONT)
+    }))?;
     for line in &panel.lines {
         let points = line.points.iter().copied();
         if line.dashed {
@@ -257,6 +301,16 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)));
     let room = if most > least { ROOM * (most - least) } else { 0.5 };
     (least <= most).then_some((least - room, most + room))
+}
+
+/// Widens the axis that has more pixels a unit until both have the same.
+fn equalise(ends: &mut [(f64, f64); 2], size_px: [u32; 2]) {
+    let scale = |place: usize| f64::from(size_px[place].max(1)) / (ends[place].1 - ends[place].0);
+    let wanted = scale(0).min(scale(1));
+    for ((from, to), pixels) in ends.iter_mut().zip(size_px) {
+        let (middle, half) = (0.5 * (*from + *to), 0.5 * f64::from(pixels.max(1)) / wanted);
+        (*from, *to) = (middle - half, middle + half);
+    }
 }
 
 /// Size of the axes' area, px.
@@ -437,62 +491,34 @@ fn line(radius: usize) -> ShapeStyle {
     BLACK.stroke_width(if radius == 0 { 2 } else { 1 })
 }
 
-/// The colour of a kind of bars.
-fn dot(kind: usize) -> ShapeStyle {
-    COLOURS[kind % COLOURS.len()].mix(0.7).filled()
-}
+/// A bar: from its left to its right end, and its height.
+pub type Bar = ([f64; 2], f64);
 
-/// A bar.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bar {
-    /// From its left to its right end.
-    pub x: [f64; 2],
-    /// From its lower to its upper end.
-    pub y: [f64; 2],
-    /// Which of the kinds.
-    pub kind: usize,
-    /// Written into it.
-    pub text: String,
-}
-
-/// Bars of named kinds, and perhaps a value of `x` that is marked, with its name.
+/// Bars, and perhaps a value of `x` that is marked, with its name.
 ///
 /// # Errors
 /// A bar is not finite.
 pub fn bars_svg(
     title: &str,
     labels: [&str; 2],
-    kinds: &[&str],
     bars: &[Bar],
     mark: Option<(&str, f64)>,
 ) -> Result<String, FigureError> {
     let (width_px, height_px) = LONE_PANEL_PX;
-    let names = kinds.iter().copied().chain(mark.map(|(name, _)| name)).map(str::to_owned);
-    let legend = Legend::new(names.collect(), width_px);
+    let legend = Legend::new(mark.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
     drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
         let (upper, lower) = root.split_vertically(height_px);
         let of_mark = mark.map(|(_, value)| value);
-        let x = extent(bars.iter().flat_map(|bar| bar.x).chain(of_mark)).unwrap_or((0.0, 1.0));
-        let of_bars = bars.iter().flat_map(|bar| bar.y);
-        let y = of_bars.fold((0.0, 0.0), |(least, most): (f64, f64), y| (least.min(y), most.max(y)));
-        let y = if y.0 < y.1 { y } else { (0.0, 1.0) };
-        let mut chart = axes(&upper, [x, y], labels)?;
-        chart.draw_series(bars.iter().map(|bar| {
-            let corners = [(bar.x[0], bar.y[0]), (bar.x[1], bar.y[1])];
-            Rectangle::new(corners, dot(bar.kind))
+        let x = extent(bars.iter().flat_map(|(x, _)| *x).chain(of_mark)).unwrap_or((0.0, 1.0));
+        let most = bars.iter().map(|(_, height)| *height).fold(0.0, f64::max);
+        let most = if most > 0.0 { most } else { 1.0 };
+        let mut chart = axes(&upper, [x, (0.0, most)], labels)?;
+        chart.draw_series(bars.iter().map(|([left, right], height)| {
+            Rectangle::new([(*left, 0.0), (*right, *height)], COLOURS[0].mix(0.7).filled())
         }))?;
-        let texts = bars.iter().filter(|bar| !bar.text.is_empty());
-        chart.draw_series(texts.map(|bar| {
-            let middle = 0.5 * (bar.y[0] + bar.y[1]);
-            Text::new(bar.text.clone(), (bar.x[0], middle), FONT)
-        }))?;
-        chart.draw_series(of_mark.map(|at| PathElement::new([(at, y.0), (at, y.1)], style(1))))?;
-        legend.draw(&lower, |area, entry, (left, middle)| {
-            if entry < kinds.len() {
-                area.draw(&Rectangle::new([(left + 4, middle - 7), (left + 20, middle + 7)], dot(entry)))?;
-            } else {
-                area.draw(&PathElement::new([(left, middle), (left + 20, middle)], style(1)))?;
-            }
+        chart.draw_series(of_mark.map(|at| PathElement::new([(at, 0.0), (at, most)], style(1))))?;
+        legend.draw(&lower, |area, _, (left, middle)| {
+            area.draw(&PathElement::new([(left, middle), (left + 20, middle)], style(1)))?;
             Ok(())
         })
     })
@@ -513,7 +539,7 @@ mod tests {
     fn panel(points: Vec<(f64, f64)>) -> Panel {
         let line = Line { name: "a < b".to_owned(), colour: 0, dashed: false, points };
         let (x_label, y_label) = ("time, s".to_owned(), "height, m".to_owned());
-        Panel { x_label, y_label, lines: vec![line], crosses: vec![(0.5, 0.5, 0)] }
+        Panel { x_label, y_label, lines: vec![line], crosses: vec![(0.5, 0.5, 0)], ..Panel::default() }
     }
 
     #[test]
@@ -549,15 +575,35 @@ mod tests {
     }
 
     #[test]
-    fn every_bar_is_drawn_with_its_text_and_the_mark_is_named() {
-        let bar = |x, text: &str| Bar { x, y: [0.0, 2.0], kind: 0, text: text.to_owned() };
-        let bars = [bar([0.0, 1.0], "a < b"), bar([1.0, 3.0], "")];
-        let svg = bars_svg("T", ["speed, m/s", "flights"], &["flown"], &bars, Some(("limit", 2.0))).unwrap();
-        for text in ["a &lt; b", "speed, m/s", "flown", "limit"] {
+    fn every_bar_is_drawn_and_the_mark_is_named() {
+        let bars = [([0.0, 1.0], 2.0), ([1.0, 3.0], 1.0)];
+        let svg = bars_svg("T", ["speed, m/s", "flights"], &bars, Some(("limit", 2.0))).unwrap();
+        for text in ["speed, m/s", "flights", "limit"] {
             assert!(svg.contains(text), "{text}");
         }
-        assert!(bars_svg("", ["", ""], &[], &[bar([0.0, f64::INFINITY], "")], None).is_ok());
-        assert!(bars_svg("", ["", ""], &[], &[], None).is_ok());
+        assert!(bars_svg("", ["", ""], &[([0.0, f64::INFINITY], 1.0)], None).is_ok());
+        assert!(bars_svg("", ["", ""], &[], None).is_ok());
+    }
+
+    /// 10 by 110 in a picture that is twice as wide as high: the width becomes 220.
+    #[test]
+    fn both_axes_have_one_scale() {
+        let mut ends = [(0.0, 10.0), (0.0, 110.0)];
+        equalise(&mut ends, [200, 100]);
+        assert_eq!(ends, [(-105.0, 115.0), (0.0, 110.0)]);
+    }
+
+    #[test]
+    fn limits_marks_and_places_are_drawn_with_their_names() {
+        let panel = Panel {
+            limits: vec![7.5],
+            marks: vec![(0.5, "ignition".to_owned()), (9.0, "outside".to_owned())],
+            places: vec![(0.2, 0.3, "apogee".to_owned())],
+            ..panel(vec![(0.0, 0.0), (1.0, 2.0)])
+        };
+        let svg = lines_svg("T", &[panel], 1, None).unwrap();
+        assert!(svg.contains("ignition") && svg.contains("apogee") && !svg.contains("outside"), "{svg}");
+        assert_eq!(svg.matches("#B3261E").count(), 1);
     }
 
     #[test]

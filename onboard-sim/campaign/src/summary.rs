@@ -268,11 +268,11 @@ pub fn to_text(summary: &Summary) -> String {
     out
 }
 
-/// The summary as Markdown, with links to the pictures in the same directory.
+/// The summary as Markdown: its text, and links to the pictures in the same directory.
 pub fn to_markdown(summary: &Summary) -> String {
-    let mut out = String::new();
-    let _ = markdown(summary, &mut out);
-    out
+    let pictures = PICTURES.map(|(name, title)| format!("![{title}]({name})\n")).concat();
+    let Manifest { mission, build, .. } = &summary.manifest;
+    format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n\n## Pictures\n\n{pictures}", to_text(summary))
 }
 
 fn percent(share: &Share) -> String {
@@ -299,11 +299,6 @@ fn others(attainable: &Attainable) -> String {
             format!("; besides, {chosen} landed from another height, and {beyond} beyond what is attainable")
         }
     }
-}
-
-fn capitalised(text: &str) -> String {
-    let (first, rest) = text.split_at(1);
-    first.to_uppercase() + rest
 }
 
 fn what(manifest: &Manifest) -> String {
@@ -359,16 +354,6 @@ fn write_text(table: &Table, out: &mut String) -> fmt::Result {
     Ok(())
 }
 
-fn write_markdown(table: &Table, out: &mut String) -> fmt::Result {
-    for (place, row) in table.iter().enumerate() {
-        writeln!(out, "| {} |", row.join(" | "))?;
-        if place == 0 {
-            writeln!(out, "|{}", "---|".repeat(row.len()))?;
-        }
-    }
-    Ok(())
-}
-
 fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     writeln!(out, "{}", what(&summary.manifest))?;
     writeln!(out, "legs    {}", percent(&summary.legs))?;
@@ -405,50 +390,10 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     write_text(&distributions(summary), out)?;
     writeln!(
         out,
-        "\nwhat costs most: landings (legs) in the half nearest the nominal value and in the other half"
+        "\nwhat costs most: landings (legs) in the half nearest the nominal value (of wind and the state at apogee: the lower \
+         half) and in the other half; Spearman's rank correlation of deviation and use of the legs"
     )?;
     write_text(&sensitivities(summary), out)
-}
-
-fn markdown(summary: &Summary, out: &mut String) -> fmt::Result {
-    let manifest = &summary.manifest;
-    writeln!(out, "# {}\n", what(manifest))?;
-    writeln!(out, "Program `{}`. Intervals are Wilson's, 95 %.\n", manifest.build)?;
-    writeln!(out, "| verdict | landed |\n|---|---|")?;
-    writeln!(out, "| legs | {} |\n| strict | {} |\n", percent(&summary.legs), percent(&summary.strict))?;
-    if let Some(attainable) = &summary.attainable {
-        writeln!(out, "| one ignition height for all flights | flights |\n|---|---|")?;
-        let Attainable { command_height_m, .. } = attainable;
-        writeln!(
-            out,
-            "| attainable, command at {command_height_m:.1} m | {} |",
-            percent(&attainable.attainable)
-        )?;
-        writeln!(out, "| landed of attainable | {}{} |\n", percent(&attainable.landed), others(attainable))?;
-        writeln!(out, "{}.\n", capitalised(ATTAINABLE))?;
-    }
-    writeln!(out, "Ignitions outside the gate: {}.\n", summary.ignitions_outside_gate)?;
-    if !summary.failures.is_empty() {
-        writeln!(out, "| why not | flights |\n|---|---|")?;
-        for failure in &summary.failures {
-            writeln!(out, "| {} | {} |", failure.reason, failure.flights)?;
-        }
-        writeln!(out)?;
-    }
-    write_markdown(&distributions(summary), out)?;
-    writeln!(out, "\n## What costs most\n")?;
-    writeln!(
-        out,
-        "Flights are halved at the median deviation of a drawn quantity from its nominal value (for wind and the state \
-         at apogee: at the median value). `cost` is the share of landings (legs) that the outer half has less. The rank \
-         correlation is Spearman's, between deviation and the largest share of the legs' limits used at contact.\n"
-    )?;
-    write_markdown(&sensitivities(summary), out)?;
-    writeln!(out, "\n## Pictures\n")?;
-    for (name, title) in PICTURES {
-        writeln!(out, "![{title}]({name})")?;
-    }
-    Ok(())
 }
 
 /// Bars of a histogram.
@@ -500,7 +445,7 @@ fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Re
     let tail = libm::floor(TAIL_SHARE * values.len() as f64) as usize;
     let mark = limit.map(|limit| ("limit of the legs", limit));
     let (Some(from), Some(to)) = (values.get(tail), values.iter().rev().nth(tail)) else {
-        return bars_svg(&format!("{title}: no flight has one"), [label, "flights"], &[], &[], mark);
+        return bars_svg(&format!("{title}: no flight has one"), [label, "flights"], &[], mark);
     };
     let width = if to > from { (to - from) / BARS as f64 } else { 1.0 };
     let mut counts = [0_u32; BARS];
@@ -510,8 +455,8 @@ fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Re
     }
     let bar = |(place, count): (usize, &u32)| {
         let left = from + width * place as f64;
-        Bar { x: [left, left + width], y: [0.0, f64::from(*count)], kind: 0, text: String::new() }
+        ([left, left + width], f64::from(*count))
     };
     let bars: Vec<Bar> = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(bar).collect();
-    bars_svg(title, [label, "flights"], &["flights"], &bars, mark)
+    bars_svg(title, [label, "flights"], &bars, mark)
 }

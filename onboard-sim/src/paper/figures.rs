@@ -132,7 +132,7 @@ fn lines(rows: &[&Row], first_colour: usize, point: impl Fn(&Sample) -> (f64, f6
 }
 
 fn panel([x_label, y_label]: [&str; 2], lines: Vec<Line>) -> Panel {
-    Panel { x_label: x_label.to_owned(), y_label: y_label.to_owned(), lines, crosses: Vec::new() }
+    Panel { x_label: x_label.to_owned(), y_label: y_label.to_owned(), lines, ..Panel::default() }
 }
 
 fn fates(stability: &Stability) -> Result<String, PaperError> {

@@ -10,7 +10,7 @@ use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 
 use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
 use crate::log::{Entry, FlightLog, LogError};
-use crate::output::{Destination, NewFile, Overwrite};
+use crate::output::{Destination, NewFile, Overwrite, WriteError};
 
 /// Why a flight cannot be given to a board.
 #[derive(Debug, thiserror::Error)]
@@ -19,8 +19,8 @@ pub enum FramesError {
     Log(#[from] LogError),
     #[error("{file}: {reason}")]
     NotWhole { file: String, reason: &'static str },
-    #[error("{path}: cannot be written")]
-    Write { path: String, source: io::Error },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 /// A file of records, which gets its name when it is complete.
@@ -31,25 +31,19 @@ struct Records<'p> {
 
 impl<'p> Records<'p> {
     fn create(path: &'p Path, overwrite: Overwrite, log: &Path) -> Result<Self, FramesError> {
-        let file =
-            NewFile::create(Destination { path, overwrite }, log).map_err(|error| failed(path, error))?;
-        Ok(Self { path, file: BufWriter::new(file) })
+        Ok(Self { path, file: BufWriter::new(NewFile::create(Destination { path, overwrite }, log)?) })
     }
 
     fn send(&mut self, record: &impl prost::Message) -> Result<(), FramesError> {
         let mut bytes = Vec::new();
         put(record, &mut bytes);
-        self.file.write_all(&bytes).map_err(|error| failed(self.path, error))
+        Ok(self.file.write_all(&bytes).map_err(WriteError::at(self.path))?)
     }
 
     fn finish(self) -> Result<(), FramesError> {
         let file = self.file.into_inner().map_err(io::IntoInnerError::into_error);
-        file.and_then(NewFile::commit).map_err(|error| failed(self.path, error))
+        Ok(file.map_err(WriteError::at(self.path))?.commit()?)
     }
-}
-
-fn failed(path: &Path, source: io::Error) -> FramesError {
-    FramesError::Write { path: path.display().to_string(), source }
 }
 
 /// Writes the frames of the flight in `log` to the file `frames` of a directory, which is made if needed, and what it
@@ -62,7 +56,7 @@ pub fn write_frames<'a>(log: &Path, directory: impl Into<Destination<'a>>) -> Re
     let Destination { path: directory, overwrite } = directory.into();
     let opened = FlightLog::open(log)?;
     let made = !directory.exists();
-    std::fs::create_dir_all(directory).map_err(|error| failed(directory, error))?;
+    std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
     let written = write_into(directory, overwrite, log, opened);
     if written.is_err() && made {
         // Nothing is left behind. If this fails, an empty directory is.

@@ -22,7 +22,7 @@ pub use tlog::{ExportedTlog, ImportError, ImportProgress, ImportedTlog, export_t
 
 use crate::cli::{Outcome, answer, say, warn_of_damage};
 use crate::log::{FlightLog, LogError};
-use crate::output::{Destination, Overwrite};
+use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::print_json;
 use serde::Serialize;
 
@@ -32,20 +32,8 @@ pub enum ExportError {
     /// The file is not a flight log, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A file cannot be created or written.
-    #[error("{}: cannot be written", path.display())]
-    Write {
-        path: PathBuf,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
-    /// The Parquet writer failed.
-    #[error("{}: cannot be written as Parquet", path.display())]
-    Parquet {
-        path: PathBuf,
-        /// Error from the writer.
-        source: ::parquet::errors::ParquetError,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// The log has no such content.
     #[error("{name}: has {found}; {wanted}")]
     Nothing {

@@ -1,7 +1,7 @@
 //! Writes tables into files.
 
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Read, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::ExportError;
 use crate::log::FlightLog;
-use crate::output::{Destination, NewFile};
+use crate::output::{Destination, NewFile, WriteError};
 use crate::table::{Cell, Column, Kind, Meaning, Row, TableReader, TableShape};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,23 +62,22 @@ pub fn export_tables<'a, R: Read>(
             }
         };
         file.rows += 1;
-        table.write(&row)
+        Ok(table.write(&row)?)
     })?;
     let finished = open.into_values().map(|(file, table)| Ok((file, table.finish()?)));
     let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     let mut whole = whole;
     if !whole.is_empty() {
         let path = directory.path.join(DICTIONARY);
-        let failed = |source| ExportError::Write { path: path.clone(), source };
         let destination = Destination { path: &path, overwrite: directory.overwrite };
-        let file = NewFile::create(destination, &input).map_err(failed)?;
+        let file = NewFile::create(destination, &input)?;
         let shapes: Vec<&TableShape> = reader.shapes().iter().collect();
         let (written, rows) = write_dictionary(file, &shapes)?;
         whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
     }
     let mut files = Vec::new();
     for (file, written) in whole {
-        written.commit().map_err(|source| ExportError::Write { path: file.path.clone(), source })?;
+        written.commit()?;
         files.push(file);
     }
     Ok(files)
@@ -95,11 +94,9 @@ fn create(
         TableFormat::Parquet => "parquet",
     };
     // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
-    std::fs::create_dir_all(directory)
-        .map_err(|source| ExportError::Write { path: directory.to_owned(), source })?;
+    std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
     let path = directory.join(format!("{}.{suffix}", shape.name));
-    let file = NewFile::create(Destination { path: &path, overwrite }, input)
-        .map_err(|source| ExportError::Write { path: path.clone(), source })?;
+    let file = NewFile::create(Destination { path: &path, overwrite }, input)?;
     let table = match format {
         TableFormat::Csv => Table::Csv(CsvTable::create(file, shape)?),
         TableFormat::Parquet => Table::Parquet(Box::new(ParquetTable::create(file, shape)?)),
@@ -108,14 +105,14 @@ fn create(
 }
 
 impl Table {
-    fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+    fn write(&mut self, row: &Row) -> Result<(), WriteError> {
         match self {
             Self::Csv(table) => table.write(row),
             Self::Parquet(table) => table.write(row),
         }
     }
 
-    fn finish(self) -> Result<NewFile, ExportError> {
+    fn finish(self) -> Result<NewFile, WriteError> {
         match self {
             Self::Csv(table) => table.finish(),
             Self::Parquet(table) => table.finish(),
@@ -123,34 +120,29 @@ impl Table {
     }
 }
 
-pub(super) struct CsvTable {
+struct CsvTable {
     path: PathBuf,
     output: BufWriter<NewFile>,
 }
 
 impl CsvTable {
-    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+    fn create(file: NewFile, shape: &TableShape) -> Result<Self, WriteError> {
         let path = file.path().to_owned();
-        let write = |source| ExportError::Write { path: path.clone(), source };
         let mut output = BufWriter::new(file);
         let names: Vec<String> = shape.columns.iter().map(|column| quoted(&column.name)).collect();
-        writeln!(output, "{}", names.join(",")).map_err(write)?;
+        writeln!(output, "{}", names.join(",")).map_err(WriteError::at(&path))?;
         Ok(Self { path, output })
     }
 
-    pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+    fn write(&mut self, row: &Row) -> Result<(), WriteError> {
         let cells: Vec<String> = row.cells.iter().map(text_of).collect();
-        writeln!(self.output, "{}", cells.join(",")).map_err(|source| self.failed(source))
+        writeln!(self.output, "{}", cells.join(",")).map_err(WriteError::at(&self.path))
     }
 
     /// The complete file, still under its temporary name.
-    pub(super) fn finish(self) -> Result<NewFile, ExportError> {
-        let Self { path, output } = self;
-        output.into_inner().map_err(|error| ExportError::Write { path, source: error.into_error() })
-    }
-
-    fn failed(&self, source: std::io::Error) -> ExportError {
-        ExportError::Write { path: self.path.clone(), source }
+    fn finish(self) -> Result<NewFile, WriteError> {
+        let file = self.output.into_inner().map_err(io::IntoInnerError::into_error);
+        file.map_err(WriteError::at(&self.path))
     }
 }
 
@@ -176,7 +168,7 @@ const DICTIONARY: &str = "dictionary.csv";
 const DICTIONARY_COLUMNS: [&str; 6] = ["table", "column", "type", "unit", "meaning", "values"];
 
 /// Writes the dictionary of some tables. Returns the complete file, still under its temporary name, and its rows.
-fn write_dictionary(file: NewFile, shapes: &[&TableShape]) -> Result<(NewFile, u64), ExportError> {
+fn write_dictionary(file: NewFile, shapes: &[&TableShape]) -> Result<(NewFile, u64), WriteError> {
     let heads = DICTIONARY_COLUMNS.map(|name| Column {
         name: name.to_owned(),
         kind: Kind::Text,
@@ -202,7 +194,7 @@ fn write_dictionary(file: NewFile, shapes: &[&TableShape]) -> Result<(NewFile, u
 }
 
 /// The words for the numbers of a column, as in `9 TD_PHASE_POWERED; 10 TD_PHASE_TOUCHDOWN`.
-pub(super) fn values(meaning: &Meaning) -> String {
+fn values(meaning: &Meaning) -> String {
     let values = meaning.values().iter().map(|(number, word)| format!("{number} {word}"));
     values.collect::<Vec<_>>().join("; ")
 }
@@ -210,7 +202,7 @@ pub(super) fn values(meaning: &Meaning) -> String {
 /// Number of rows in a group; a group is held in memory until it is written.
 const GROUP_ROWS: usize = 16_384;
 
-pub(super) struct ParquetTable {
+struct ParquetTable {
     path: PathBuf,
     columns: Vec<Column>,
     writer: SerializedFileWriter<NewFile>,
@@ -218,9 +210,9 @@ pub(super) struct ParquetTable {
 }
 
 impl ParquetTable {
-    pub(super) fn create(file: NewFile, shape: &TableShape) -> Result<Self, ExportError> {
+    fn create(file: NewFile, shape: &TableShape) -> Result<Self, WriteError> {
         let path = file.path().to_owned();
-        let failed = |source| ExportError::Parquet { path: path.clone(), source };
+        let failed = |error: ParquetError| WriteError::at(&path)(io::Error::other(error));
         let schema = schema_of(shape).map_err(failed)?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
@@ -231,25 +223,24 @@ impl ParquetTable {
         Ok(Self { path, columns: shape.columns.clone(), writer, held: Vec::new() })
     }
 
-    pub(super) fn write(&mut self, row: &Row) -> Result<(), ExportError> {
+    fn write(&mut self, row: &Row) -> Result<(), WriteError> {
         self.held.push(row.cells.clone());
         if self.held.len() >= GROUP_ROWS { self.write_group() } else { Ok(()) }
     }
 
     /// The complete file, still under its temporary name.
-    pub(super) fn finish(mut self) -> Result<NewFile, ExportError> {
+    fn finish(mut self) -> Result<NewFile, WriteError> {
         self.write_group()?;
-        let path = self.path;
-        self.writer.into_inner().map_err(|source| ExportError::Parquet { path, source })
+        self.writer.into_inner().map_err(io::Error::other).map_err(WriteError::at(&self.path))
     }
 
-    fn write_group(&mut self) -> Result<(), ExportError> {
+    fn write_group(&mut self) -> Result<(), WriteError> {
         let rows = std::mem::take(&mut self.held);
         if rows.is_empty() {
             return Ok(());
         }
-        group(&mut self.writer, &self.columns, &rows)
-            .map_err(|source| ExportError::Parquet { path: self.path.clone(), source })
+        let written = group(&mut self.writer, &self.columns, &rows);
+        written.map_err(io::Error::other).map_err(WriteError::at(&self.path))
     }
 }
 

@@ -14,13 +14,13 @@ use protocol::frame::Frame;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record, TOPIC_RAW_RX};
 use protocol::log::tlog::{TlogFrame, TlogReader};
 use protocol::log::v1;
-use protocol::log::writer::{LogHeader, LogWriteError};
+use protocol::log::writer::LogHeader;
 use protocol::text::Reassembler;
 use serde::Serialize;
 
 use super::ExportError;
-use crate::log::{Entry, FlightLog, Heard, NewLog, NewLogError, frame_of};
-use crate::output::{Destination, NewFile};
+use crate::log::{Entry, FlightLog, Heard, NewLog, frame_of};
+use crate::output::{Destination, NewFile, WriteError};
 
 /// Summary of a written `.tlog`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -78,8 +78,8 @@ fn write_frames<R: Read>(
     endpoint: &str,
     destination: Destination,
 ) -> Result<ExportedTlog, ExportError> {
-    let failed = |source| ExportError::Write { path: destination.path.to_owned(), source };
-    let file = NewFile::create(destination, Path::new(log.name())).map_err(failed)?;
+    let failed = WriteError::at(destination.path);
+    let file = NewFile::create(destination, Path::new(log.name()))?;
     let mut output = BufWriter::new(file);
     let mut written =
         ExportedTlog { endpoint: endpoint.to_owned(), received: 0, sent: 0, left_out: 0, damage: None };
@@ -99,11 +99,10 @@ fn write_frames<R: Read>(
         } else {
             written.sent += 1;
         }
-        output.write_all(&(stamped.log_time_ns / 1000).to_be_bytes()).map_err(failed)?;
-        output.write_all(&stamped.data).map_err(failed)?;
+        output.write_all(&(stamped.log_time_ns / 1000).to_be_bytes()).map_err(&failed)?;
+        output.write_all(&stamped.data).map_err(&failed)?;
     }
-    let file = output.into_inner().map_err(|error| failed(error.into_error()))?;
-    file.commit().map_err(failed)?;
+    output.into_inner().map_err(|error| failed(error.into_error()))?.commit()?;
     written.damage = log.damage().map(ToString::to_string);
     Ok(written)
 }
@@ -126,20 +125,9 @@ pub enum ImportError {
     /// The `.tlog` has no frame.
     #[error("{}: is not a .tlog: it has no MAVLink 2 frame that follows a time of 8 bytes", path.display())]
     NoFrames { path: PathBuf },
-    /// The log cannot be created.
-    #[error("{}: cannot be created", path.display())]
-    Create {
-        path: PathBuf,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
     /// The log cannot be written.
-    #[error("{}: cannot be written", path.display())]
-    Write {
-        path: PathBuf,
-        /// Error from the writer.
-        source: LogWriteError,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 /// Summary of an import.
@@ -174,8 +162,6 @@ pub fn import_tlog<'a>(
     output: impl Into<Destination<'a>>,
     progress: &mut dyn FnMut(ImportProgress),
 ) -> Result<ImportedTlog, ImportError> {
-    let destination = output.into();
-    let output = destination.path;
     let read = |source| ImportError::Read { path: input.to_owned(), source };
     let file = File::open(input).map_err(read)?;
     let total = file.metadata().map_err(read)?.len();
@@ -190,11 +176,7 @@ pub fn import_tlog<'a>(
         run: BTreeMap::from([("imported_from".to_owned(), input.display().to_string())]),
         ..LogHeader::default()
     };
-    let failed = |error| match error {
-        NewLogError::Create(source) => ImportError::Create { path: output.to_owned(), source },
-        NewLogError::Write(source) => ImportError::Write { path: output.to_owned(), source },
-    };
-    let mut log = NewLog::create(destination, input, &header).map_err(failed)?;
+    let mut log = NewLog::create(output.into(), input, &header)?;
     let link = format!("file:{}", input.file_name().unwrap_or_default().to_string_lossy());
     let mut imported = ImportedTlog::default();
     let mut fold = Fold::default();
@@ -209,11 +191,11 @@ pub fn import_tlog<'a>(
         let source = bytes.get(5).copied();
         let direction = if source == Some(GROUND_SYSTEM) { Direction::Tx } else { Direction::Rx };
         let raw = RawFrame { direction, endpoint: "ground", link: link.clone(), bytes };
-        log.write(&Record::RawFrame(raw), time_ns).map_err(failed)?;
+        log.write(&Record::RawFrame(raw), time_ns)?;
         if let Some(frame) = understood.filter(|_| direction == Direction::Rx) {
             for record in fold.take(&frame, since_us as f64 / 1e6) {
                 imported.telemetry += u64::from(matches!(record, Record::Telemetry(_)));
-                log.write(&record, time_ns).map_err(failed)?;
+                log.write(&record, time_ns)?;
             }
         }
         next = frames.next_frame().map_err(read)?;
@@ -224,7 +206,7 @@ pub fn import_tlog<'a>(
     }
     imported.mavlink1 = frames.mavlink1();
     imported.garbage_bytes = frames.garbage_bytes();
-    log.finish().map_err(failed)?;
+    log.finish()?;
     Ok(imported)
 }
 

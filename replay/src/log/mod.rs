@@ -11,8 +11,8 @@ mod recording;
 mod verdict;
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom, Write as _};
-use std::path::Path;
+use std::io::{self, BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom};
+use std::path::{Path, PathBuf};
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
 use flights::InFlight;
@@ -21,7 +21,7 @@ pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 use mcap::records::{Record as McapRecord, op};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
 use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
-use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{frame_descriptor, misread_frame};
@@ -29,7 +29,7 @@ pub use recording::{Recording, RecordingError};
 use verdict::contradiction;
 pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
 
-use crate::output::{Destination, NewFile};
+use crate::output::{Destination, NewFile, WriteError};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -281,15 +281,8 @@ fn listed(topics: &[String]) -> String {
 
 /// A log being written; see [`NewFile`].
 pub(crate) struct NewLog {
+    path: PathBuf,
     writer: LogWriter<BufWriter<NewFile>>,
-}
-
-/// Why a new log could not be written.
-pub(crate) enum NewLogError {
-    /// The file exists or cannot be created.
-    Create(std::io::Error),
-    /// Writing failed.
-    Write(LogWriteError),
 }
 
 impl NewLog {
@@ -297,22 +290,22 @@ impl NewLog {
         destination: Destination,
         input: &Path,
         header: &LogHeader,
-    ) -> Result<Self, NewLogError> {
-        let file = NewFile::create(destination, input).map_err(NewLogError::Create)?;
-        let writer = LogWriter::new(BufWriter::new(file), header).map_err(NewLogError::Write)?;
-        Ok(Self { writer })
+    ) -> Result<Self, WriteError> {
+        let path = destination.path.to_owned();
+        let file = BufWriter::new(NewFile::create(destination, input)?);
+        let writer = LogWriter::new(file, header).map_err(io::Error::other).map_err(WriteError::at(&path))?;
+        Ok(Self { path, writer })
     }
 
-    pub(crate) fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), NewLogError> {
-        self.writer.write(record, time_ns).map_err(NewLogError::Write)
+    pub(crate) fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), WriteError> {
+        let written = self.writer.write(record, time_ns).map_err(io::Error::other);
+        written.map_err(WriteError::at(&self.path))
     }
 
-    pub(crate) fn finish(self) -> Result<(), NewLogError> {
-        let failed = |error| NewLogError::Write(mcap::McapError::from(error).into());
-        let mut file = self.writer.finish().map_err(NewLogError::Write)?;
-        file.flush().map_err(failed)?;
-        let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
-        file.commit().map_err(failed)
+    pub(crate) fn finish(self) -> Result<(), WriteError> {
+        let file = self.writer.finish().map_err(io::Error::other);
+        let file = file.and_then(|file| file.into_inner().map_err(io::IntoInnerError::into_error));
+        file.map_err(WriteError::at(&self.path))?.commit()
     }
 }
 

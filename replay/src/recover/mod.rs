@@ -20,7 +20,7 @@ use write::Rescue;
 
 use crate::cli::{Outcome, answer};
 use crate::log::LogError;
-use crate::output::{Destination, Overwrite};
+use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{counted, print_json, shown};
 
 /// Why nothing could be recovered.
@@ -37,20 +37,8 @@ pub enum RecoverError {
         /// What is wrong with it first.
         reason: Option<String>,
     },
-    /// The file cannot be created.
-    #[error("{}: cannot be created", path.display())]
-    Create {
-        path: PathBuf,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
-    /// Writing failed.
-    #[error("{}: cannot be written", path.display())]
-    Write {
-        path: PathBuf,
-        /// Error from the writer.
-        source: mcap::McapError,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 /// A stretch of a file that could not be kept.

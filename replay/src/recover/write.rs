@@ -8,9 +8,9 @@ use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 
+use super::Recovery;
 use super::scan::WriterReport;
-use super::{RecoverError, Recovery};
-use crate::output::{Destination, NewFile};
+use crate::output::{Destination, NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
 const CHUNK_BYTES: u64 = 64 * 1024;
@@ -45,14 +45,11 @@ impl<'a> Rescue<'a> {
         destination: Destination,
         input: &Path,
         told: &'a WriterReport,
-    ) -> Result<Self, RecoverError> {
-        let path = destination.path;
-        let file = NewFile::create(destination, input)
-            .map_err(|source| RecoverError::Create { path: path.to_owned(), source })?;
+    ) -> Result<Self, WriteError> {
         Ok(Self {
-            path: path.to_owned(),
+            path: destination.path.to_owned(),
             told,
-            state: State::Waiting(file),
+            state: State::Waiting(NewFile::create(destination, input)?),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             span_ns: None,
@@ -72,7 +69,7 @@ impl<'a> Rescue<'a> {
     }
 
     /// Keeps a record, or every record of a chunk.
-    pub(super) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), RecoverError> {
+    pub(super) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
         let kept = if opcode == op::CHUNK {
             self.chunks += 1;
             // It was read before without an error; a file that has changed since then is lost here.
@@ -170,7 +167,7 @@ impl<'a> Rescue<'a> {
         }
     }
 
-    pub(super) fn finish(mut self, recovery: &mut Recovery) -> Result<(), RecoverError> {
+    pub(super) fn finish(mut self, recovery: &mut Recovery) -> Result<(), WriteError> {
         recovery.messages = self.messages;
         recovery.chunks = self.chunks;
         recovery.records_about = self.records_about;
@@ -194,12 +191,12 @@ impl<'a> Rescue<'a> {
         writer.finish()?;
         if let State::Writing(writer) = std::mem::replace(&mut self.state, State::Gone) {
             let file = writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
-            file.commit()?;
+            file.commit().map_err(|error| error.source)?;
         }
         Ok(())
     }
 
-    fn failed(&self, source: mcap::McapError) -> RecoverError {
-        RecoverError::Write { path: self.path.clone(), source }
+    fn failed(&self, error: mcap::McapError) -> WriteError {
+        WriteError::at(&self.path)(std::io::Error::other(error))
     }
 }

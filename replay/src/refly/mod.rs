@@ -28,7 +28,7 @@ use flight::rules::phase::Phase;
 pub use prepared::Prepared;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
-use protocol::log::writer::{LogHeader, LogWriteError};
+use protocol::log::writer::LogHeader;
 use serde::Serialize;
 use sim::sortie::SetUpError;
 use sim::world::whole::WorldError;
@@ -36,8 +36,8 @@ use sim::world::whole::WorldError;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};
 use crate::info::VerdictFacts;
-use crate::log::{Clock, ClockTime, NewLog, NewLogError, Recording, RecordingError};
-use crate::output::{Destination, Overwrite};
+use crate::log::{Clock, ClockTime, NewLog, Recording, RecordingError};
+use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
 use crate::settings::{Setting, SettingArguments, SettingError};
 
@@ -300,25 +300,6 @@ pub fn margin(verdict: &VerdictFacts) -> f64 {
     fractions.fold(f64::INFINITY, f64::min)
 }
 
-/// Why a log could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReflyLogError {
-    /// The file exists or cannot be created.
-    #[error("{}: cannot be created", path.display())]
-    Create {
-        path: PathBuf,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
-    /// Writing failed.
-    #[error("{}: cannot be written", path.display())]
-    Write {
-        path: PathBuf,
-        /// Error from the writer.
-        source: LogWriteError,
-    },
-}
-
 /// Writes a re-flown flight as a log that every command accepts.
 ///
 /// # Errors
@@ -329,19 +310,14 @@ pub fn write_log<'a>(
     options: &ReflyOptions,
     report: &ReflyReport,
     flight: &ReflownFlight,
-) -> Result<(), ReflyLogError> {
+) -> Result<(), WriteError> {
     let destination = destination.into();
-    let path = destination.path;
-    let failed = |error| match error {
-        NewLogError::Create(source) => ReflyLogError::Create { path: path.to_owned(), source },
-        NewLogError::Write(source) => ReflyLogError::Write { path: path.to_owned(), source },
-    };
     let header = header(recording, options, report, flight);
-    let mut log = NewLog::create(destination, Path::new(&recording.name), &header).map_err(failed)?;
+    let mut log = NewLog::create(destination, Path::new(&recording.name), &header)?;
     for (time_s, record) in records(report, flight) {
-        log.write(&record, (time_s.max(0.0) * 1e9) as u64).map_err(failed)?;
+        log.write(&record, (time_s.max(0.0) * 1e9) as u64)?;
     }
-    log.finish().map_err(failed)
+    log.finish()
 }
 
 fn header(

@@ -81,7 +81,7 @@ p, ul { margin: 6px 0; max-width: 80ch; }
 .muted { color: var(--muted); }
 .verdict { font-size: 26px; font-weight: 700; margin: 12px 0; }
 .good { color: var(--good); } .bad { color: var(--bad); }
-.wide { overflow-x: auto; }
+.wide, pre { overflow-x: auto; }
 table { border-collapse: collapse; margin: 8px 0; }
 th, td { text-align: left; padding: 4px 12px 4px 0; border-bottom: 1px solid var(--grid); vertical-align: middle; }
 th { color: var(--muted); font-weight: 600; }
@@ -92,14 +92,12 @@ figure { margin: 0; overflow-x: auto; background: var(--card); border-radius: 6p
 figure.full { grid-column: 1 / -1; } figure.full svg { min-width: 640px; } figure.tall { grid-row: span 3; }
 figure.square { grid-row: span 2; }
 svg { display: block; width: 100%; height: auto; }
-svg text { fill: var(--muted); font: 11px system-ui, sans-serif; }
-svg .title { fill: var(--fg); font-size: 13px; font-weight: 600; }
+svg text { fill: var(--muted); font: 11px system-ui, sans-serif; } svg .ground { fill: none; }
 svg .grid { stroke: var(--grid); stroke-width: 1; }
 svg .frame { stroke: var(--line); fill: none; }
 svg .limit { stroke: var(--bad); stroke-width: 1; stroke-dasharray: 5 4; }
-svg .mark { stroke: var(--muted); stroke-width: 1; stroke-dasharray: 2 3; }
 svg .l { fill: none; stroke-width: 1.8; stroke-linejoin: round; stroke-linecap: round; }
-svg .place { fill: var(--fg); } svg .label { fill: var(--fg); }
+svg circle.text { fill: var(--fg); }
 svg .a { stroke: var(--a); } svg .b { stroke: var(--b); stroke-dasharray: 7 3; } svg .c { stroke: var(--c); }
 svg .d { stroke: var(--d); stroke-dasharray: 2 2; } svg .thin { stroke: var(--muted); stroke-width: 0.7; fill: none; }
 svg .fa { fill: var(--a); } svg .fb { fill: var(--b); } svg .fc { fill: var(--c); } svg .fd { fill: var(--d); }

@@ -11,13 +11,13 @@ mod track;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use track::Flight;
 
 use crate::cli::{Outcome, answer, warn_of_completeness};
 use crate::info::{Completeness, Info, info};
 use crate::log::{Recording, RecordingError};
-use crate::output::{Destination, NewFile, Overwrite, same_file};
+use crate::output::{Destination, Overwrite, same_file, write_whole};
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -94,12 +94,7 @@ impl Args {
             bail!("{}: is a log that is being read", path.display());
         }
         let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
-        NewFile::create(destination, &self.file)
-            .and_then(|mut file| {
-                file.write_all(html.as_bytes())?;
-                file.commit()
-            })
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
+        write_whole(destination, &self.file, |file| file.write_all(html.as_bytes()))?;
         answer(|output| writeln!(output, "{}", path.display()))?;
         warn_of_completeness(&page.name, &page.completeness);
         Ok(Outcome::Given)

@@ -190,7 +190,7 @@ fn the_command_exports_and_imports_logs() {
     let (code, stdout, _) = run(&mut replay("export", &tlog));
     assert!(code == 0 && stdout.contains("flight.mcap: "), "{stdout}");
     let (code, _, stderr) = run(&mut replay("export", &tlog));
-    assert!(code == 2 && stderr.contains("cannot be created"), "{stderr}");
+    assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
     let (code, stdout, _) = run(replay("report", &at("flight.mcap")).arg("--output").arg(at("page.html")));
     assert!(code == 0 && stdout.contains("page.html"), "{stdout}");
     assert!(std::fs::read_to_string(at("page.html")).unwrap().starts_with("<!DOCTYPE html>"));
@@ -218,7 +218,7 @@ fn a_recovery_is_reported_and_never_overwrites() {
     let (code, _, _) = run(replay("verify", &output).arg("--strict"));
     assert_eq!(code, 1, "the repair does not make a whole flight of it");
     let (code, _, stderr) = run(replay("recover", &cut).arg(&output));
-    assert!(code == 2 && stderr.contains("cannot be created"), "{stderr}");
+    assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
     let (code, _, stderr) =
         run(replay("recover", &files.file(b"nothing")).arg(files.directory.path().join("x")));
     assert!(code == 2 && stderr.contains("is not a flight log"), "{stderr}");

@@ -60,7 +60,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
     let places: Vec<usize> =
         order.iter().map(|words| page.find(words).unwrap_or_else(|| panic!("{words}"))).collect();
     assert!(places.is_sorted(), "{places:?}");
-    assert!(page.contains(">planned<") && page.contains("prefers-color-scheme: dark"));
+    assert!(page.contains("\nplanned\n") && page.contains("prefers-color-scheme: dark"));
     assert!(page.matches("<svg").count() > 15);
 }
 
@@ -128,7 +128,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
         assert!(whole.contains(part), "{part}");
     }
     assert_eq!(whole.matches("<svg").count(), 3);
-    assert_eq!(whole.matches("class=\"place\"").count(), 3 * moments.len());
+    assert_eq!(whole.matches("<circle").count(), 3 * moments.len());
 }
 
 /// The estimate is compared with the truth in every direction, up to contact and not after it.

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Printed;
 use crate::cli::{Outcome, answer, in_pool, say, show_progress, stop_on_interrupt};
-use crate::output::{Destination, NewFile, Overwrite};
+use crate::output::{Destination, NewFile, Overwrite, WriteError, write_whole};
 use crate::print::{JunitCase, JunitOutcome, counted, print_json, print_junit, shown, write_junit};
 
 /// Whether the recorded decisions are made again.
@@ -94,13 +94,6 @@ pub enum BaselineError {
         /// Error from the operating system.
         source: std::io::Error,
     },
-    /// It cannot be written.
-    #[error("{}: cannot be written", path.display())]
-    Write {
-        path: PathBuf,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
     /// It is no baseline.
     #[error("{}: is no baseline of `replay verify`: {reason}", path.display())]
     Content { path: PathBuf, reason: String },
@@ -142,13 +135,12 @@ impl Baseline {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
-        let failed = |source| BaselineError::Write { path: path.to_owned(), source };
-        let text = serde_json::to_string_pretty(self).map_err(|error| failed(error.into()))?;
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
         let destination = Destination { path, overwrite: Overwrite::Always };
-        let mut file = NewFile::create(destination, Path::new("")).map_err(failed)?;
-        writeln!(file, "{text}").map_err(failed)?;
-        file.commit().map_err(failed)
+        write_whole(destination, Path::new(""), |file| {
+            let text = serde_json::to_string_pretty(self)?;
+            writeln!(file, "{text}")
+        })
     }
 }
 
