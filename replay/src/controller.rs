@@ -5,14 +5,13 @@ use std::collections::BTreeMap;
 use flight::computer::Output;
 use flight::computer::pilot::Pilot;
 use flight::guidance::baseline::{Controller, Law};
-use flight::guidance::powered::{ControlLevel, LandingSolved, Plane};
+use flight::guidance::powered::{ControlLevel, LandingSolved};
 use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 pub use flight_log::again::FrameError;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::{LoggedInput, level_of, phase_of, start_to_log};
-use nalgebra::Vector3;
 use nmpc::SolveStatus;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
@@ -215,20 +214,4 @@ impl NewPlans {
         self.flown = states.to_vec();
         Some((states, step_s))
     }
-}
-
-/// The path of the centre of gravity in a plan just made, m: x, y, z of the world. It begins at the estimated position;
-/// motion across the plane of the landing is not planned.
-pub fn path_in_world_m(pilot: &Pilot, states: &[PlanarState], step_s: f64) -> Vec<[f64; 3]> {
-    let (Some(plane), Some(estimate), Some(first)) = (pilot.plane(), pilot.estimate(), states.first()) else {
-        return Vec::new();
-    };
-    let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
-    let place = |(node, state): (usize, &PlanarState)| {
-        let over_ground = Plane::over_ground(state, wind_m_s, node as f64 * step_s);
-        let moved =
-            plane.along * (over_ground.x_m - first.x_m) + Vector3::z() * (over_ground.z_m - first.z_m);
-        (estimate.state.position_m + moved).into()
-    };
-    states.iter().enumerate().map(place).collect()
 }

@@ -1,333 +1,248 @@
-//! Exports a log into a recording, record by record.
+//! Writes the recording of a log: what Rerun imports from it, and what it is drawn with.
 
-use std::collections::VecDeque;
-use std::io::{Read, Write};
+use std::io::Write as _;
+use std::path::Path;
 
-use flight::guidance::powered::ControlLevel;
-use protocol::log::flight_v1::TruthSample;
-use protocol::log::v1::{LandingVerdict as RecordedVerdict, Telemetry};
-use replay::log::LoggedFrame;
-use replay::log::{Entry, FlightLog, StampedEntry};
-use rerun::{RecordingStream, RecordingStreamResult};
+use flight::vehicle::mission::Mission;
+use re_lenses::{CastTo, Lens, LensBuilderError, LensError, Lenses, OutputMode, Selector, default_runtime};
+use re_mcap::{DecoderRegistry, McapFile, TopicFilter};
+use replay::log::{Entry, FlightLog, LogError};
+use replay::output::{Destination, NewFile, WriteError, same_file};
+use rerun::archetypes::{LineStrips3D, Points3D, Transform3D};
+use rerun::components::Radius;
+use rerun::datatypes::Rgba32;
+use rerun::external::re_log_encoding::EncodeError;
+use rerun::log::Chunk;
+use rerun::time::TimeType;
+use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamError, TimeColumn};
 
-use crate::ExportError;
-use crate::again::{Again, FrameAgain};
-use crate::identity;
-use crate::layout::send_layout;
-use crate::plot_list::{Plot, limits_of, plots_of};
-use crate::plots::{Plots, Whose};
-use crate::pose::{
-    Pose, rocket_from_nozzle, rocket_from_nozzle_in_space, world_from_rocket_in_space, world_from_telemetry,
-};
-use crate::rrd::{Batches, RrdWriter};
-use crate::scene::{Extent, Scene, Seen};
-use crate::survey::{PoseSource, StampedEvent, Survey};
-use crate::times::Times;
-use crate::words;
+use crate::layout::layout;
+use crate::shape::RocketShape;
 
-/// Summary of an export.
+/// The timeline of both flights: time since the start of each log.
+pub const FLIGHT_TIME: &str = "flight_time";
+/// The entities of the second flight lie below this one.
+pub const BESIDE: &str = "/beside";
+
+/// Recordings of one application share a layout in the viewer.
+const APPLICATION: &str = "touchdown";
+/// The timeline of the import.
+const LOG_TIME: &str = "message_log_time";
+
+const PAD: Rgba32 = Rgba32::from_rgb(150, 158, 168);
+const LIMIT: Rgba32 = Rgba32::from_rgb(220, 70, 70);
+const MARKER: Rgba32 = Rgba32::from_rgb(255, 255, 255);
+const FLOWN: Rgba32 = Rgba32::from_rgb(110, 190, 255);
+const FLOWN_BESIDE: Rgba32 = Rgba32::from_rgb(255, 120, 190);
+
+/// Why a log could not be exported. Damage inside a log is not a reason.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// A log cannot be used.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Rerun's import of MCAP cannot be set up.
+    #[error("Rerun cannot import the log")]
+    Import(#[from] LensBuilderError),
+    /// Rerun refuses a record.
+    #[error("Rerun refused a record")]
+    Record(#[from] RecordingStreamError),
+    /// Rerun cannot encode the recording.
+    #[error("the recording cannot be encoded")]
+    Encode(#[from] EncodeError),
+}
+
+/// What was exported of a log.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Exported {
-    /// Frames of the flight computer.
-    pub ticks: u64,
     /// Records that carry the pose of the rocket.
-    pub poses: u64,
-    pub events: u64,
-    /// Events that were left out: unreadable, or too many.
-    pub events_left_out: u64,
-    /// Flight records that this build cannot read; not exported.
-    pub unreadable: u64,
-    /// Why the first of them cannot be read.
-    pub first_unreadable: Option<String>,
-    /// Why this build cannot use the log's profile, if so.
-    pub profile_problem: Option<String>,
+    pub poses: usize,
+    pub events: usize,
     /// What ended the reading early.
     pub damage: Option<String>,
+    /// Why this build cannot use the log's mission, if so.
+    pub mission_problem: Option<String>,
 }
 
-/// When a log is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Pace {
-    /// After the flight; the survey has seen all of it.
-    Afterwards,
-    /// While it is being written; the survey has seen its beginning.
-    Live,
-}
-
-/// Writes the recording of a log to any output.
+/// Writes the recording of a log, and of another one beside it. The file appears when it is complete.
 ///
 /// # Errors
-/// The log cannot be used, or the recording cannot be written.
-pub fn export<R: Read, W: Write + Send + 'static>(
-    log: &mut FlightLog<R>,
-    survey: &Survey,
-    output: W,
-) -> Result<(Exported, W), ExportError> {
-    let writer = RrdWriter::new(identity::builder(log.name(), survey), output, Batches::Large)?;
-    let exported = fill(writer.recording(), log, survey, Pace::Afterwards)?;
-    Ok((exported, writer.finish()?))
-}
-
-/// Writes two flights into one recording: the second one in other colours, below the first one's entities, on the same
-/// clock. What was done with the second log is the second answer.
-///
-/// # Errors
-/// As [`export`].
-pub fn export_two<R: Read, W: Write + Send + 'static>(
-    (log, survey): (&mut FlightLog<R>, &Survey),
-    (other, other_survey): (&mut FlightLog<R>, &Survey),
-    output: W,
-) -> Result<(Exported, Exported, W), ExportError> {
-    let builder = || identity::builder(log.name(), survey);
-    let writer = RrdWriter::new(builder(), output, Batches::Large)?;
-    let below = writer.beside(builder())?;
-    let (of_other, beside) =
-        Export::new(&below, other_survey, Whose::Beside, Pace::Afterwards)?.run(other)?;
-    below.flush_blocking().map_err(|error| ExportError::Encode { reason: error.to_string() })?;
-    let recording = writer.recording();
-    let (done, own) = Export::new(recording, survey, Whose::Own, Pace::Afterwards)?.run(log)?;
-    let shown = Shown { extent: own.extent.around(&beside.extent), ..own };
-    shown.send(recording)?;
-    Ok((done, of_other, writer.finish()?))
-}
-
-/// Fills a recording with a log.
-pub(crate) fn fill<R: Read>(
-    recording: &RecordingStream,
-    log: &mut FlightLog<R>,
-    survey: &Survey,
-    pace: Pace,
-) -> Result<Exported, ExportError> {
-    let (done, shown) = Export::new(recording, survey, Whose::Own, pace)?.run(log)?;
-    shown.send(recording)?;
-    Ok(done)
-}
-
-/// What the layout depends on.
-pub(crate) struct Shown {
-    extent: Extent,
-    plots: Vec<&'static Plot>,
-    phases_as_text: bool,
-}
-
-impl Shown {
-    /// Everything that a flight may have, in the space where it is expected.
-    pub(crate) fn expected(survey: &Survey) -> Self {
-        Self {
-            extent: Extent::expected(survey),
-            plots: plots_of(survey).iter().collect(),
-            phases_as_text: true,
-        }
+/// A log cannot be used, or the recording cannot be written.
+pub fn export(log: &Path, beside: Option<&Path>, to: Destination<'_>) -> Result<Vec<Exported>, ExportError> {
+    let cannot_write = WriteError::at(to.path);
+    if beside.is_some_and(|beside| same_file(beside, to.path)) {
+        return Err(cannot_write(std::io::Error::other("it is one of the logs")).into());
     }
-
-    pub(crate) fn send(&self, recording: &RecordingStream) -> RecordingStreamResult<()> {
-        send_layout(recording, identity::APPLICATION, &self.extent, &self.plots, self.phases_as_text)
+    let mut file = NewFile::create(to, log)?;
+    let own = Survey::of(log)?;
+    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
+    let (recording, messages) = RecordingStreamBuilder::new(APPLICATION)
+        .enabled(true)
+        .recording_id(format!("{}-{stem}", own.start_ns))
+        .recording_name(stem)
+        .memory()?;
+    recording.set_log_tick_enabled(false);
+    recording.set_log_time_enabled(false);
+    own.draw(&recording, "", FLOWN)?;
+    let mut exported = vec![own.import(&recording, log, "")?];
+    let mut topics = own.topics;
+    if let Some(beside) = beside {
+        let other = Survey::of(beside)?;
+        other.draw(&recording, BESIDE, FLOWN_BESIDE)?;
+        exported.push(other.import(&recording, beside, BESIDE)?);
+        topics.extend(other.topics);
     }
+    layout(&topics).send(&recording, rerun::blueprint::BlueprintActivation::default())?;
+    file.write_all(&messages.drain_as_bytes()?).map_err(cannot_write)?;
+    file.commit()?;
+    Ok(exported)
 }
 
-/// An export in progress.
-struct Export<'a> {
-    recording: &'a RecordingStream,
-    survey: &'a Survey,
-    whose: Whose,
-    pace: Pace,
-    /// The best source of the pose so far.
-    pose_source: PoseSource,
-    waiting: VecDeque<StampedEvent>,
-    times: Times,
-    scene: Scene<'a>,
-    plots: Plots<'a>,
-    again: Again,
-    /// Whether the flight computer, run again, currently follows a plan.
-    planning: bool,
-    verdict: Option<RecordedVerdict>,
-    done: Exported,
+/// What is read of a log before its import.
+#[derive(Default)]
+struct Survey {
+    start_ns: i64,
+    mission: Option<Mission>,
+    path_m: Vec<[f32; 3]>,
+    topics: Vec<String>,
+    exported: Exported,
 }
 
-impl<'a> Export<'a> {
-    fn new(
-        recording: &'a RecordingStream,
-        survey: &'a Survey,
-        whose: Whose,
-        pace: Pace,
-    ) -> Result<Self, ExportError> {
-        Ok(Self {
-            recording,
-            survey,
-            whose,
-            pace,
-            pose_source: survey.pose_source,
-            // A log that is being written tells its events one by one.
-            waiting: if pace == Pace::Live { VecDeque::new() } else { survey.events.clone().into() },
-            times: Times::default(),
-            scene: Scene::new(recording, survey, whose)?,
-            plots: Plots::new(recording, whose),
-            again: Again::default(),
-            planning: false,
-            verdict: None,
-            done: Exported {
-                events_left_out: survey.events_left_out,
-                profile_problem: survey.profile_problem.clone(),
-                ..Exported::default()
-            },
-        })
-    }
-
-    fn run<R: Read>(mut self, log: &mut FlightLog<R>) -> Result<(Exported, Shown), ExportError> {
-        while let Some(StampedEntry { entry, log_time_ns, sequence, .. }) = log.next_entry()? {
-            if self.times.known() {
-                self.events_until(log_time_ns)?;
-            }
-            self.pose_source = self.pose_source.max(source_of(&entry));
-            match entry {
-                Entry::Telemetry(telemetry) => self.telemetry(&telemetry, log_time_ns)?,
-                Entry::Verdict(verdict) => {
-                    self.times.at_vehicle_time(self.recording, verdict.time_s);
-                    words::verdict(self.recording, &verdict)?;
-                    self.verdict = Some(*verdict);
+impl Survey {
+    fn of(path: &Path) -> Result<Self, LogError> {
+        let mut log = FlightLog::open(path)?;
+        let mut found = Self::default();
+        let mut first_ns = None;
+        while let Some(stamped) = log.next_entry()? {
+            first_ns.get_or_insert(stamped.log_time_ns);
+            match stamped.entry {
+                Entry::World(truth) => {
+                    let at = &truth.state.position_m;
+                    let at_m = [at.x, at.y, at.z].map(|value| value as f32);
+                    found.exported.poses += 1;
+                    // On the pad it stays where it is.
+                    if found.path_m.last() != Some(&at_m) {
+                        found.path_m.push(at_m);
+                    }
                 }
-                Entry::Unreadable { reason } => {
-                    self.done.unreadable += 1;
-                    self.done.first_unreadable.get_or_insert(reason);
-                }
-                Entry::ComputerStart(start) => self.again.start(self.survey, &start),
-                Entry::ComputerFrame(frame) => self.frame(&frame, sequence, log_time_ns)?,
-                Entry::PilotTiming(timing) => {
-                    self.times.learn(timing.time_s, log_time_ns);
-                    self.times.at_vehicle_time(self.recording, timing.time_s);
-                    self.plots.timing(&timing)?;
-                }
-                Entry::World(truth) => self.world(&truth, log_time_ns)?,
-                Entry::Event(event) if self.pace == Pace::Live => {
-                    self.waiting.push_back(StampedEvent::of(&event, log_time_ns));
-                }
-                Entry::Estimate(_) | Entry::RawFrame | Entry::Operator | Entry::Event(_) | Entry::Other => {}
+                Entry::Event(_) => found.exported.events += 1,
+                _ => {}
             }
         }
-        self.events_until(u64::MAX)?;
-        self.done.damage = log.damage().map(ToString::to_string);
-        if let Some(span) = self.times.span().filter(|_| self.whose == Whose::Own) {
-            self.plots.limits(&limits_of(self.survey, self.verdict.as_ref()), span)?;
-        }
-        let Self { recording, survey, scene, verdict, plots, again, done, .. } = self;
-        let again = again.words();
-        let remarks = words::Remarks { damage: done.damage.as_deref(), again: again.as_deref() };
-        words::report(recording, log.name(), survey, verdict.as_ref(), remarks)?;
-        let extent = scene.finish()?;
-        let plots = plots_of(survey).iter().filter(|plot| plots.has(plot)).collect();
-        Ok((
-            done,
-            Shown { extent, plots, phases_as_text: self.pace == Pace::Live || survey.events.is_empty() },
-        ))
-    }
-
-    /// A frame of the flight computer; its values are plotted with the truth.
-    fn frame(&mut self, frame: &LoggedFrame, record: u32, log_time_ns: u64) -> RecordingStreamResult<()> {
-        let in_flight = frame.tick.zip(frame.flight_time_s());
-        if let Some((tick, time_s)) = in_flight {
-            self.times.learn(time_s, log_time_ns);
-            self.times.tick(tick);
-            self.times.at_vehicle_time(self.recording, time_s);
-        }
-        let flown = self.run_again(|again| again.frame(&frame.record, record))?;
-        if in_flight.is_none() {
-            return Ok(());
-        }
-        self.done.ticks += 1;
-        self.phase(frame.record.output.phase)?;
-        self.plots.level(frame.record.output.level)?;
-        let Some(FrameAgain { tick: again, plan }) = flown else { return Ok(()) };
-        self.plots.frame_again(&again, plan.as_ref().map(|(_, iterations)| *iterations))?;
-        let planning = again.output.level != u32::from(ControlLevel::Idle.index());
-        match plan {
-            Some((path_m, _)) => self.scene.path(path_m, again.output.phase)?,
-            // A plan that is no longer followed is no longer shown.
-            None if self.planning && !planning => self.scene.path(Vec::new(), again.output.phase)?,
+        let head = log.head();
+        let start_ns = head.run.get("start_unix_ns").and_then(|text| text.parse().ok()).or(first_ns);
+        found.start_ns = start_ns.and_then(|start_ns| i64::try_from(start_ns).ok()).unwrap_or(0);
+        found.topics = log.channels().map(|(_, channel)| channel.topic.clone()).collect();
+        found.exported.damage = log.damage().map(ToString::to_string);
+        match head.profile_toml.as_ref().and_then(|text| text.as_ref().ok()) {
             None => {}
+            Some(text) => match flight::vehicles::mission::from_toml(text, "profile.toml") {
+                Ok(mission) => found.mission = Some(mission),
+                Err(error) => found.exported.mission_problem = Some(error.to_string()),
+            },
         }
-        self.planning = planning;
-        Ok(())
+        Ok(found)
     }
 
-    /// Runs the controller again, and records where it first differs or ends.
-    fn run_again<T>(
-        &mut self,
-        run: impl FnOnce(&mut Again) -> Option<T>,
-    ) -> RecordingStreamResult<Option<T>> {
-        let before = (self.again.first_different, self.again.obstacle.is_some());
-        let again = run(&mut self.again);
-        if let (None, Some(frame)) = (before.0, self.again.first_different) {
-            words::replay(self.recording, &format!("frame {frame}, run again, differs from the record"))?;
-        }
-        if let (false, Some(reason)) = (before.1, &self.again.obstacle) {
-            words::replay(self.recording, &format!("from here on nothing is run again: {reason}"))?;
-        }
-        Ok(again)
-    }
-
-    fn world(&mut self, truth: &TruthSample, log_time_ns: u64) -> RecordingStreamResult<()> {
-        self.times.learn(truth.time_s, log_time_ns);
-        self.times.at_vehicle_time(self.recording, truth.time_s);
-        self.plots.in_space(truth)?;
-        let angle = |axis: usize| truth.gimbal_actual_rad.get(axis).copied().unwrap_or(0.0);
-        let nozzle = rocket_from_nozzle_in_space([angle(0), angle(1)], self.scene.pivot_x_m());
-        let weights = self.scene.in_weights(truth.thrust_n, truth.mass_kg);
-        self.rocket(world_from_rocket_in_space(&truth.state), nozzle, Some(weights))
-    }
-
-    fn telemetry(&mut self, telemetry: &Telemetry, log_time_ns: u64) -> RecordingStreamResult<()> {
-        self.times.learn(telemetry.time_s, log_time_ns);
-        self.times.at_vehicle_time(self.recording, telemetry.time_s);
-        let alone = self.pose_source == PoseSource::Telemetry;
-        self.plots.telemetry(telemetry, alone)?;
-        if !alone {
-            return Ok(());
-        }
-        if let Some(phase) = telemetry.phase {
-            self.phase(phase)?;
-        }
-        let (Some(z_m), Some(theta_rad)) = (telemetry.altitude_m, telemetry.pitch_rad) else {
-            return Ok(());
+    /// Records what never moves: the shape of the rocket in its own axes, the pad, and the path that was flown.
+    fn draw(
+        &self,
+        recording: &RecordingStream,
+        below: &str,
+        flown: Rgba32,
+    ) -> Result<(), RecordingStreamError> {
+        let shape = self.mission.as_ref().map_or_else(RocketShape::unknown, |mission| {
+            RocketShape::of_airframe(&mission.airframe, mission.motor_curve.propellant_mass_kg())
+        });
+        let at = |entity: &str| format!("{below}/world/{entity}");
+        recording.log_static(at("rocket/body"), &shape.body())?;
+        recording.log_static(at("rocket/legs"), &shape.legs())?;
+        recording.log_static(at("rocket/bell"), &shape.bell())?;
+        // In a view of the whole flight the rocket is small.
+        let marker = Points3D::new([[0.0; 3]]).with_colors([MARKER]);
+        recording.log_static(at("rocket/marker"), &marker.with_radii([Radius::new_ui_points(5.0)]))?;
+        let lines = |strips: Vec<Vec<[f32; 3]>>, color| {
+            LineStrips3D::new(strips).with_colors([color]).with_radii([Radius::new_ui_points(1.0)])
         };
-        let rocket = world_from_telemetry(telemetry.x_m.unwrap_or(0.0), z_m, theta_rad);
-        let gimbal_rad = telemetry.gimbal_measured_rad.filter(|angle| angle.is_finite()).unwrap_or(0.0);
-        let nozzle = rocket_from_nozzle(gimbal_rad, self.scene.pivot_x_m());
-        self.rocket(rocket, nozzle, None)
-    }
-
-    fn rocket(
-        &mut self,
-        rocket: Pose,
-        nozzle: Pose,
-        thrust_in_weights: Option<f64>,
-    ) -> RecordingStreamResult<()> {
-        self.done.poses += 1;
-        self.scene.rocket(&Seen { rocket, nozzle, thrust_in_weights })
-    }
-
-    fn phase(&mut self, phase: u32) -> RecordingStreamResult<()> {
-        match self.plots.phase(phase)? {
-            Some(name) => words::phase(self.recording, &name),
-            None => Ok(()),
+        let length_m = shape.length_m();
+        let mut pad: Vec<_> = [length_m, length_m / 2.0].map(circle).to_vec();
+        pad.push(vec![[-length_m, 0.0, 0.0], [length_m, 0.0, 0.0]]);
+        pad.push(vec![[0.0, -length_m, 0.0], [0.0, length_m, 0.0]]);
+        recording.log_static(at("pad"), &lines(pad, PAD))?;
+        if let Some(mission) = &self.mission {
+            let limit = circle(mission.touchdown_limits.x_m as f32);
+            recording.log_static(at("pad/limit"), &lines(vec![limit], LIMIT))?;
         }
+        recording.log_static(at("flown"), &lines(vec![self.path_m.clone()], flown))
     }
 
-    /// Events have log time only, so they wait until log time can be converted to vehicle time.
-    fn events_until(&mut self, log_time_ns: u64) -> RecordingStreamResult<()> {
-        while let Some(event) = self.waiting.pop_front_if(|event| event.log_time_ns <= log_time_ns) {
-            self.times.at_log_time(self.recording, event.log_time_ns);
-            words::event(self.recording, &event)?;
-            self.done.events += 1;
+    /// Records everything that Rerun reads from a log, on the clock of the flight.
+    fn import(&self, recording: &RecordingStream, path: &Path, below: &str) -> Result<Exported, ExportError> {
+        let lenses = lenses()?;
+        let emit = |chunk: Chunk| {
+            for made in lenses.apply(&chunk, &default_runtime()) {
+                let made = made.map_or_else(LensError::partial_chunk, Some);
+                recording.send_chunks(made.map(|chunk| self.moved(&chunk, below)));
+            }
+        };
+        let bytes = std::fs::read(path)
+            .map_err(|source| LogError::Read { name: path.display().to_string(), source })?;
+        let log = McapFile::new(bytes, true);
+        let mut exported = self.exported.clone();
+        let imported = log.summary().map_err(Into::into).and_then(|summary| {
+            let plan = DecoderRegistry::all_without_raw_fallback();
+            let plan = plan.plan(log.bytes(), &summary, &TopicFilter::default())?;
+            plan.run(log.bytes(), &summary, TimeType::TimestampNs, &emit)
+        });
+        if let Err(error) = imported {
+            exported.damage.get_or_insert(format!("{error:#}"));
         }
-        Ok(())
+        Ok(exported)
+    }
+
+    /// A chunk of this log with the time since its start, below an entity.
+    fn moved(&self, chunk: &Chunk, below: &str) -> Chunk {
+        let mut moved = chunk.clone_with_new_entity_path(format!("{below}{}", chunk.entity_path()).into());
+        let log_time = chunk.timelines().get(&LOG_TIME.into());
+        let since_start = log_time.map(|times| {
+            let since_ns = times.times_raw().iter().map(|time_ns| time_ns.saturating_sub(self.start_ns));
+            TimeColumn::new_duration_nanos(FLIGHT_TIME, since_ns)
+        });
+        if let Some(times) = since_start
+            && moved.add_timeline(times).is_err()
+        {
+            // It has as many rows as the column it was made from.
+            return chunk.clone();
+        }
+        moved
     }
 }
 
-/// The pose that a record brings.
-fn source_of(entry: &Entry) -> PoseSource {
-    match entry {
-        Entry::World(_) => PoseSource::Truth,
-        Entry::Telemetry(_) => PoseSource::Telemetry,
-        _ => PoseSource::None,
-    }
+/// What the import makes of well-known messages: the events as text, and `/tf` as the pose of the entity that is drawn.
+fn lenses() -> Result<Lenses, LensBuilderError> {
+    let transform = |entity: &str| Lens::scatter("foxglove.FrameTransform:message").output_entity(entity);
+    let position = || Selector::parse(".translation | pack(.x!, .y!, .z!)");
+    let attitude = Selector::parse(".rotation | pack(.x!, .y!, .z!, .w!)")?;
+    let rocket = transform("world/rocket")
+        .to_component_with_cast(Transform3D::descriptor_translation(), position()?, CastTo::Auto)
+        .to_component_with_cast(Transform3D::descriptor_quaternion(), attitude, CastTo::Auto)
+        .build()?;
+    // A camera here follows the rocket but does not turn with it.
+    let followed = transform("world/followed")
+        .to_component_with_cast(Transform3D::descriptor_translation(), position()?, CastTo::Auto)
+        .build()?;
+    let events = re_lenses::semantic::foxglove::log(TimeType::TimestampNs)?;
+    Ok(Lenses::new(OutputMode::ForwardAll).add_lens(rocket).add_lens(followed).add_lens(events))
+}
+
+/// A circle around the pad.
+fn circle(radius_m: f32) -> Vec<[f32; 3]> {
+    const EDGES: u8 = 64;
+    let at = |edge: u8| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(edge) / f64::from(EDGES));
+        [radius_m * cos as f32, radius_m * sin as f32, 0.0]
+    };
+    (0..=EDGES).map(at).collect()
 }

@@ -1,203 +1,88 @@
-//! How the viewer shows the recording: its blueprint.
-//!
-//! The paths and archetypes are the viewer's own
-//! (<https://rerun.io/docs/reference/types/archetypes>, blueprint archetypes); they are written one by one because
-//! the ready-made builders have no camera, no grid and no time range.
+//! How the viewer shows the recording: its blueprint. Every other field can be dragged into a plot.
 
-use rerun::components::Plane3D;
-use rerun::datatypes::{TimeInt, TimeRange, TimeRangeBoundary, Uuid, VisibleTimeRange};
-use rerun::external::re_log_types::BlueprintActivationCommand;
-use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, TextLogColumns,
-    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
-};
-use rerun::external::re_sdk_types::blueprint::components::{
-    ColumnShare, ContainerKind, Corner2D, Eye3DKind, IncludedContent, PanelState, QueryExpression,
-    RootContainer, RowShare, TimelineName, ViewClass,
-};
-use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use rerun::{
-    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId, StoreKind,
+use rerun::archetypes::SeriesLines;
+use rerun::blueprint::components::PanelState;
+use rerun::blueprint::{
+    Blueprint, BlueprintPanel, ContainerLike, Grid, Horizontal, SelectionPanel, Spatial3DView, TextLogView,
+    TimePanel, TimeSeriesView, Vertical, VisualizableArchetype as _, Visualizer, VisualizerComponentMapping,
 };
 
-use crate::entity;
-use crate::plot_list::Plot;
-use crate::scene::Extent;
+use crate::export::{BESIDE, FLIGHT_TIME};
 
-/// Sends the layout of a recording.
-pub(crate) fn send_layout(
-    recording: &RecordingStream,
-    application: &'static str,
-    extent: &Extent,
-    plots: &[&Plot],
-    phases_as_text: bool,
-) -> RecordingStreamResult<()> {
-    let blueprint_id = StoreId::random(StoreKind::Blueprint, application);
-    let (stream, messages) =
-        RecordingStreamBuilder::from_store_id(&blueprint_id).send_properties(false).enabled(true).memory()?;
-    stream.set_time_sequence("blueprint", 0);
-    let mut layout = Layout { stream: &stream, made: 0 };
-    let root = layout.whole(extent, plots, phases_as_text)?;
-    stream.log("viewport", &ViewportBlueprint::new().with_root_container(root).with_auto_views(false))?;
-    for panel in ["blueprint_panel", "selection_panel"] {
-        stream.log(panel, &PanelBlueprint::new().with_state(PanelState::Hidden))?;
-    }
-    let time_panel = TimePanelBlueprint::new()
-        .with_state(PanelState::Collapsed)
-        .with_timeline(TimelineName(entity::TIMELINE_FLIGHT_TIME.into()));
-    stream.log("time_panel", &time_panel)?;
-    stream.flush_blocking().ok();
-    let activation = BlueprintActivationCommand { blueprint_id, make_active: true, make_default: true };
-    recording.send_blueprint(messages.take(), activation);
-    Ok(())
+/// A plot: its title, the topic and the message that it shows, and the fields.
+pub struct Plot {
+    title: &'static str,
+    pub topic: &'static str,
+    message: &'static str,
+    pub fields: &'static [&'static str],
 }
 
-struct Layout<'a> {
-    stream: &'a RecordingStream,
-    made: u64,
+const fn plot(
+    title: &'static str,
+    [topic, message]: [&'static str; 2],
+    fields: &'static [&'static str],
+) -> Plot {
+    Plot { title, topic, message, fields }
 }
 
-/// A view or a container of the layout.
-struct Part {
-    path: String,
-    id: Uuid,
-}
+const TRUTH: [&str; 2] = ["/vehicle/truth3d", "touchdown.flight.v1.TruthSample"];
+const TIMING: [&str; 2] = ["/pilot/timing", "touchdown.flight.v1.PilotTiming"];
+const TELEMETRY: [&str; 2] = ["/telemetry", "touchdown.log.v1.Telemetry"];
 
-/// Properties of a view: path below the view, and content.
-type Properties<'p> = [(&'p str, &'p dyn AsComponents)];
+pub const PLOTS: [Plot; 11] = [
+    plot("Height of the feet, m", TRUTH, &[".height_m"]),
+    plot("Vertical speed, m/s", TRUTH, &[".state.velocity_m_s.z"]),
+    plot("Horizontal position, m", TRUTH, &[".state.position_m.x", ".state.position_m.y"]),
+    plot("Horizontal speed, m/s", TRUTH, &[".state.velocity_m_s.x", ".state.velocity_m_s.y"]),
+    plot("Gimbal in pitch, rad", TRUTH, &[".gimbal_commanded_rad[0]", ".gimbal_actual_rad[0]"]),
+    plot("Gimbal in yaw, rad", TRUTH, &[".gimbal_commanded_rad[1]", ".gimbal_actual_rad[1]"]),
+    plot("Thrust, N", TRUTH, &[".thrust_n"]),
+    plot("Time of a frame that plans, s", TIMING, &[".solve_time_s", ".deadline_s"]),
+    plot("Altitude, m (telemetry)", TELEMETRY, &[".altitude_m"]),
+    plot("Pitch, rad (telemetry)", TELEMETRY, &[".pitch_rad"]),
+    plot("Gimbal, rad (telemetry)", TELEMETRY, &[".gimbal_commanded_rad", ".gimbal_measured_rad"]),
+];
 
-impl Layout<'_> {
-    fn whole(
-        &mut self,
-        extent: &Extent,
-        plots: &[&Plot],
-        phases_as_text: bool,
-    ) -> RecordingStreamResult<RootContainer> {
-        let overview = self.overview(extent)?;
-        let close_up = self.close_up(extent)?;
-        let spaces = self.container(ContainerKind::Horizontal, &[&overview, &close_up], &[3.0, 2.0])?;
-        let states = self.view("StateTimeline", "Phase and control level", "states", &["$origin/**"], &[])?;
-        let mut texts = vec!["+ /log/events", "+ /log/replay", "+ /log/verdict", "+ /log/beside/**"];
-        if phases_as_text {
-            texts.push("+ /log/phases");
-        }
-        let columns = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body]
-            .map(|kind| TextLogColumn { visible: true.into(), kind });
-        let columns = TextLogColumns::new().with_text_log_columns(columns);
-        let log = self.view("TextLog", "Events", "log", &texts, &[("TextLogColumns", &columns)])?;
-        let report = self.view("TextDocument", "Verdict and run", entity::REPORT, &["$origin"], &[])?;
-        let words = self.container(ContainerKind::Horizontal, &[&log, &report], &[3.0, 2.0])?;
-        let left = self.container(ContainerKind::Vertical, &[&spaces, &states, &words], &[4.6, 1.7, 2.6])?;
-        let plots = plots
-            .iter()
-            .map(|plot| {
-                let origin = format!("{}/{}", entity::PLOTS, plot.name);
-                let legend = PlotLegend::new().with_corner(Corner2D::RightTop).with_visible(plot.legend);
-                self.view("TimeSeries", plot.title, &origin, &["$origin/**"], &[("PlotLegend", &legend)])
-            })
-            .collect::<RecordingStreamResult<Vec<_>>>()?;
-        let plots: Vec<&Part> = plots.iter().collect();
-        let right = self.container(ContainerKind::Grid, &plots, &[1.0, 1.0])?;
-        let root = self.container(ContainerKind::Horizontal, &[&left, &right], &[5.0, 4.0])?;
-        Ok(RootContainer(root.id))
+impl Plot {
+    /// The component that the import makes of the message.
+    pub fn component(&self) -> String {
+        format!("{}:message", self.message)
     }
 
-    /// The whole flight from the side, x to the right.
-    fn overview(&mut self, extent: &Extent) -> RecordingStreamResult<Part> {
-        let (left_m, right_m) = extent.x_m;
-        let middle_m = f32::midpoint(left_m, right_m);
-        let height_m = (extent.top_m - extent.ground_z_m).max(right_m - left_m).max(4.0 * extent.rocket_m);
-        let target_m = [middle_m, 0.0, extent.ground_z_m + 0.45 * height_m];
-        let eye = EyeControls3D::new()
-            .with_kind(Eye3DKind::Orbital)
-            .with_position([middle_m + 0.45 * height_m, -1.25 * height_m, target_m[2] + 0.25 * height_m])
-            .with_look_target(target_m)
-            .with_eye_up([0.0, 0.0, 1.0]);
-        let grid = LineGrid3D::new().with_plane(Plane3D::new([0.0, 0.0, 1.0], extent.ground_z_m));
-        self.space("Flight", entity::WORLD, &["+ /world/**"], &eye, &grid)
-    }
-
-    /// The camera follows the rocket but does not turn with it.
-    fn close_up(&mut self, extent: &Extent) -> RecordingStreamResult<Part> {
-        let eye = EyeControls3D::new()
-            .with_kind(Eye3DKind::Orbital)
-            .with_position([0.8 * extent.rocket_m, -3.4 * extent.rocket_m, 0.5 * extent.rocket_m])
-            .with_look_target([0.0, 0.0, -0.5 * extent.rocket_m])
-            .with_eye_up([0.0, 0.0, 1.0]);
-        // A grid would move with the camera, so there is none.
-        let grid = LineGrid3D::new().with_visible(false);
-        let contents = ["+ /world/**".to_owned(), format!("- /{}", entity::MARKER)];
-        let contents = contents.each_ref().map(String::as_str);
-        self.space("Rocket", entity::FOLLOWED, &contents, &eye, &grid)
-    }
-
-    fn space(
-        &mut self,
-        name: &str,
-        origin: &str,
-        contents: &[&str],
-        eye: &EyeControls3D,
-        grid: &LineGrid3D,
-    ) -> RecordingStreamResult<Part> {
-        let so_far = VisibleTimeRanges::new([VisibleTimeRange {
-            timeline: entity::TIMELINE_FLIGHT_TIME.into(),
-            range: TimeRange {
-                start: TimeRangeBoundary::Infinite,
-                end: TimeRangeBoundary::CursorRelative(TimeInt(0)),
-            },
-        }]);
-        let trail = format!("ViewContents/overrides/{}/visualizers", entity::TRAIL);
-        let properties: [(&str, &dyn AsComponents); 3] =
-            [("EyeControls3D", eye), ("LineGrid3D", grid), (&trail, &so_far)];
-        self.view("3D", name, origin, contents, &properties)
-    }
-
-    fn view(
-        &mut self,
-        class: &str,
-        name: &str,
-        origin: &str,
-        contents: &[&str],
-        properties: &Properties<'_>,
-    ) -> RecordingStreamResult<Part> {
-        let part = self.part("view");
-        let query = contents.iter().map(|line| QueryExpression((*line).into()));
-        self.stream.log(format!("{}/ViewContents", part.path), &ViewContents::new(query))?;
-        let view =
-            ViewBlueprint::new(ViewClass(class.into())).with_display_name(name).with_space_origin(origin);
-        self.stream.log(part.path.as_str(), &view)?;
-        for (below, content) in properties {
-            self.stream.log(format!("{}/{below}", part.path), *content)?;
-        }
-        Ok(part)
-    }
-
-    fn container(
-        &mut self,
-        kind: ContainerKind,
-        contents: &[&Part],
-        shares: &[f32],
-    ) -> RecordingStreamResult<Part> {
-        let part = self.part("container");
-        let included = contents.iter().map(|content| IncludedContent(content.path.as_str().into()));
-        let container = ContainerBlueprint::new(kind).with_contents(included);
-        let container = match kind {
-            ContainerKind::Vertical => {
-                container.with_row_shares(shares.iter().map(|share| RowShare((*share).into())))
-            }
-            ContainerKind::Grid => container.with_grid_columns(shares.len() as u32),
-            _ => container.with_col_shares(shares.iter().map(|share| ColumnShare((*share).into()))),
+    fn view(&self) -> ContainerLike {
+        let entities = ["", BESIDE].map(|below| format!("{below}{}", self.topic));
+        let view = TimeSeriesView::new(self.title).with_origin("/").with_contents(entities.clone());
+        let lines = |suffix: &str| -> Vec<Visualizer> {
+            let line = |field: &&str| {
+                let source = VisualizerComponentMapping::new_source_component_with_selector(
+                    "Scalars:scalars",
+                    self.component(),
+                    *field,
+                );
+                let name = format!("{}{suffix}", field.trim_start_matches('.'));
+                SeriesLines::new().with_names([name]).visualizer().with_mappings([source.into()])
+            };
+            self.fields.iter().map(line).collect()
         };
-        self.stream.log(part.path.as_str(), &container)?;
-        Ok(part)
+        let [own, beside] = entities;
+        view.with_overrides(own, lines("")).with_overrides(beside, lines(" (beside)")).into()
     }
+}
 
-    /// A unique id in the layout.
-    fn part(&mut self, kind: &str) -> Part {
-        self.made += 1;
-        let mut bytes = [0; 16];
-        bytes[8..].copy_from_slice(&self.made.to_be_bytes());
-        let path = format!("{kind}/00000000-0000-0000-0000-{:012x}", self.made);
-        Part { path, id: Uuid { bytes } }
-    }
+/// The space, the events, and the plots of the topics that the recording has.
+pub(crate) fn layout(topics: &[String]) -> Blueprint {
+    let drawn = ["", BESIDE].map(|below| format!("{below}/world/**"));
+    let flight = Spatial3DView::new("Flight").with_origin("/").with_contents(drawn.clone());
+    let rocket = Spatial3DView::new("Rocket").with_origin("/world/followed").with_contents(drawn);
+    let spaces = Horizontal::new([flight.into(), rocket.into()]).with_column_shares([3.0, 2.0]);
+    let events = ["", BESIDE].map(|below| format!("{below}/events"));
+    let events = TextLogView::new("Events").with_origin("/").with_contents(events);
+    let left = Vertical::new([spaces.into(), events.into()]).with_row_shares([3.0, 1.0]);
+    let plots = PLOTS.iter().filter(|plot| topics.iter().any(|topic| topic == plot.topic)).map(Plot::view);
+    let right = Grid::new(plots.collect::<Vec<_>>()).with_grid_columns(2);
+    Blueprint::new(Horizontal::new([left.into(), right.into()]).with_column_shares([5.0, 4.0]))
+        .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Hidden))
+        .with_selection_panel(SelectionPanel::from_state(PanelState::Hidden))
+        .with_time_panel(TimePanel::new().with_state(PanelState::Collapsed).with_timeline(FLIGHT_TIME))
+        .with_auto_views(false)
 }

@@ -33,7 +33,6 @@ mod overwriting;
 mod pages;
 mod pilot;
 mod plain_answers;
-mod planned_paths;
 mod recovery;
 mod reflown_logs;
 mod simulated;

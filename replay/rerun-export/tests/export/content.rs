@@ -2,101 +2,108 @@
 
 use std::collections::BTreeSet;
 
-use replay_rerun::{Overwrite, entity, export_file};
+use re_lenses::Selector;
+use replay_rerun::{BESIDE, FLIGHT_TIME, PLOTS, export};
 
-use crate::logs::{START_UNIX_NS, TICKS, folder, write_apogee_log, write_log, write_telemetry_log};
+use crate::flown::MK2;
+use crate::logs::{START_UNIX_NS, TICKS, folder, forced, write_apogee_log, write_log, write_telemetry_log};
 use crate::read_back::Recording;
 
 #[test]
 fn a_flight_is_exported_whole() {
     let (_folder, log, rrd) = folder();
     write_log(&log, true);
-    let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses, exported.events), (TICKS, TICKS, 1));
-    assert_eq!((exported.damage, exported.unreadable), (None, 0));
+    let exported = export(&log, None, (&rrd).into()).unwrap();
+    let [own] = exported.as_slice() else { panic!("{exported:?}") };
+    assert_eq!((own.poses, own.events), (TICKS as usize, 1));
+    assert_eq!((&own.damage, &own.mission_problem), (&None, &None));
 
     let recording = Recording::read(&rrd);
     assert_eq!(recording.application, "touchdown");
-    assert_eq!(recording.ids, BTreeSet::from([format!("recorded-{START_UNIX_NS}-flight")]));
+    assert_eq!(recording.ids, BTreeSet::from([format!("{START_UNIX_NS}-flight")]));
     assert_eq!(recording.layouts, 1);
     assert!(recording.layout_chunks > 10);
-    let ticks = TICKS as usize;
-    for (path, rows) in [
-        (entity::ROCKET, ticks),
-        (entity::NOZZLE, ticks),
-        (entity::THRUST, ticks),
-        (entity::PHASE, 1),
-        (entity::LEVEL, 1),
-        (entity::LEVEL_REPLAYED, 1),
-        (entity::EVENTS, 1),
-        (entity::VERDICT, 1),
-        ("plots/altitude_m/true", ticks),
-        ("plots/gimbal_pitch_deg/commanded", ticks),
-        ("plots/gimbal_pitch_deg/replayed", ticks),
-        ("plots/gimbal_pitch_deg/limit_high", 2),
-        ("plots/vertical_m_s/limit_low", 2),
-    ] {
-        assert_eq!(recording.rows(path), rows, "{path}");
+    for topic in ["tf", "vehicle/truth3d", "computer/frame", "world/rocket", "world/followed"] {
+        assert_eq!(recording.rows(topic), TICKS as usize, "{topic}");
     }
-    for path in [entity::BODY, entity::PAD, entity::PAD_LIMIT, entity::FLOWN, entity::REPORT] {
-        assert!(recording.is_static(path), "{path}");
+    assert_eq!(recording.rows("verdict"), 1);
+    for drawn in ["rocket/body", "rocket/legs", "rocket/bell", "pad", "pad/limit", "flown"] {
+        assert!(recording.is_static(&format!("world/{drawn}")), "{drawn}");
     }
-    assert_eq!(recording.times(entity::ROCKET, entity::TIMELINE_TICK), [1, 2, 3, 4]);
-    let times_ns = recording.times(entity::ROCKET, entity::TIMELINE_FLIGHT_TIME);
+    let times_ns = recording.times("world/rocket", FLIGHT_TIME);
     assert_eq!(times_ns, [5_000_000, 10_000_000, 15_000_000, 20_000_000]);
-    assert_eq!(recording.times(entity::VERDICT, entity::TIMELINE_FLIGHT_TIME), [20_000_000]);
-    let timelines: BTreeSet<String> =
-        recording.chunks.iter().flat_map(|chunk| chunk.timelines().keys()).map(ToString::to_string).collect();
-    assert_eq!(timelines, BTreeSet::from(["flight_time".to_owned(), "tick".to_owned()]));
+    assert_eq!(recording.times("verdict", FLIGHT_TIME), [20_000_000]);
 }
 
+/// The pose and the text are of the kinds that a viewer draws.
 #[test]
-fn without_the_truth_the_decisions_are_shown() {
-    let (_folder, log, rrd) = folder();
-    write_log(&log, false);
-    let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses), (TICKS, 0));
-    let recording = Recording::read(&rrd);
-    assert_eq!(recording.rows(entity::ROCKET), 0);
-    assert_eq!(recording.rows("plots/fins_mean_deg/replayed"), TICKS as usize);
-}
-
-#[test]
-fn a_flight_from_apogee_is_shown_in_space() {
+fn the_pose_and_the_events_are_what_a_viewer_draws() {
     let (_folder, log, rrd) = folder();
     write_apogee_log(&log);
-    let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses, exported.profile_problem), (TICKS, TICKS, None));
+    export(&log, None, (&rrd).into()).unwrap();
     let recording = Recording::read(&rrd);
-    assert_eq!(recording.layouts, 1);
-    for path in [
-        entity::ROCKET,
-        entity::NOZZLE,
-        "plots/altitude_m/true",
-        "plots/y_m/true",
-        "plots/vertical_m_s/true",
-        "plots/tilt_deg/true",
-        "plots/gimbal_yaw_deg/actual",
-        "plots/fins_mean_deg/commanded",
-    ] {
-        assert_eq!(recording.rows(path), TICKS as usize, "{path}");
+    let translations_m: Vec<[f32; 3]> = recording
+        .of("world/rocket")
+        .flat_map(|chunk| chunk.iter_slices::<[f32; 3]>("Transform3D:translation".into()))
+        .flatten()
+        .copied()
+        .collect();
+    assert_eq!(translations_m.len(), TICKS as usize);
+    assert_eq!((translations_m[0], translations_m[3]), ([3.0, -4.0, 100.0], [3.0, -4.0, 85.0]));
+    let has = |entity: &str, component: &'static str| {
+        recording.of(entity).any(|chunk| chunk.components().contains_key(&component.into()))
+    };
+    assert!(
+        has("world/rocket", "Transform3D:quaternion") && !has("world/followed", "Transform3D:quaternion")
+    );
+    write_log(&log, true);
+    export(&log, None, forced(&rrd)).unwrap();
+    let recording = Recording::read(&rrd);
+    assert!(recording.of("events").any(|chunk| chunk.components().contains_key(&"TextLog:text".into())));
+}
+
+/// A plot whose field does not exist is empty in the viewer, and nothing says so.
+#[test]
+fn every_plot_of_the_layout_has_its_fields() {
+    let (folder, log, station) = folder();
+    let rrd = folder.path().join("both.rrd");
+    write_apogee_log(&log);
+    write_telemetry_log(&station);
+    for plot in &PLOTS {
+        let log = match plot.topic {
+            "/pilot/timing" => &MK2.log,
+            "/telemetry" => &station,
+            _ => &log,
+        };
+        export(log, None, forced(&rrd)).unwrap();
+        let recording = Recording::read(&rrd);
+        for field in plot.fields {
+            let selector: Selector = field.parse().unwrap();
+            let component = rerun::ComponentIdentifier::try_new(plot.component()).unwrap();
+            let chunks = recording.of(plot.topic.trim_start_matches('/'));
+            let messages = chunks.filter_map(|chunk| chunk.components().get_array(component));
+            let values = messages.map(|messages| {
+                let selected = selector.execute_per_row(messages).unwrap();
+                selected.map_or(0, |values| values.values().len())
+            });
+            assert!(values.sum::<usize>() > 0, "{} {field}", plot.topic);
+        }
     }
-    assert_eq!(recording.rows(entity::PHASE), 1);
-    assert_eq!(recording.rows("plots/gimbal_yaw_deg/limit_high"), 2);
-    assert!(recording.is_static(entity::FLOWN) && recording.is_static(entity::PAD_LIMIT));
-    assert_eq!(recording.times(entity::ROCKET, entity::TIMELINE_TICK), [1, 100, 200, 300]);
 }
 
 #[test]
-fn without_a_vehicle_the_telemetry_is_shown() {
-    let (_folder, log, rrd) = folder();
-    write_telemetry_log(&log);
-    let exported = export_file(&log, &rrd, Overwrite::Never).unwrap();
-    assert_eq!((exported.ticks, exported.poses), (0, 2));
-    let recording = Recording::read(&rrd);
-    assert_eq!(recording.rows("plots/altitude_m/telemetry"), 2);
-    assert_eq!(recording.rows("plots/level/controller"), 3);
-    assert_eq!(recording.rows(entity::PHASE), 1);
-    let times_ns = recording.times(entity::ROCKET, entity::TIMELINE_FLIGHT_TIME);
-    assert_eq!(times_ns, [1_000_000_000, 2_000_000_000]);
+fn two_flights_lie_in_one_recording_on_one_clock() {
+    let (folder, log, rrd) = folder();
+    let other = folder.path().join("other.mcap");
+    write_log(&log, true);
+    write_apogee_log(&other);
+    let exported = export(&log, Some(&other), (&rrd).into()).unwrap();
+    assert_eq!(exported.iter().map(|exported| exported.poses).collect::<Vec<_>>(), [4, 4]);
+    let both = Recording::read(&rrd);
+    assert_eq!((both.ids.len(), both.layouts), (1, 1));
+    let beside = |entity: &str| format!("{}/{entity}", BESIDE.trim_start_matches('/'));
+    assert!(both.is_static(&beside("world/rocket/body")) && both.is_static("world/rocket/body"));
+    assert_eq!(both.times("world/rocket", FLIGHT_TIME)[..2], [5_000_000, 10_000_000]);
+    assert_eq!(both.times(&beside("world/rocket"), FLIGHT_TIME)[..2], [0, 500_000_000]);
+    assert_eq!(both.rows("vehicle/truth3d"), both.rows(&beside("vehicle/truth3d")));
 }

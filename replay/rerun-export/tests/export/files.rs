@@ -1,10 +1,8 @@
-//! Tests with files that are damaged, foreign, missing or already there, and with full disks.
+//! Tests with files that are damaged, foreign, missing or already there.
 
-use replay::log::FlightLog;
-use replay_rerun::survey::Survey;
-use replay_rerun::{ExportError, Overwrite, export, export_file};
+use replay_rerun::export;
 
-use crate::logs::{TICKS, folder, write_log};
+use crate::logs::{TICKS, folder, forced, in_the_third_chunk, write_log};
 use crate::read_back::Recording;
 
 #[test]
@@ -13,39 +11,41 @@ fn the_readable_part_of_a_cut_log_is_exported() {
     write_log(&log, true);
     let bytes = std::fs::read(&log).unwrap();
     let mut partly = 0;
-    for percent in (30..100).step_by(5) {
-        std::fs::write(&log, &bytes[..bytes.len() * percent / 100]).unwrap();
-        let exported = match export_file(&log, &rrd, Overwrite::Always) {
+    let cuts = (30..100).step_by(5).map(|percent| bytes.len() * percent / 100);
+    for cut in cuts.chain([in_the_third_chunk(&bytes)]) {
+        std::fs::write(&log, &bytes[..cut]).unwrap();
+        let exported = match export(&log, None, forced(&rrd)) {
             Ok(exported) => exported,
             Err(refused) => {
-                assert!(refused.to_string().contains("before its first message"), "{percent} %: {refused}");
-                assert_eq!(partly, 0, "{percent} %: less of the log could be read");
+                assert!(refused.to_string().contains("before its first message"), "{cut}: {refused}");
+                assert_eq!(partly, 0, "{cut}: less of the log could be read");
                 continue;
             }
         };
-        assert_eq!(
-            Recording::read(&rrd).rows("plots/fins_mean_deg/replayed"),
-            exported.ticks as usize,
-            "{percent} %"
-        );
-        assert!(exported.damage.is_some() || exported.ticks == TICKS, "{percent} %");
-        partly += usize::from((1..TICKS).contains(&exported.ticks));
+        let poses = exported[0].poses;
+        assert_eq!(Recording::read(&rrd).rows("world/rocket"), poses, "{cut}");
+        assert!(exported[0].damage.is_some() || poses == TICKS as usize, "{cut}");
+        partly += usize::from((1..TICKS as usize).contains(&poses));
     }
     assert!(partly > 0);
 }
 
 #[test]
-fn nothing_is_overwritten_without_force() {
-    let (_folder, log, rrd) = folder();
+fn nothing_is_overwritten_without_force_and_no_log_ever() {
+    let (folder, log, rrd) = folder();
+    let other = folder.path().join("other.mcap");
     write_log(&log, true);
+    write_log(&other, false);
     std::fs::write(&rrd, "precious").unwrap();
-    let refused = export_file(&log, &rrd, Overwrite::Never).unwrap_err();
-    assert!(matches!(refused, ExportError::Exists { .. }));
-    assert!(refused.to_string().contains("flight.rrd: already exists"), "{refused}");
+    let refused = format!("{:#}", anyhow::Error::from(export(&log, None, (&rrd).into()).unwrap_err()));
+    assert!(refused.contains("flight.rrd: cannot be written") && refused.contains("--force"), "{refused}");
     assert_eq!(std::fs::read(&rrd).unwrap(), b"precious");
-    let refused = export_file(&log, &log, Overwrite::Always).unwrap_err();
-    assert!(matches!(refused, ExportError::IsTheLog { .. }));
-    export_file(&log, &rrd, Overwrite::Always).unwrap();
+    for input in [&log, &other] {
+        let before = std::fs::read(input).unwrap();
+        export(&log, Some(&other), forced(input)).unwrap_err();
+        assert_eq!(std::fs::read(input).unwrap(), before);
+    }
+    export(&log, None, forced(&rrd)).unwrap();
     assert_eq!(Recording::read(&rrd).layouts, 1);
 }
 
@@ -53,35 +53,13 @@ fn nothing_is_overwritten_without_force() {
 fn a_file_that_is_not_a_log_is_named_and_leaves_nothing_behind() {
     let (folder, log, rrd) = folder();
     std::fs::write(&log, "time,altitude\n0,15\n").unwrap();
-    let error = export_file(&log, &rrd, Overwrite::Never).unwrap_err();
+    let error = export(&log, None, (&rrd).into()).unwrap_err();
     assert!(error.to_string().contains("flight.mcap: is not a flight log"), "{error}");
-    let missing = export_file(&folder.path().join("none.mcap"), &rrd, Overwrite::Never).unwrap_err();
+    let missing = export(&folder.path().join("none.mcap"), None, (&rrd).into()).unwrap_err();
     assert!(missing.to_string().contains("none.mcap: cannot be read"), "{missing}");
     write_log(&log, true);
     let nowhere = folder.path().join("nowhere").join("flight.rrd");
-    let error = export_file(&log, &nowhere, Overwrite::Never).unwrap_err();
+    let error = export(&log, None, (&nowhere).into()).unwrap_err();
     assert!(error.to_string().contains("flight.rrd: cannot be written"), "{error}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-}
-
-/// A full disk is an error, not a short recording.
-#[test]
-fn a_failing_output_is_an_error() {
-    struct Full;
-    impl std::io::Write for Full {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            // There is room for the stream's header only.
-            if bytes.len() <= 16 { Ok(bytes.len()) } else { Err(std::io::Error::other("no room")) }
-        }
-        fn flush(&mut self) -> std::io::Result<()> {
-            Ok(())
-        }
-    }
-    let (_folder, path, _) = folder();
-    write_log(&path, true);
-    let bytes = std::fs::read(&path).unwrap();
-    let survey = Survey::of(bytes.as_slice()).unwrap();
-    let mut log = FlightLog::read("flight.mcap".to_owned(), bytes.as_slice()).unwrap();
-    let error = export::export(&mut log, &survey, Full).map(|(done, _)| done).unwrap_err();
-    assert!(error.to_string().contains("no room"), "{error}");
 }

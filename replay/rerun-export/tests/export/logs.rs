@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use flight_log::sortie::{LastFrame, campaign_header, frame_and_phase, header, start, time_ns};
-use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use flight_log::sortie::{LastFrame, frame_and_phase, header, start, time_ns};
+use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
+use replay::output::{Destination, Overwrite};
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -56,16 +57,9 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
     log.finish().unwrap();
 }
 
-/// The first frames of a flight from apogee: its log's header, the start, and the frames.
-pub(crate) fn first_frames(count: usize) -> (LogHeader, ComputerStart, Vec<ComputerFrame>) {
-    let recipe = Recipe::built_in("mk2", "field").unwrap();
-    let mut flight = Sortie::new(&recipe, 0).unwrap();
-    let (start, mut last, mut frames) = (start(&flight), LastFrame::default(), Vec::new());
-    while frames.len() < count {
-        flight.step_with(&Outside::NOBODY, &mut last);
-        frames.push(*last.take().unwrap());
-    }
-    (campaign_header(&recipe, 0), start, frames)
+/// A recording that may be replaced.
+pub(crate) fn forced(path: &Path) -> Destination<'_> {
+    Destination { path, overwrite: Overwrite::Always }
 }
 
 /// A place in a log's third chunk, where it may be cut.

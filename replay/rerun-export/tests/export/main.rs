@@ -1,4 +1,4 @@
-//! Tests the export: logs are flown by the real controller, exported, and read back with Rerun's own decoder.
+//! Tests the export: logs are exported and read back with Rerun's own decoder.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 mod command_line;
@@ -7,8 +7,6 @@ mod files;
 #[path = "../../../tests/replay/simulated.rs"]
 #[expect(dead_code, reason = "other tests fly more")]
 mod flown;
-mod follow;
 mod logs;
 mod outside_reader;
 mod read_back;
-mod run_again;
