@@ -42,9 +42,9 @@ pub(super) struct Downloading {
 
 /// What a download has to say.
 #[derive(Debug)]
-pub(super) enum Word {
-    /// It goes on.
-    Goes(String),
+pub(super) enum DownloadReport {
+    /// How far it is.
+    Progress(String),
     /// The log is here.
     Done(PathBuf),
     Failed(anyhow::Error),
@@ -98,11 +98,11 @@ impl Downloading {
     }
 
     /// Goes on: what to send, and what there is to say.
-    pub(super) fn poll(&mut self, now: Duration) -> (Vec<MavMessage>, Option<Word>) {
+    pub(super) fn poll(&mut self, now: Duration) -> (Vec<MavMessage>, Option<DownloadReport>) {
         let packets = self.download.poll(now);
         let messages = packets.iter().map(|packet| packet.message(self.vehicle)).collect();
-        let word = self.go_on().unwrap_or_else(|error| Some(Word::Failed(error)));
-        (messages, word)
+        let report = self.go_on().unwrap_or_else(|error| Some(DownloadReport::Failed(error)));
+        (messages, report)
     }
 
     /// Stops, for a program that ends: waits until what has arrived is written.
@@ -112,16 +112,16 @@ impl Downloading {
         }
     }
 
-    fn go_on(&mut self) -> anyhow::Result<Option<Word>> {
+    fn go_on(&mut self) -> anyhow::Result<Option<DownloadReport>> {
         let ended = self.download.ended().transpose()?;
         let Some(keeper) = &self.keeper else { return Ok(None) };
         if let Some(finished) = keeper.finished() {
-            return finished.map(|path| Some(Word::Done(path)));
+            return finished.map(|path| Some(DownloadReport::Done(path)));
         }
         if ended.is_some() && !std::mem::replace(&mut self.finishing, true) {
             keeper.order(Order::Finish)?;
         }
-        Ok(self.next_tenth().map(Word::Goes))
+        Ok(self.next_tenth().map(DownloadReport::Progress))
     }
 
     /// The vehicle has opened its file: goes on with what is here of it.
@@ -133,7 +133,7 @@ impl Downloading {
         Ok(())
     }
 
-    /// A word at the beginning and at every tenth of the file.
+    /// A report at the beginning and at every tenth of the file.
     fn next_tenth(&mut self) -> Option<String> {
         let progress = self.progress()?;
         let tenth = 1 + (10 * u64::from(progress.bytes) / u64::from(progress.len.max(1))) as u32;
@@ -203,26 +203,26 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
                 downloading.take(&frame, now)?;
             }
         }
-        let (messages, word) = downloading.poll(now);
+        let (messages, report) = downloading.poll(now);
         for message in &messages {
             wire.send(message, 0);
         }
-        match word {
-            Some(Word::Done(path)) => {
+        match report {
+            Some(DownloadReport::Done(path)) => {
                 shown.end();
                 wire.save_timestamps();
                 print(format!("log {}\n", path.display()).as_bytes())?;
                 return Ok(Exit::Landed);
             }
-            Some(Word::Failed(error)) => {
+            Some(DownloadReport::Failed(error)) => {
                 shown.end();
                 return Err(error);
             }
-            Some(Word::Goes(words)) if !shown.in_place => {
+            Some(DownloadReport::Progress(words)) if !shown.in_place => {
                 // Nobody may read it.
                 let _ = writeln!(std::io::stderr(), "{words}");
             }
-            Some(Word::Goes(_)) | None => {}
+            Some(DownloadReport::Progress(_)) | None => {}
         }
         if shown.in_place && now >= shown.at + SHOW_EVERY {
             shown.at = now;

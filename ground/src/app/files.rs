@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::book::{Book, BookKey, CLOSED, Head, Line, OPENED, SignedHead};
+use protocol::book::{Book, BookKey, Head, Line, OPENED, SignedHead};
 use protocol::log::record::Record;
 use protocol::log::recorder::{Recorder, RecorderError, TlogName};
 use protocol::log::writer::LogHeader;
@@ -16,8 +16,8 @@ use time::macros::format_description;
 
 use crate::cli::LogChoice;
 use crate::model::{
-    BookLine, Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, entry_text, geojson, kml,
-    parse_checklist, read_geojson, remembered,
+    Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, entry_text, geojson, kml, parse_checklist,
+    read_geojson, remembered,
 };
 
 /// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that exists is kept: the new one
@@ -158,38 +158,21 @@ impl StationBook {
             Some(key) => format!("signed with the key of public key {}", key.public()),
             None => "not signed: the station has no key".to_owned(),
         };
-        let mut book = Self { book: Book::default(), key, signed: None };
         let text = format!("{about}; {key_words}");
-        let record = book.enter_line(&Line { unix_ns, kind: OPENED, who: "", text: &text });
+        let mut book = Self { book: Book::default(), key, signed: None };
+        let record = book.enter(&Line { unix_ns, kind: OPENED, who: "", text: &text });
         (book, record)
     }
 
-    pub(super) fn enter(&mut self, line: &BookLine, unix_ns: u64) -> Record {
-        self.enter_line(&Line { unix_ns, kind: &line.kind, who: &line.who, text: &line.text })
-    }
-
-    fn enter_line(&mut self, line: &Line) -> Record {
+    pub(super) fn enter(&mut self, line: &Line) -> Record {
         Record::BookEntry(self.book.enter(line))
     }
 
-    /// Enters that the run ends.
-    pub(super) fn close(&mut self, unix_ns: u64) -> Record {
-        self.enter_line(&Line { unix_ns, kind: CLOSED, who: "", text: "the station ends" })
-    }
-
-    /// Signs the end if it has changed and the last signature is old enough. Returns it with its record.
-    pub(super) fn sign_if_due(&mut self, now: Duration) -> Option<(SignedHead, Record)> {
-        let waits = |at: &Duration| now.saturating_sub(*at) < SIGNED_EVERY;
-        if self.signed.as_ref().is_some_and(|(_, at)| waits(at)) {
-            return None;
-        }
-        self.sign(now)
-    }
-
-    /// Signs the end if it has changed.
-    pub(super) fn sign(&mut self, now: Duration) -> Option<(SignedHead, Record)> {
+    /// Signs the end if it has changed and the last signature is old enough, or `at_once`. Returns it with its record.
+    pub(super) fn sign(&mut self, now: Duration, at_once: bool) -> Option<(SignedHead, Record)> {
         let head = self.book.head()?;
-        if self.signed.is_some_and(|(signed, _)| signed == head) {
+        let is_recent = |at: Duration| !at_once && now.saturating_sub(at) < SIGNED_EVERY;
+        if self.signed.is_some_and(|(signed, at)| signed == head || is_recent(at)) {
             return None;
         }
         self.signed = Some((head, now));
@@ -197,8 +180,7 @@ impl StationBook {
             Some(key) => key.sign(head),
             None => SignedHead { head, signature: [0; 64] },
         };
-        let record = Record::BookHead(signed.record());
-        Some((signed, record))
+        Some((signed, Record::BookHead(signed.record())))
     }
 
     pub(super) fn is_signed(&self) -> bool {
@@ -437,16 +419,15 @@ mod book_tests {
         let key = BookKey::of(&Key::new([3; 32]));
         let (mut book, first) = StationBook::open(Some(key.clone()), "station 255/190", 1);
         assert!(matches!(&first, Record::BookEntry(entry) if entry.text.contains(&key.public().to_string())));
-        let (signed, _) = book.sign_if_due(Duration::ZERO).unwrap();
+        let (signed, _) = book.sign(Duration::ZERO, false).unwrap();
         assert!(key.public().signed(&signed) && signed.head.entries == 1);
-        assert!(book.sign_if_due(Duration::from_secs(9)).is_none());
-        let line = BookLine { kind: "key".to_owned(), who: "Ann".to_owned(), text: "A".to_owned() };
-        book.enter(&line, 2);
-        assert!(book.sign_if_due(Duration::from_secs(1)).is_none(), "too soon");
-        let (signed, _) = book.sign_if_due(Duration::from_secs(10)).unwrap();
-        assert_eq!(signed.head.entries, 2);
-        book.close(3);
-        assert!(book.sign(Duration::from_secs(10)).is_some(), "the last one is signed at once");
+        assert!(book.sign(Duration::from_secs(9), true).is_none(), "nothing new");
+        book.enter(&Line { unix_ns: 2, kind: "key", who: "Ann", text: "A" });
+        assert!(book.sign(Duration::from_secs(1), false).is_none(), "too soon");
+        assert!(book.sign(Duration::from_secs(1), true).is_some(), "the last one is signed at once");
+        book.enter(&Line { unix_ns: 3, kind: "key", who: "Ann", text: "B" });
+        let (signed, _) = book.sign(Duration::from_secs(10), false).unwrap();
+        assert_eq!(signed.head.entries, 3);
     }
 }
 

@@ -4,7 +4,7 @@ use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use protocol::book::BookKey;
+use protocol::book::{BookKey, CLOSED, Line};
 use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
@@ -12,7 +12,7 @@ use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, LogTime, Signals};
-use super::download::{Downloading, Word};
+use super::download::{DownloadReport, Downloading};
 use super::files::{SignatureFile, SpaceWatch, StationBook};
 use super::output::{Lines, Output};
 use super::replaying::Again;
@@ -341,24 +341,24 @@ impl Station {
             Msg::Frame(frame) => download.take(frame, now),
             _ => Ok(()),
         });
-        let word = match taken {
+        let report = match taken {
             Ok(()) => {
-                let (messages, word) = download.poll(now);
+                let (messages, report) = download.poll(now);
                 for message in &messages {
                     wire.send(message, boot);
                 }
-                word
+                report
             }
-            Err(error) => Some(Word::Failed(error)),
+            Err(error) => Some(DownloadReport::Failed(error)),
         };
-        if !matches!(word, Some(Word::Goes(_)) | None) {
+        if !matches!(report, Some(DownloadReport::Progress(_)) | None) {
             self.download = None;
         }
-        word.map(|word| {
-            Msg::Download(match word {
-                Word::Goes(words) => Ok(words),
-                Word::Done(path) => Ok(format!("the vehicle's log is here: {}", path.display())),
-                Word::Failed(error) => Err(format!("{error:#}")),
+        report.map(|report| {
+            Msg::Download(match report {
+                DownloadReport::Progress(words) => Ok(words),
+                DownloadReport::Done(path) => Ok(format!("the vehicle's log is here: {}", path.display())),
+                DownloadReport::Failed(error) => Err(format!("{error:#}")),
             })
         })
     }
@@ -408,27 +408,27 @@ impl Station {
     }
 
     fn enter(&mut self, line: &BookLine) {
-        let unix_ns = self.clock.unix_ns();
-        if let Some(record) = self.book.as_mut().map(|book| book.enter(line, unix_ns)) {
+        let BookLine { kind, who, text } = line;
+        let line = Line { unix_ns: self.clock.unix_ns(), kind, who, text };
+        if let Some(record) = self.book.as_mut().map(|book| book.enter(&line)) {
             self.record(record);
         }
     }
 
-    /// Signs the end of the book and records it, if it is due, or in any case at the `end`.
-    fn sign_book(&mut self, end: bool) -> Option<Msg> {
+    /// Signs the end of the book and records it, if it is due, or at once.
+    fn sign_book(&mut self, at_once: bool) -> Option<Msg> {
         let now = self.clock.now();
         let book = self.book.as_mut()?;
         let is_signed = book.is_signed();
-        let (head, record) = if end { book.sign(now) } else { book.sign_if_due(now) }?;
+        let (head, record) = book.sign(now, at_once)?;
         self.record(record);
         Some(Msg::Book { head, is_signed })
     }
 
     /// Closes the book. Its end is sent to the vehicle without waiting for an answer.
     pub(super) fn close_book(&mut self, model: &mut Model, wire: &mut Wire) {
-        let unix_ns = self.clock.unix_ns();
-        let Some(last) = self.book.as_mut().map(|book| book.close(unix_ns)) else { return };
-        self.record(last);
+        let (kind, text) = (CLOSED.to_owned(), "the station ends".to_owned());
+        self.enter(&BookLine { kind, who: String::new(), text });
         let Some(msg) = self.sign_book(true) else { return };
         self.book = None;
         self.step(model, wire, msg);
