@@ -196,8 +196,7 @@ pub struct ScreenArgs {
     #[arg(long, value_name = "WHICH")]
     pub characters: Option<Characters>,
 
-    /// Colours: auto, dark, light (for sunlight), 16 (the terminal's own), none or contrast. Default: auto, by
-    /// NO_COLOR, TERM, COLORTERM and COLORFGBG.
+    /// Colours. Default: auto, by NO_COLOR, TERM, COLORTERM and COLORFGBG.
     #[arg(long, value_name = "WHICH")]
     pub theme: Option<ThemeChoice>,
 
@@ -465,35 +464,37 @@ pub enum Characters {
 }
 
 /// Which colours to use.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "String")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum ThemeChoice {
-    /// Decide by the environment.
+    /// Decide by the environment
     #[default]
     Auto,
-    Palette(Palette),
+    /// White on black
+    Dark,
+    /// Black on white, for sunlight
+    Light,
+    /// The terminal's own
+    #[serde(rename = "16")]
+    #[value(name = "16")]
+    Sixteen,
+    /// No colours
+    None,
+    /// High contrast
+    Contrast,
 }
 
-impl FromStr for ThemeChoice {
-    type Err = String;
-
-    fn from_str(given: &str) -> Result<Self, String> {
-        if given == "auto" {
-            return Ok(Self::Auto);
-        }
-        let found = Palette::ALL.into_iter().find(|palette| palette.name() == given);
-        found.map(Self::Palette).ok_or_else(|| {
-            let names = Palette::ALL.map(Palette::name).join(", ");
-            format!("`{given}` is no theme; give auto, {names}")
+impl ThemeChoice {
+    /// `None` if the environment decides.
+    pub fn palette(self) -> Option<Palette> {
+        Some(match self {
+            Self::Auto => return None,
+            Self::Dark => Palette::Dark,
+            Self::Light => Palette::Light,
+            Self::Sixteen => Palette::Sixteen,
+            Self::None => Palette::None,
+            Self::Contrast => Palette::Contrast,
         })
-    }
-}
-
-impl TryFrom<String> for ThemeChoice {
-    type Error = String;
-
-    fn try_from(given: String) -> Result<Self, String> {
-        given.parse()
     }
 }
 

@@ -218,10 +218,6 @@ impl Config {
             .filter(|definition| keys.key(definition.act) != Some(definition.usual))
             .map(|definition| format!("{}={}", definition.name, keys.name(definition.act)))
             .collect();
-        let theme_name = match theme {
-            ThemeChoice::Auto => "auto",
-            ThemeChoice::Palette(palette) => palette.name(),
-        };
         let rows = [
             ("connect", given((!connect.is_empty()).then(|| connect.join(" ")), "the demonstration")),
             ("sysid", given(sysid.map(|id| id.to_string()), &GROUND.system_id.to_string())),
@@ -237,7 +233,7 @@ impl Config {
             ("bell", given(bell.map(|bell| bell.to_string()), "true")),
             ("alarm_command", given(alarm_command.clone(), "none")),
             ("characters", chosen(value_name(characters), *characters == usual.characters)),
-            ("theme", chosen(theme_name.to_owned(), *theme == usual.theme)),
+            ("theme", chosen(value_name(theme), *theme == usual.theme)),
             ("voice", given(voice.clone(), "none")),
             ("talk", chosen(value_name(talk), *talk == usual.talk)),
             (
@@ -270,7 +266,6 @@ mod tests {
 
     use crate::cli::{Cli, Command};
     use crate::model::{Act, Amount};
-    use crate::view::theme::Palette;
 
     // Tests of the settings file, its example and the flags.
 
@@ -344,9 +339,7 @@ mod tests {
         ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
             config.characters == Characters::Ascii
         }),
-        ("theme", "\"dark\"", &["--theme", "light"], |_, config| {
-            config.theme == ThemeChoice::Palette(Palette::Light)
-        }),
+        ("theme", "\"dark\"", &["--theme", "light"], |_, config| config.theme == ThemeChoice::Light),
         ("voice", "\"a\"", &["--voice", "b"], |_, config| config.voice.as_deref() == Some("b")),
         ("talk", "\"few\"", &["--talk", "all"], |_, config| config.talk().amount == Amount::All),
         ("talk_every_s", "3", &["--talk-every-s", "4"], |_, config| {

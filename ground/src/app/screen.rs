@@ -30,7 +30,7 @@ use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
 use super::programs::{Voice, VoiceEnded};
-use crate::cli::{Characters, ThemeChoice};
+use crate::cli::Characters;
 use crate::config::Config;
 use crate::key::Key;
 use crate::model::{Acknowledgement, CommandKind, Model, Page};
@@ -205,10 +205,7 @@ impl Drop for Screen {
 /// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
-    let palette = match config.theme {
-        ThemeChoice::Auto => found.palette,
-        ThemeChoice::Palette(palette) => palette,
-    };
+    let palette = config.theme.palette().unwrap_or(found.palette);
     let ascii = match config.characters {
         Characters::Auto => found.ascii,
         Characters::Unicode => false,

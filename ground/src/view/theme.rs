@@ -78,17 +78,6 @@ pub enum Palette {
 impl Palette {
     pub const ALL: [Self; 5] = [Self::Dark, Self::Light, Self::Sixteen, Self::None, Self::Contrast];
 
-    /// The name in the settings.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Dark => "dark",
-            Self::Light => "light",
-            Self::Sixteen => "16",
-            Self::None => "none",
-            Self::Contrast => "contrast",
-        }
-    }
-
     #[must_use]
     pub fn next(self) -> Self {
         let place = Self::ALL.iter().position(|palette| *palette == self).unwrap_or(0);

@@ -202,18 +202,18 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
         let plain = rows(&drawn(rig, size, Palette::None));
         for palette in Palette::ALL {
             let buffer = drawn(rig, size, palette);
-            assert_eq!(rows(&buffer), plain, "{name} {}", palette.name());
+            assert_eq!(rows(&buffer), plain, "{name} {palette:?}");
             for cell in &buffer.content {
-                assert!(!cell.modifier.contains(Modifier::DIM), "{name} {}: dim", palette.name());
+                assert!(!cell.modifier.contains(Modifier::DIM), "{name} {palette:?}: dim");
                 if matches!(palette, Palette::None | Palette::Sixteen) {
                     assert!(rgb(cell.bg).is_none(), "{name}: the terminal's own background");
                     continue;
                 }
                 let (fore, back) = colours(cell);
                 let found = contrast(fore, back);
-                assert!(found >= contrast_min(palette), "{name} {}: {cell:?} {found:.1}", palette.name());
+                assert!(found >= contrast_min(palette), "{name} {palette:?}: {cell:?} {found:.1}");
             }
-            fs::write(folder.join(format!("{name}-{}.svg", palette.name())), picture(&buffer)).unwrap();
+            fs::write(folder.join(format!("{name}-{palette:?}.svg")), picture(&buffer)).unwrap();
         }
     });
 }
