@@ -15,6 +15,7 @@
 //! * [`duplicate`] and [`link_stats`]: copies of a frame, and the rates and the loss of a link;
 //! * [`hub`]: several links to one peer, made of the modules above;
 //! * `transport` (a feature): UDP, TCP and serial links;
+//! * `links` (the same feature): the open links of a program, together;
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
 //! * [`mission`]: which mission is meant;
 //! * [`book`]: who did what, as a chain of hashes;
@@ -86,6 +87,8 @@ pub mod identity;
 #[cfg(feature = "transport")]
 pub mod key_file;
 pub mod link_stats;
+#[cfg(feature = "transport")]
+pub mod links;
 #[cfg(feature = "std")]
 pub mod log;
 pub mod mission;

@@ -199,7 +199,7 @@ pub(super) struct SignatureFile {
     /// `None` before the first signature.
     file: Option<File>,
     /// Open for its lock: it keeps other stations away while there is no file of signatures.
-    _checklist: File,
+    checklist: File,
     hash: String,
 }
 
@@ -244,7 +244,7 @@ pub(super) fn open_checklist(
         told.push(format!("{broken} entries of {} cannot be read and do not count", signed_path.display()));
     }
     let hash = checklist.hash.clone();
-    let kept = SignatureFile { path: signed_path.clone(), file, _checklist: written, hash };
+    let kept = SignatureFile { path: signed_path.clone(), file, checklist: written, hash };
     Ok((checklist, kept, told))
 }
 
@@ -259,6 +259,16 @@ fn lock(file: &File, path: &Path) -> anyhow::Result<()> {
             anyhow::Error::from(error).context(format!("locking {}", path.display()))
         }
     })
+}
+
+impl Drop for SignatureFile {
+    /// A program that is being started has a copy of every open file until it runs, and a copy keeps the lock.
+    fn drop(&mut self) {
+        for file in self.file.iter().chain([&self.checklist]) {
+            // The file is closed next, which unlocks it, too.
+            let _ = file.unlock();
+        }
+    }
 }
 
 impl SignatureFile {

@@ -3,38 +3,33 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use protocol::dialect::{MavCmd, MavMessage};
 use protocol::frame::{Encoder, Frame, FramerCounters};
-use protocol::hub::{Hub, HubLink, LinkEvent, Origin, Received};
+use protocol::hub::{HubLink, LinkEvent, Origin, Received};
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
+use protocol::links::{Links, MAX_AT_ONCE, Now};
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::signing::{Anchor, Lockouts, Signing};
-use protocol::transport::{LinkAddress, Transport, TransportSender};
+use protocol::transport::LinkAddress;
 
 use super::clock::{Clock, LogTime};
 use crate::model::{GONE_AFTER, LinkReport};
 use crate::update::Msg;
 
-/// How often signing timestamps are saved, in signing time units of 10 us.
-const SAVE_TIMESTAMPS_EVERY: u64 = 100_000;
 const FLIGHT_STATUS_ID: u32 = 54_000;
 /// How many boots a link remembers.
 const BOOTS_MAX: usize = 8;
-/// The most data taken from one link before keys and clock are served again.
-const MAX_AT_ONCE: usize = 1024;
 
 /// The open links to one vehicle.
 pub struct Wire {
-    open: Vec<OpenLink>,
+    links: Links,
+    /// Where the boots of the vehicle are heard, for each link.
+    boots: Vec<Boots>,
     vehicle: Address,
-    hub: Hub,
     lockouts: Lockouts,
     places: Places,
-    key_file: Option<KeyFile>,
-    saved_at: u64,
     /// Whether a failure to save timestamps was reported.
     save_failure_reported: bool,
     encoder: Encoder,
@@ -45,21 +40,16 @@ pub struct Wire {
     sent_bytes: usize,
 }
 
-struct OpenLink {
-    transport: Transport,
-    sender: TransportSender,
-    name: String,
-    ended: bool,
-    /// From where each boot of the vehicle was last heard, and when.
-    boots: Vec<(u32, Origin, Duration)>,
-}
+/// From where each boot of the vehicle was last heard over a link, and when.
+#[derive(Default)]
+struct Boots(Vec<(u32, Origin, Duration)>);
 
-impl OpenLink {
+impl Boots {
     /// Notes from where a boot is heard.
-    fn note_boot(&mut self, boot: u32, from: Origin, now: Duration) {
-        self.boots.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < GONE_AFTER);
-        self.boots.push((boot, from, now));
-        self.boots.drain(..self.boots.len().saturating_sub(BOOTS_MAX));
+    fn note(&mut self, boot: u32, from: Origin, now: Duration) {
+        self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < GONE_AFTER);
+        self.0.push((boot, from, now));
+        self.0.drain(..self.0.len().saturating_sub(BOOTS_MAX));
     }
 
     /// Where this boot is; `None` if nothing is known that tells.
@@ -67,8 +57,8 @@ impl OpenLink {
     /// # Errors
     /// Only other boots are heard over this link.
     fn place_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
-        let place = self.boots.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
-        let others = self.boots.iter().any(|(_, _, at)| now.saturating_sub(*at) < GONE_AFTER);
+        let place = self.0.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
+        let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < GONE_AFTER);
         if place.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(place) }
     }
 }
@@ -97,30 +87,13 @@ impl Wire {
         recorder: Option<Recorder>,
         log_time: LogTime,
     ) -> anyhow::Result<Self> {
-        let mut open = Vec::new();
-        for endpoint in endpoints {
-            let transport = Transport::open(endpoint.clone())
-                .await
-                .with_context(|| format!("opening the link {endpoint}"))?;
-            let name = transport.address().to_string();
-            open.push(OpenLink {
-                sender: transport.sender(),
-                transport,
-                name,
-                ended: false,
-                boots: Vec::new(),
-            });
-        }
-        let (key_file, signing) = key.unzip();
-        let carried: Vec<_> = open.iter().map(|link| link.transport.address().capacity_bytes_s()).collect();
+        let links = Links::open(&endpoints, key).await?;
         Ok(Self {
+            boots: endpoints.iter().map(|_| Boots::default()).collect(),
+            links,
             vehicle,
-            hub: Hub::new(open.len(), signing).over(&carried),
             lockouts: Lockouts::default(),
             places: Places::default(),
-            open,
-            key_file,
-            saved_at: 0,
             save_failure_reported: false,
             encoder: Encoder::new(us),
             clock,
@@ -132,53 +105,33 @@ impl Wire {
 
     /// The addresses of the links.
     pub fn endpoints(&self) -> impl Iterator<Item = &LinkAddress> {
-        self.open.iter().map(|link| link.transport.address())
+        self.links.each().map(|(address, _)| address)
     }
 
     /// What the only link carries, bytes per second; `None` if no bound is known, and for several links.
     pub fn capacity_bytes_s(&self) -> Option<u32> {
-        let [only] = &self.open[..] else { return None };
-        only.transport.address().capacity_bytes_s()
+        let mut all = self.endpoints();
+        all.next().filter(|_| all.next().is_none())?.capacity_bytes_s()
     }
 
     /// The next data of any link, with the number of the link. What waits for a slow line is sent meanwhile.
     pub async fn receive(&mut self) -> (usize, Received) {
         loop {
-            let (clock, due_at) = (self.clock, self.hub.due_at());
+            let (clock, due_at) = (self.clock, self.links.hub().due_at());
             tokio::select! {
-                received = self.next() => return received,
+                received = self.links.next() => return received,
                 () = clock.sleep_until(due_at) => self.send_what_waits(),
             }
         }
-    }
-
-    async fn next(&mut self) -> (usize, Received) {
-        std::future::poll_fn(|context| {
-            for (number, link) in self.open.iter_mut().enumerate().filter(|(_, link)| !link.ended) {
-                match link.transport.poll_receive(context) {
-                    std::task::Poll::Pending => {}
-                    std::task::Poll::Ready(Some(received)) => {
-                        return std::task::Poll::Ready((number, received));
-                    }
-                    std::task::Poll::Ready(None) => {
-                        link.ended = true;
-                        let why = format!("{}: the link has ended", link.name);
-                        return std::task::Poll::Ready((number, Received::Down(why)));
-                    }
-                }
-            }
-            std::task::Poll::Pending
-        })
-        .await
     }
 
     /// Turns received data, and everything else that waits on the links, into messages.
     pub fn take(&mut self, (number, first): (usize, Received)) -> Vec<Msg> {
         let mut taken = Taken::default();
         self.take_one(number, first, &mut taken);
-        for number in 0..self.open.len() {
+        for number in 0..self.links.count() {
             for _ in 0..MAX_AT_ONCE {
-                let Some(received) = self.open[number].transport.try_receive() else { break };
+                let Some(received) = self.links.try_receive(number) else { break };
                 self.take_one(number, received, &mut taken);
             }
         }
@@ -195,21 +148,17 @@ impl Wire {
         if let Received::Datagram { bytes, .. } | Received::Stream(_, bytes) = &received {
             taken.bytes += bytes.len();
         }
-        let from = match &received {
-            Received::Datagram { from, .. } => Some(Origin::Datagram(*from)),
-            Received::Stream(id, _) => Some(Origin::Stream(*id)),
-            _ => None,
-        };
+        let from = received.origin();
         let msgs = &mut taken.msgs;
-        let name = self.open[number].name.clone();
-        let (now, stamp) = (self.clock.now(), self.unix_stamp());
-        for news in self.hub.take(number, received, now, stamp) {
+        let name = self.links.name(number).to_owned();
+        let now = self.now();
+        for news in self.links.take(number, received, now) {
             match news {
                 LinkEvent::Frame(frame) => {
                     self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
-                    if self.open.len() > 1 {
+                    if self.links.count() > 1 {
                         msgs.push(Msg::HeardOver(number));
                     }
                     if frame.source() == self.vehicle {
@@ -223,17 +172,14 @@ impl Wire {
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
                 }
-                LinkEvent::Believed(origin) => {
-                    taken.believed = true;
-                    self.open[number].sender.believe(origin);
-                }
+                LinkEvent::Believed(_) => taken.believed = true,
                 LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
                 // Counted and shown in the report of the link; a sender that is locked out is reported.
                 LinkEvent::Rejected(frame, why) => {
-                    msgs.extend(self.lockouts.refused(&frame, why, now, stamp).map(Msg::LinkSays));
+                    msgs.extend(self.lockouts.refused(&frame, why, now.time, now.stamp).map(Msg::LinkSays));
                 }
                 LinkEvent::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
-                LinkEvent::Down(why) if self.hub.links().iter().all(|link| link.trouble().is_some()) => {
+                LinkEvent::Down(why) if self.links.each().all(|(_, link)| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
                 }
                 LinkEvent::Down(why) => msgs.push(Msg::OneLinkDown(why)),
@@ -243,11 +189,11 @@ impl Wire {
 
     /// The text, with the name of the link if there are several.
     fn named(&self, name: &str, words: String) -> String {
-        if self.open.len() > 1 { format!("{name}: {words}") } else { words }
+        if self.links.count() > 1 { format!("{name}: {words}") } else { words }
     }
 
     fn framing(&self) -> FramerCounters {
-        self.hub.links().iter().fold(FramerCounters::default(), |mut sum, link| {
+        self.links.each().fold(FramerCounters::default(), |mut sum, (_, link)| {
             sum += link.framing();
             sum
         })
@@ -260,7 +206,7 @@ impl Wire {
             && let (Some(from), Ok(MavMessage::TD_FLIGHT_STATUS(status))) = (from, frame.decode())
         {
             let now = self.clock.now();
-            self.open[number].note_boot(status.boot_number, from, now);
+            self.boots[number].note(status.boot_number, from, now);
         }
     }
 
@@ -269,62 +215,47 @@ impl Wire {
     /// hold and a disarm go to everybody there. 0: the vehicle has reported no boot.
     pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
-        let (now, stamp) = (self.clock.now(), self.unix_stamp());
-        for number in 0..self.open.len() {
-            let to = if concerns_all(message) { Ok(None) } else { self.open[number].place_of(boot, now) };
+        let now = self.now();
+        for number in 0..self.links.count() {
+            let to =
+                if concerns_all(message) { Ok(None) } else { self.boots[number].place_of(boot, now.time) };
             // Only other vehicles are heard over this link.
             let Ok(to) = to else { continue };
-            if let Some(bytes) = self.hub.send(number, &frame, stamp) {
-                self.hand_over(number, &frame, bytes, to);
-            }
+            let Self { links, recorder, log_time, sent_bytes, .. } = self;
+            links.send(number, &frame, to, now, &mut |name, frame, count| {
+                *sent_bytes += count;
+                record(recorder.as_ref(), log_time, Direction::Tx, name, frame);
+            });
         }
         self.send_what_waits();
-        let dropped = self.hub.links().iter().zip(&self.open);
-        let drops = dropped.map(|(link, open)| link.dropped() + open.sender.dropped()).sum();
-        Msg::Sent { bytes: std::mem::take(&mut self.sent_bytes), drops }
+        Msg::Sent { bytes: std::mem::take(&mut self.sent_bytes), drops: self.links.dropped() }
     }
 
     /// Gives each slow line what it can carry by now.
     fn send_what_waits(&mut self) {
-        let (now, stamp) = (self.clock.now(), self.unix_stamp());
-        for number in 0..self.open.len() {
-            while let Some((frame, bytes)) = self.hub.leaving(number, now, stamp) {
-                self.hand_over(number, &frame, bytes, None);
-            }
-        }
-    }
-
-    fn hand_over(&mut self, number: usize, frame: &Frame, bytes: Vec<u8>, to: Option<Origin>) {
-        let count = bytes.len();
-        // What finds no room in the queue has not been sent.
-        if self.open[number].sender.send_to(bytes, to) {
-            self.record(Direction::Tx, &self.open[number].name, frame);
-            self.hub.on_sent(number, count, self.clock.now());
-            self.sent_bytes += count;
-        }
+        let now = self.now();
+        let Self { links, recorder, log_time, sent_bytes, .. } = self;
+        links.send_what_waits(now, &mut |name, frame, count| {
+            *sent_bytes += count;
+            record(recorder.as_ref(), log_time, Direction::Tx, name, frame);
+        });
     }
 
     /// Reports the state of each link. Also saves signing timestamps now and then.
     pub fn report(&mut self) -> Vec<Msg> {
-        let now = self.clock.now();
-        let stamp = self.unix_stamp();
+        let now = self.now();
         let mut msgs = Vec::new();
-        if stamp.saturating_sub(self.saved_at) >= SAVE_TIMESTAMPS_EVERY {
-            self.saved_at = stamp;
+        if self.links.saves_timestamps_at(now.stamp) {
             msgs.extend(self.save_timestamps());
         }
-        let links = self.hub.links().iter().zip(&self.open);
-        msgs.push(Msg::Links {
-            links: links.map(|(link, open)| report_of(link, open, now)).collect(),
-            signing: self.hub.signing(),
-        });
+        let links = self.links.each().map(|(address, link)| report_of(address, link, now.time));
+        msgs.push(Msg::Links { links: links.collect(), signing: self.links.hub().signing() });
         msgs
     }
 
     /// Saves signing timestamps for the next run; reports a failure once.
     pub fn save_timestamps(&mut self) -> Option<Msg> {
-        let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory()) else { return None };
-        let failed = file.remember(&memory).err();
+        let failed = self.links.save_timestamps().err();
         let was_said = std::mem::replace(&mut self.save_failure_reported, failed.is_some());
         failed.filter(|_| !was_said).map(|why| {
             Msg::LinkSays(format!(
@@ -333,17 +264,22 @@ impl Wire {
         })
     }
 
-    fn unix_stamp(&self) -> u64 {
-        Anchor::at(Duration::from_nanos(self.clock.start_unix_ns())).stamp(self.clock.now())
+    fn now(&self) -> Now {
+        let time = self.clock.now();
+        Now { time, stamp: Anchor::at(Duration::from_nanos(self.clock.start_unix_ns())).stamp(time) }
     }
 
     fn record(&self, direction: Direction, link: &str, frame: &Frame) {
-        if let Some(recorder) = &self.recorder
-            && let Some(bytes) = frame.for_log()
-        {
-            let frame = RawFrame { direction, endpoint: "ground", link: link.to_owned(), bytes };
-            recorder.try_record(Record::RawFrame(frame), self.log_time.now_ns());
-        }
+        record(self.recorder.as_ref(), &self.log_time, direction, link, frame);
+    }
+}
+
+fn record(recorder: Option<&Recorder>, log_time: &LogTime, direction: Direction, link: &str, frame: &Frame) {
+    if let Some(recorder) = recorder
+        && let Some(bytes) = frame.for_log()
+    {
+        let frame = RawFrame { direction, endpoint: "ground", link: link.to_owned(), bytes };
+        recorder.try_record(Record::RawFrame(frame), log_time.now_ns());
     }
 }
 
@@ -360,12 +296,12 @@ fn concerns_all(message: &MavMessage) -> bool {
     }
 }
 
-fn report_of(link: &HubLink, open: &OpenLink, now: Duration) -> LinkReport {
+fn report_of(address: &LinkAddress, link: &HubLink, now: Duration) -> LinkReport {
     LinkReport {
-        name: open.name.clone(),
+        name: address.to_string(),
         figures: link.stats().figures(now),
         sources: link.stats().sources(now),
-        capacity_bytes_s: open.transport.address().capacity_bytes_s(),
+        capacity_bytes_s: address.capacity_bytes_s(),
         copies: link.copies(),
         trouble: link.trouble().map(str::to_owned),
     }

@@ -11,43 +11,30 @@ use protocol::command::CommandRequest;
 use protocol::crew_file::{CrewFile, Mode};
 use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA, TdRole};
 use protocol::frame::Frame;
-use protocol::hub::{Hub, HubLink, LinkEvent};
+use protocol::hub::LinkEvent;
 use protocol::identity::Address;
 use protocol::key_file::KeyFile;
+use protocol::links::{self, MAX_AT_ONCE, Now};
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
 use protocol::signing::{Anchor, Rejection};
-use protocol::transport::{LinkAddress, Transport, TransportSender};
+use protocol::transport::LinkAddress;
 use sim::sortie::Radio;
 
 use super::FlyError;
 use super::recording::{note, record_raw};
 use crate::endpoint::{Outgoing, Path};
 
-/// Longest interval between saved timestamps, in units of 10 us.
-const REMEMBER_EVERY: u64 = 100_000;
-/// Most items taken from one link in a frame, so that a flood cannot delay the run loop.
-const MAX_AT_ONCE: usize = 1024;
-
 /// Most received frames recorded in a second, so that a flood neither fills the log nor stops it.
 const MAX_RECORDED_S: u32 = 500;
 
 /// Every link of the vehicle.
 pub(super) struct Links {
-    open: Vec<OpenLink>,
+    open: links::Links,
     intake: Intake,
-    hub: Hub,
-    key_file: Option<KeyFile>,
-    remembered_at: u64,
     stamps: Stamps,
     recorder: Option<Recorder>,
     pub(super) tx_bytes: u64,
-}
-
-struct OpenLink {
-    transport: Transport,
-    sender: TransportSender,
-    name: String,
 }
 
 /// Received frames on their way into the log.
@@ -105,53 +92,38 @@ impl Links {
         crew: Option<&CrewFile>,
         recorder: Option<Recorder>,
     ) -> Result<Self, FlyError> {
-        let (key_file, signing) = key_file.map(|path| KeyFile::open(path, "vehicle")).transpose()?.unzip();
+        let key = key_file.map(|path| KeyFile::open(path, "vehicle")).transpose()?;
         let operators = crew.map(CrewFile::keys).transpose()?.unwrap_or_default();
-        let signing = signing.map(|signing| signing.with_operators(operators));
-        let mut open = Vec::new();
-        for endpoint in endpoints {
-            let transport = Transport::open(endpoint.clone())
-                .await
-                .map_err(|source| FlyError::Link { link: endpoint.to_string(), source })?;
-            let name = transport.address().to_string();
-            open.push(OpenLink { sender: transport.sender(), transport, name });
-        }
-        let carried: Vec<_> = open.iter().map(|link| link.transport.address().capacity_bytes_s()).collect();
-        let hub = Hub::new(open.len(), signing).over(&carried);
+        let key = key.map(|(file, signing)| (file, signing.with_operators(operators)));
+        let links = links::Links::open(endpoints, key).await?;
         let intake = Intake { recorder: recorder.clone(), second: 0, recorded: 0, left_out: 0 };
-        Ok(Self {
-            open,
-            intake,
-            hub,
-            key_file,
-            remembered_at: 0,
-            stamps: Stamps::begin(),
-            recorder,
-            tx_bytes: 0,
-        })
+        Ok(Self { open: links, intake, stamps: Stamps::begin(), recorder, tx_bytes: 0 })
+    }
+
+    fn now(&self, time_s: f64) -> Now {
+        Now { time: Duration::from_secs_f64(time_s), stamp: self.stamps.now() }
     }
 
     pub(super) fn receive(&mut self, time_s: f64) -> Vec<Received> {
-        let (now, clock) = (Duration::from_secs_f64(time_s), self.stamps.now());
-        let recorder = self.recorder.as_ref();
+        let now = self.now(time_s);
+        let Self { open: links, intake, recorder, .. } = self;
+        let recorder = recorder.as_ref();
         let mut heard = Vec::new();
         let mut believed = false;
-        for (number, OpenLink { transport, sender, name }) in self.open.iter_mut().enumerate() {
+        for number in 0..links.count() {
+            let name = links.name(number).to_owned();
             for _ in 0..MAX_AT_ONCE {
-                let Some(received) = transport.try_receive() else { break };
+                let Some(received) = links.try_receive(number) else { break };
                 let path = Path { link: number, origin: received.origin() };
-                for news in self.hub.take(number, received, now, clock) {
-                    match news {
-                        LinkEvent::Believed(origin) => {
-                            believed = true;
-                            sender.believe(origin);
-                        }
+                for event in links.take(number, received, now) {
+                    match event {
+                        LinkEvent::Believed(_) => believed = true,
                         LinkEvent::Frame(frame) => {
-                            self.intake.record(name, &frame, time_s);
+                            intake.record(&name, &frame, time_s);
                             heard.push(Received::Frame(path, frame));
                         }
                         LinkEvent::Copy(frame) => {
-                            self.intake.record(name, &frame, time_s);
+                            intake.record(&name, &frame, time_s);
                             heard.push(Received::Copy(path, frame));
                         }
                         // Counted but not recorded: a flood of forgeries must not fill the log.
@@ -166,54 +138,44 @@ impl Links {
             }
         }
         // Save the timestamp before acting on the frame, so that it cannot be replayed after a restart.
-        if believed || clock.saturating_sub(self.remembered_at) >= REMEMBER_EVERY {
-            self.remembered_at = clock;
-            self.remember(time_s);
+        if self.open.saves_timestamps_at(now.stamp) || believed {
+            self.save_timestamps(time_s);
         }
         heard
     }
 
     /// Sends a frame. For a slow line it may wait until [`Links::send_what_waits`].
-    pub(super) fn send(&mut self, Outgoing { frame, links }: &Outgoing, time_s: f64) {
-        let (stamp, count) = (self.stamps.now(), self.open.len());
-        for number in links.iter().copied().filter(|number| *number < count) {
-            if let Some(bytes) = self.hub.send(number, frame, stamp) {
-                self.hand_over(number, frame, bytes, time_s);
-            }
+    pub(super) fn send(&mut self, Outgoing { frame, links: to }: &Outgoing, time_s: f64) {
+        let now = self.now(time_s);
+        let Self { open: links, recorder, tx_bytes, .. } = self;
+        let count = links.count();
+        for number in to.iter().copied().filter(|number| *number < count) {
+            links.send(number, frame, None, now, &mut |name, frame, bytes| {
+                *tx_bytes += bytes as u64;
+                record_raw(recorder.as_ref(), Direction::Tx, name, frame, time_s);
+            });
         }
     }
 
     /// Gives each slow line what it can carry by now.
     pub(super) fn send_what_waits(&mut self, time_s: f64) {
-        let (now, stamp) = (Duration::from_secs_f64(time_s), self.stamps.now());
-        for number in 0..self.open.len() {
-            while let Some((frame, bytes)) = self.hub.leaving(number, now, stamp) {
-                self.hand_over(number, &frame, bytes, time_s);
-            }
-        }
-    }
-
-    fn hand_over(&mut self, number: usize, frame: &Frame, bytes: Vec<u8>, time_s: f64) {
-        let OpenLink { sender, name, .. } = &self.open[number];
-        let count = bytes.len();
-        // A frame without room was not sent, so the log must not contain it.
-        if sender.send(bytes) {
-            self.tx_bytes += count as u64;
-            self.hub.on_sent(number, count, Duration::from_secs_f64(time_s));
-            record_raw(self.recorder.as_ref(), Direction::Tx, name, frame, time_s);
-        }
+        let now = self.now(time_s);
+        let Self { open: links, recorder, tx_bytes, .. } = self;
+        links.send_what_waits(now, &mut |name, frame, bytes| {
+            *tx_bytes += bytes as u64;
+            record_raw(recorder.as_ref(), Direction::Tx, name, frame, time_s);
+        });
     }
 
     /// Number of frames dropped because their link had no room.
     pub(super) fn dropped(&self) -> u64 {
-        let of_lines: u64 = self.hub.links().iter().map(HubLink::dropped).sum();
-        of_lines + self.open.iter().map(|link| link.sender.dropped()).sum::<u64>()
+        self.open.dropped()
     }
 
     /// Writes the final statistics into the log: traffic of each link, and frames refused for their signature.
     pub(super) fn close(&mut self, time_s: f64) {
         let now = Duration::from_secs_f64(time_s);
-        for (link, OpenLink { name, .. }) in self.hub.links().iter().zip(&self.open) {
+        for (name, link) in self.open.each() {
             let (figures, framing) = (link.stats().figures(now), link.framing());
             let words = format!(
                 "link {name}: {} frames heard, {} copies, loss {:.1} %, {} bad checksums, {} unknown ids",
@@ -225,7 +187,7 @@ impl Links {
             );
             note(self.recorder.as_ref(), time_s, &words);
         }
-        if let Some(counters) = self.hub.signing() {
+        if let Some(counters) = self.open.hub().signing() {
             let words = format!(
                 "signatures: {} accepted, {} unsigned, {} wrong, {} replayed, {} too old, {} too new",
                 counters.accepted,
@@ -237,13 +199,11 @@ impl Links {
             );
             note(self.recorder.as_ref(), time_s, &words);
         }
-        self.remember(time_s);
+        self.save_timestamps(time_s);
     }
 
-    fn remember(&mut self, time_s: f64) {
-        if let (Some(file), Some(memory)) = (&mut self.key_file, self.hub.signing_memory())
-            && let Err(error) = file.remember(&memory)
-        {
+    fn save_timestamps(&mut self, time_s: f64) {
+        if let Err(error) = self.open.save_timestamps() {
             note(self.recorder.as_ref(), time_s, &format!("timestamps are not saved: {error}"));
         }
     }

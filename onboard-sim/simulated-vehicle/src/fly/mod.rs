@@ -147,12 +147,8 @@ pub enum FlyError {
     #[error(transparent)]
     Board(#[from] BoardError),
     /// A link cannot be opened.
-    #[error("cannot open the link {link}")]
-    Link {
-        link: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Link(#[from] protocol::links::OpenError),
 }
 
 /// How a flight ended.

@@ -167,7 +167,8 @@ fn in_the_descent_the_band_is_told_four_times_a_second() {
     });
     let estimator = estimator.unwrap();
     assert!(estimator.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS), "{estimator:?}");
-    assert!(estimator.vel_ratio.is_nan() && (0.01..5.0).contains(&estimator.pos_vert_accuracy));
+    assert!((0.0..1.0).contains(&estimator.vel_ratio) && (0.0..1.0).contains(&estimator.pos_vert_ratio));
+    assert!((0.01..5.0).contains(&estimator.pos_vert_accuracy));
     let sensors = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE;
     let healthy = sent.iter().any(|frame| {
