@@ -156,21 +156,21 @@ enum Command {
 }
 
 impl Cli {
-    /// Answers the question.
+    /// Runs the command.
     ///
     /// # Errors
     /// There is no answer.
     pub fn run(self) -> Result<Outcome> {
         match self.command {
-            Command::Info(ask) => ask.run(),
-            Command::Verify(ask) => ask.run(),
-            Command::Evaluate(ask) => ask.run(),
-            Command::Refly(ask) => ask.run(),
-            Command::Compare(ask) => ask.run(),
-            Command::Report(ask) => ask.run(),
-            Command::Export(ask) => ask.run(),
-            Command::Recover(ask) => ask.run(),
-            Command::Fit(ask) => ask.run(),
+            Command::Info(args) => args.run(),
+            Command::Verify(args) => args.run(),
+            Command::Evaluate(args) => args.run(),
+            Command::Refly(args) => args.run(),
+            Command::Compare(args) => args.run(),
+            Command::Report(args) => args.run(),
+            Command::Export(args) => args.run(),
+            Command::Recover(args) => args.run(),
+            Command::Fit(args) => args.run(),
             Command::Completions { shell } => {
                 let mut script = Vec::new();
                 clap_complete::generate(shell, &mut Self::command(), "replay", &mut script);

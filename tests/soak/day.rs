@@ -81,6 +81,6 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
         }
     }
     let landed = vehicle.judged().is_some_and(|judged| judged.landed);
-    let told = model.vehicle.verdict.as_ref().is_some_and(|verdict| verdict.value.landed);
+    let told = model.vehicle.verdict().is_some_and(|verdict| verdict.value.landed);
     Ok(landed && told)
 }

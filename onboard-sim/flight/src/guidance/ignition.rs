@@ -32,7 +32,7 @@ pub struct IgnitionSettings {
 
 /// What a tick computes for the choice of the ignition.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct IgnitionOutlook {
+pub struct IgnitionPrediction {
     /// Heights from which the certified motor lands if its thrust begins there at the expected speed, m.
     pub band: Option<Band>,
     /// Heights from which all considered motors land, m.
@@ -47,7 +47,7 @@ pub struct IgnitionOutlook {
     pub command_in_s: Option<f64>,
 }
 
-impl IgnitionOutlook {
+impl IgnitionPrediction {
     /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin
     /// below the chosen height; `onset_m` is where it would begin.
     pub fn overdue_s(&self, onset_m: f64) -> Option<f64> {
@@ -87,7 +87,7 @@ impl IgnitionSettings {
         height_m: f64,
         vertical_m_s: f64,
         fin_drag_area_m2: f64,
-    ) -> IgnitionOutlook {
+    ) -> IgnitionPrediction {
         let (onset_height_m, onset_vertical_m_s) =
             column.fallen(height_m, vertical_m_s, fin_drag_area_m2, self.delay_s);
         let band = |impulse_scale, time_scale| {
@@ -111,7 +111,7 @@ impl IgnitionSettings {
         });
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
-        IgnitionOutlook {
+        IgnitionPrediction {
             band: certified,
             common,
             chosen_m,

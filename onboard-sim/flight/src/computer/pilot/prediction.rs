@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::Pilot;
 use crate::computer::Input;
 use crate::estimation::estimator::Estimate;
-use crate::guidance::ignition::IgnitionOutlook;
+use crate::guidance::ignition::IgnitionPrediction;
 use crate::guidance::vertical::fall_ends_m_s;
 use crate::rules::gate::GateInput;
 use crate::rules::phase::{Event, Mode, Phase};
@@ -22,7 +22,7 @@ const FALL_MIN_M_S: f64 = 5.0;
 /// The forecast before ignition, renewed five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Prediction {
-    pub ignition: IgnitionOutlook,
+    pub ignition: IgnitionPrediction,
     /// Height of the feet below which the parachute has no room to spare, m.
     pub commit_height_m: f64,
     /// Height of the feet, m.
