@@ -9,10 +9,8 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context as _, Result, ensure};
 use campaign::run::threads;
 
-use crate::info::Completeness;
 use crate::log::{Cut, Gap, Recording};
 use crate::output::write_whole;
-use crate::verify::Verification;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
 const EXIT_NO: u8 = 1;
@@ -23,10 +21,8 @@ pub const EXIT_NO_ANSWER: u8 = 2;
 pub enum Outcome {
     /// There is an answer.
     Given,
-    /// Some of the logs could not be read.
+    /// Some of the logs could not be read, or not be run again.
     NotAll,
-    /// A bit-for-bit comparison. If `strict`, it must cover the whole flight.
-    Verified { outcome: Verification, strict: bool },
     /// Yes or no.
     Decided { yes: bool },
 }
@@ -38,14 +34,6 @@ impl Outcome {
             Self::Given | Self::Decided { yes: true } => 0,
             Self::Decided { yes: false } => EXIT_NO,
             Self::NotAll => EXIT_NO_ANSWER,
-            Self::Verified { outcome, strict } => match outcome {
-                Verification::Identical => 0,
-                Verification::IdenticalReadablePart if !strict => 0,
-                Verification::IdenticalReadablePart | Verification::Impossible | Verification::Diverged => {
-                    EXIT_NO
-                }
-                Verification::NotReplayable => EXIT_NO_ANSWER,
-            },
         }
     }
 }
@@ -164,12 +152,6 @@ pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
     }
     warn_of_damage(&recording.name, recording.damage.as_deref());
     warn_of_cut(&recording.name, recording.cut.as_ref());
-}
-
-/// Warns about the damage and the missing end of a log that was described.
-pub(crate) fn warn_of_completeness(name: &str, found: &Completeness) {
-    warn_of_damage(name, found.damage.as_deref());
-    warn_of_cut(name, found.cut.as_ref());
 }
 
 /// Warns that only the part of a log before its damage is used.

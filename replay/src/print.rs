@@ -12,7 +12,7 @@ use anyhow::Result;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use serde::Serialize;
 
-use crate::info::{VerdictFacts, VerdictLimit};
+use crate::log::{VerdictFacts, VerdictLimit};
 
 /// Writes any report as JSON.
 ///

@@ -25,8 +25,8 @@ pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
 use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
-use crate::info::VerdictFacts;
 use crate::log::RecordingError;
+use crate::log::VerdictFacts;
 use crate::print::{
     JunitCase, JunitOutcome, LimitRow, counted, print_json, print_junit, shown, verdict_rows, verdict_words,
 };

@@ -7,7 +7,7 @@ use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use super::CompareError;
-use crate::info::VerdictFacts;
+use crate::log::VerdictFacts;
 use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts, heard_message};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 

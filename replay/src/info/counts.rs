@@ -10,7 +10,8 @@ use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;
 use serde::Serialize;
 
-use super::{Grade, GradeLevel, ProfileFacts, VerdictFacts};
+use super::{Grade, GradeLevel, ProfileFacts};
+use crate::log::VerdictFacts;
 use crate::log::{Entry, FrameOrder, Gap, StampedEntry, TickRanges};
 
 /// A channel of a log.

@@ -11,15 +11,14 @@ pub use self::counts::{ChannelFacts, FrameFacts, PhaseSource, PhaseSpan, PhaseTi
 use anyhow::Result;
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
-use protocol::log::v1;
 use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Outcome, answer, say, warn_of_completeness};
+use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
 use crate::log::{
-    AttachmentFacts, BuildComparison, Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Flights, Found, Head,
-    LogError, SummaryFacts, Verdicts, heard_message, summary_of,
+    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, SummaryFacts,
+    VerdictFacts, Verdicts, heard_message, summary_of,
 };
 use crate::print::{counted, print_json, shown};
 
@@ -304,6 +303,12 @@ pub struct Completeness {
 }
 
 impl Completeness {
+    /// Warns about the damage and the missing end of a log that was described.
+    pub(crate) fn warn(&self, name: &str) {
+        warn_of_damage(name, self.damage.as_deref());
+        warn_of_cut(name, self.cut.as_ref());
+    }
+
     pub(super) fn new(
         damage: Option<&Damage>,
         span: Option<&Span>,
@@ -332,75 +337,6 @@ impl Completeness {
     pub(super) fn with_flights(self, flights: &Flights) -> Self {
         let cut = flights.cut();
         Self { complete: self.complete && cut.is_none(), flights: flights.flown(), cut, ..self }
-    }
-}
-
-/// The landing verdict, as recorded or heard.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictFacts {
-    /// Whether the vehicle landed within the limits that decide.
-    pub landed: bool,
-    /// How the flight ended, in one sentence.
-    pub ending: String,
-    /// Time of contact, s.
-    pub time_s: f64,
-    /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
-    pub clock: Clock,
-    /// The limits that decide: those of the legs.
-    pub limits: Vec<VerdictLimit>,
-    /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
-    pub table_2: Vec<VerdictLimit>,
-}
-
-/// A limit of the landing verdict.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictLimit {
-    /// Name of the judged quantity.
-    pub name: String,
-    pub value: f64,
-    /// The lowest allowed.
-    pub minimum: f64,
-    /// The highest allowed.
-    pub maximum: f64,
-    /// Unit of value and limits.
-    pub unit: String,
-    /// Whether the value is inside the limits.
-    pub passed: bool,
-}
-
-impl VerdictFacts {
-    /// A recorded verdict.
-    pub fn of(verdict: &v1::LandingVerdict) -> Self {
-        let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
-            let limits = limits.iter().map(|limit| VerdictLimit {
-                name: limit.name.clone(),
-                value: limit.value,
-                minimum: limit.minimum,
-                maximum: limit.maximum,
-                unit: limit.unit.clone(),
-                passed: limit.passed,
-            });
-            limits.collect()
-        };
-        Self {
-            landed: verdict.landed,
-            ending: verdict.ending.clone().unwrap_or_default(),
-            time_s: verdict.time_s,
-            clock: Clock::Flight,
-            limits: facts(&verdict.limits),
-            table_2: facts(&verdict.table_2),
-        }
-    }
-
-    /// The verdict that was found in a log.
-    pub(crate) fn found(found: &Found) -> Self {
-        let clock = if found.heard { Clock::Boot } else { Clock::Flight };
-        Self { clock, ..Self::of(&found.verdict) }
-    }
-
-    /// Its time of contact with its clock.
-    pub fn contact(&self) -> ClockTime {
-        ClockTime { clock: self.clock, time_s: self.time_s }
     }
 }
 
@@ -660,7 +596,7 @@ impl Args {
         // On a terminal the description has said it already.
         let said = !self.json && std::io::stdout().is_terminal();
         for info in described.iter().filter(|_| !said) {
-            warn_of_completeness(&info.file, &info.completeness);
+            info.completeness.warn(&info.file);
         }
         Ok(if refused { Outcome::NotAll } else { Outcome::Given })
     }

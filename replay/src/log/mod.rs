@@ -27,7 +27,8 @@ pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 use verdict::contradiction;
-pub(crate) use verdict::{Found, Heard, Verdicts, frame_of, heard_message};
+pub(crate) use verdict::{Heard, Verdicts, frame_of, heard_message};
+pub use verdict::{VerdictFacts, VerdictLimit};
 
 use crate::output::{Destination, NewFile, WriteError};
 

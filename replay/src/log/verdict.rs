@@ -9,13 +9,84 @@ use protocol::log::record::TOPIC_RAW_RX;
 use protocol::log::v1;
 use sim::ending::{FlightEnding, UNDER_PARACHUTE};
 
-use super::{Entry, StampedEntry};
+use serde::Serialize;
+
+use super::{Clock, ClockTime, Entry, StampedEntry};
 
 /// A value of the verdict whose limit no message has given.
 const NOT_TOLD: f64 = f64::NAN;
 /// Limits up to these are the landing paper's Table 2: m/s along and across the axis.
 const TABLE_2_M_S: [f64; 2] = [0.4, 0.1];
 const ROUNDING: f64 = 1e-6;
+
+/// The landing verdict, as recorded or heard.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictFacts {
+    /// Whether the vehicle landed within the limits that decide.
+    pub landed: bool,
+    /// How the flight ended, in one sentence.
+    pub ending: String,
+    /// Time of contact, s.
+    pub time_s: f64,
+    /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
+    pub clock: Clock,
+    /// The limits that decide: those of the legs.
+    pub limits: Vec<VerdictLimit>,
+    /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
+    pub table_2: Vec<VerdictLimit>,
+}
+
+/// A limit of the landing verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictLimit {
+    /// Name of the judged quantity.
+    pub name: String,
+    pub value: f64,
+    /// The lowest allowed.
+    pub minimum: f64,
+    /// The highest allowed.
+    pub maximum: f64,
+    /// Unit of value and limits.
+    pub unit: String,
+    /// Whether the value is inside the limits.
+    pub passed: bool,
+}
+
+impl VerdictFacts {
+    /// A recorded verdict.
+    pub fn of(verdict: &v1::LandingVerdict) -> Self {
+        let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
+            let limits = limits.iter().map(|limit| VerdictLimit {
+                name: limit.name.clone(),
+                value: limit.value,
+                minimum: limit.minimum,
+                maximum: limit.maximum,
+                unit: limit.unit.clone(),
+                passed: limit.passed,
+            });
+            limits.collect()
+        };
+        Self {
+            landed: verdict.landed,
+            ending: verdict.ending.clone().unwrap_or_default(),
+            time_s: verdict.time_s,
+            clock: Clock::Flight,
+            limits: facts(&verdict.limits),
+            table_2: facts(&verdict.table_2),
+        }
+    }
+
+    /// The verdict that was found in a log.
+    pub(crate) fn found(found: &Found) -> Self {
+        let clock = if found.heard { Clock::Boot } else { Clock::Flight };
+        Self { clock, ..Self::of(&found.verdict) }
+    }
+
+    /// Its time of contact with its clock.
+    pub fn contact(&self) -> ClockTime {
+        ClockTime { clock: self.clock, time_s: self.time_s }
+    }
+}
 
 /// The verdict as the vehicle told it over the air.
 #[derive(Debug, Default)]

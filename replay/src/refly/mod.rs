@@ -35,7 +35,7 @@ use sim::world::whole::WorldError;
 
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};
-use crate::info::VerdictFacts;
+use crate::log::VerdictFacts;
 use crate::log::{Clock, ClockTime, NewLog, Recording, RecordingError};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};

@@ -21,8 +21,8 @@ use super::{
     refuse_timed,
 };
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT};
-use crate::info::VerdictFacts;
 use crate::log::Recording;
+use crate::log::VerdictFacts;
 use crate::settings::{Setting, mission_with, truth_with};
 
 /// Number and time of a record that is kept.

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use track::Flight;
 
-use crate::cli::{Outcome, answer, warn_of_completeness};
+use crate::cli::{Outcome, answer};
 use crate::info::{Completeness, Info, info};
 use crate::log::{Recording, RecordingError};
 use crate::output::{Destination, Overwrite, same_file, write_whole};
@@ -87,7 +87,7 @@ impl Args {
         let path = self.output.clone().unwrap_or_else(|| self.file.with_extension("html"));
         if path.as_os_str() == "-" {
             answer(|output| output.write_all(html.as_bytes()))?;
-            warn_of_completeness(&page.name, &page.completeness);
+            page.completeness.warn(&page.name);
             return Ok(Outcome::Given);
         }
         if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
@@ -96,7 +96,7 @@ impl Args {
         let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
         write_whole(destination, &self.file, |file| file.write_all(html.as_bytes()))?;
         answer(|output| writeln!(output, "{}", path.display()))?;
-        warn_of_completeness(&page.name, &page.completeness);
+        page.completeness.warn(&page.name);
         Ok(Outcome::Given)
     }
 }

@@ -13,7 +13,7 @@ use super::inputs::Inputs;
 use super::parts::Part;
 use super::{FileFacts, Obstacle, VerifyReport};
 use crate::controller::LoggedComputer;
-use crate::info::VerdictFacts;
+use crate::log::VerdictFacts;
 use crate::log::{
     Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, misread_frame,
     summary_of,

@@ -176,6 +176,18 @@ pub enum Verification {
     NotReplayable,
 }
 
+impl Verification {
+    /// The answer. If `strict`, only a whole flight is identical.
+    fn answer(self, strict: bool) -> Outcome {
+        match self {
+            Self::Identical => Outcome::Given,
+            Self::IdenticalReadablePart => Outcome::Decided { yes: !strict },
+            Self::Impossible | Self::Diverged => Outcome::Decided { yes: false },
+            Self::NotReplayable => Outcome::NotAll,
+        }
+    }
+}
+
 /// Why ticks were not compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Obstacle {
@@ -717,7 +729,7 @@ impl Args {
             Verification::Identical if strict && !all_compared => Verification::IdenticalReadablePart,
             worst => worst,
         };
-        Ok(Outcome::Verified { outcome, strict })
+        Ok(outcome.answer(strict))
     }
 }
 

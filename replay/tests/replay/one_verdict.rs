@@ -21,7 +21,7 @@ fn said_alike(log: &std::path::PathBuf) -> String {
 fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
     for log in [&LANDED.log, &MK2.log] {
         let verdict = info(log).unwrap().verdict.unwrap();
-        let names = |limits: &[replay::info::VerdictLimit]| -> Vec<String> {
+        let names = |limits: &[replay::log::VerdictLimit]| -> Vec<String> {
             limits.iter().map(|limit| limit.name.clone()).collect()
         };
         assert_eq!(
@@ -34,7 +34,7 @@ fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
         assert_eq!(ending.contains("every limit"), verdict.landed && strict, "{ending}");
         let (_, stdout, _) = run(&mut replay("info", log));
         let broken =
-            |limits: &[replay::info::VerdictLimit]| limits.iter().filter(|limit| !limit.passed).count();
+            |limits: &[replay::log::VerdictLimit]| limits.iter().filter(|limit| !limit.passed).count();
         let broken = broken(&verdict.limits) + broken(&verdict.table_2);
         assert_eq!(stdout.matches("is OUTSIDE").count(), broken, "{stdout}");
         // One screen of a terminal.

@@ -3,7 +3,8 @@
 use flight::rules::phase::Phase;
 
 use super::rms_and_max;
-use crate::info::{Info, PhaseSpan, VerdictLimit, print_info};
+use crate::info::{Info, PhaseSpan, print_info};
+use crate::log::VerdictLimit;
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, escaped, paragraph, put, table, table_of_limits};

@@ -18,7 +18,7 @@ use sim::sortie::Sortie;
 
 use super::{Checked, FlightResult, Flown, Found, SuiteError};
 use crate::digest::digest;
-use crate::info::VerdictFacts;
+use crate::log::VerdictFacts;
 use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
 use crate::verify::{Obstacle, Verification, verify};
