@@ -133,18 +133,20 @@ def euler(world_from_body):
 def input_of(time_s, plant, sample, contact):
     """A frame's input but for its number: time, readings, gimbal (its servos do not say), fins, contact, igniter, pin, log."""
     gyro, force, height, fix, distance = sample
-    measured = vector(1, gyro) + vector(2, force)
+    measured = message(1, vector(1, gyro) + vector(2, force))
     if height is not None:
-        measured += double(3, height)
+        measured += double(2, height)
     if fix:
         (north, east, up), (north_m_s, east_m_s, up_m_s), valid_us = fix
         place, velocity = vector(1, (north, -east, up)), vector(2, (north_m_s, -east_m_s, up_m_s))
-        measured += message(4, place + velocity + double(3, valid_us * 1e-6))
+        measured += message(3, place + velocity + double(3, valid_us * 1e-6))
     if distance is not None:
-        measured += double(5, distance)
+        measured += double(4, distance)
     fins = [plant.fdm[f"fcs/fin{fin}-rad"] for fin in range(4)]
-    flags = whole(8, contact) + whole(9, True) + whole(10, True) + whole(11, True) + whole(12, 1 << 30)
-    return double(2, time_s) + message(3, measured) + doubles(6, (0.0, 0.0)) + doubles(7, fins) + flags
+    # Contact, continuity of the igniter, no booster, the pin is out; the log.
+    flags = whole(7, contact) + whole(8, True) + whole(9, False) + whole(10, True)
+    log = message(12, whole(1, True) + whole(2, 1 << 30))
+    return double(2, time_s) + message(3, measured) + doubles(5, (0.0, 0.0)) + doubles(6, fins) + flags + log
 
 
 def fly(computer, order, draw):
