@@ -161,11 +161,24 @@ impl Server {
             return Taken::NotNow;
         }
         if matches!(packet.opcode, Opcode::ReadFile | Opcode::BurstReadFile) {
-            match self.session_of(*client, packet.session) {
+            let len = self.session_of(*client, packet.session).map(|session| {
+                (session.link, session.used_at) = (link, now);
+                session.len
+            });
+            match len {
                 None => self.answer(link, *client, packet.nak(Refusal::InvalidSession)),
-                Some(session) => {
-                    (session.link, session.used_at) = (link, now);
-                    session.ask(packet);
+                Some(len) if packet.offset >= len => {
+                    if let Some(session) = self.session_of(*client, packet.session)
+                        && packet.opcode == Opcode::BurstReadFile
+                    {
+                        session.end_burst();
+                    }
+                    self.answer(link, *client, packet.nak(Refusal::EndOfFile));
+                }
+                Some(_) => {
+                    if let Some(session) = self.session_of(*client, packet.session) {
+                        session.ask(packet);
+                    }
                 }
             }
             return Taken::Answered;
@@ -416,6 +429,14 @@ struct Burst {
     pieces_left: u32,
 }
 
+impl Burst {
+    /// Whether it will come to this offset.
+    fn is_ahead(&self, offset: u32) -> bool {
+        let end = u64::from(self.offset) + u64::from(self.pieces_left) * u64::from(self.request.size);
+        offset > self.offset && u64::from(offset) <= end
+    }
+}
+
 #[derive(Debug, Clone)]
 struct Session {
     number: u8,
@@ -427,33 +448,65 @@ struct Session {
     used_at: Duration,
     reads: VecDeque<Packet>,
     burst: Option<Burst>,
+    /// A piece of the burst comes next, because a single one came before it.
+    burst_next: bool,
 }
 
 impl Session {
     fn new(number: u8, client: Address, link: usize, (place, len): (usize, u32), now: Duration) -> Self {
-        Self { number, client, link, place, len, used_at: now, reads: VecDeque::new(), burst: None }
+        Self {
+            number,
+            client,
+            link,
+            place,
+            len,
+            used_at: now,
+            reads: VecDeque::new(),
+            burst: None,
+            burst_next: false,
+        }
     }
 
     fn is(&self, client: Address, number: u8) -> bool {
         self.client == client && self.number == number
     }
 
+    /// Takes a request to read inside the file.
     fn ask(&mut self, request: &Packet) {
         if request.opcode == Opcode::BurstReadFile {
-            self.burst = Some(Burst {
-                request: request.clone(),
-                sequence: request.sequence,
-                offset: request.offset,
-                pieces_left: BURST_PIECES,
-            });
+            // A request that comes again does not begin again what is under way, and one for pieces farther ahead in
+            // it prolongs it. So a client need not wait for the end of a burst, nor for its last packet if that is lost.
+            if let Some(burst) = &mut self.burst
+                && burst.request.size == request.size
+                && (burst.request == *request || burst.is_ahead(request.offset))
+            {
+                if burst.request != *request {
+                    burst.pieces_left = BURST_PIECES;
+                }
+            } else {
+                self.burst = Some(Burst {
+                    request: request.clone(),
+                    sequence: request.sequence,
+                    offset: request.offset,
+                    pieces_left: BURST_PIECES,
+                });
+            }
         } else if self.reads.len() < MAX_READS && !self.reads.contains(request) {
             self.reads.push_back(request.clone());
         }
     }
 
-    /// The next packet: single pieces first, for they fill the gaps of a burst.
+    fn end_burst(&mut self) {
+        self.burst = None;
+    }
+
+    /// The next packet. Single pieces and a burst take turns, so that neither waits for the other.
     fn next(&mut self, piece: &mut [u8; DATA_LEN], files: &mut dyn Files) -> Option<Packet> {
-        if let Some(request) = self.reads.pop_front() {
+        let burst_first = core::mem::replace(&mut self.burst_next, false);
+        if let Some(request) =
+            (!burst_first || self.burst.is_none()).then(|| self.reads.pop_front()).flatten()
+        {
+            self.burst_next = true;
             let read = self.read(request.offset, request.size, piece, files);
             return Some(read.map_or_else(|why| request.nak(why), |read| request.ack(&piece[..read])));
         }
