@@ -159,8 +159,9 @@ fn extended_sys_state(state: &VehicleState<'_>) -> MavMessage {
 }
 
 fn attitude(state: &VehicleState<'_>) -> MavMessage {
-    let [q1, q2, q3, q4] = state.motion().ned_from_body.map(|part| part as f32);
-    let [rollspeed, pitchspeed, yawspeed] = state.motion().rate_rad_s.map(|rate| rate as f32);
+    let motion = state.motion();
+    let [q1, q2, q3, q4] = motion.ned_from_body.map(|part| part as f32);
+    let [rollspeed, pitchspeed, yawspeed] = motion.rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
         time_boot_ms: boot_ms(state.time_s),
         q1,
@@ -175,8 +176,9 @@ fn attitude(state: &VehicleState<'_>) -> MavMessage {
 }
 
 fn position(state: &VehicleState<'_>) -> MavMessage {
-    let [x, y, z] = state.motion().position_m.map(|metres| metres as f32);
-    let [vx, vy, vz] = state.motion().velocity_m_s.map(|speed| speed as f32);
+    let motion = state.motion();
+    let [x, y, z] = motion.position_m.map(|metres| metres as f32);
+    let [vx, vy, vz] = motion.velocity_m_s.map(|speed| speed as f32);
     MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
         time_boot_ms: boot_ms(state.time_s),
         x,

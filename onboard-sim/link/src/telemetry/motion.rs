@@ -55,8 +55,9 @@ pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
 }
 
 pub(super) fn attitude(state: &VehicleState<'_>) -> MavMessage {
-    let [roll, pitch, yaw] = roll_pitch_yaw_rad(&state.motion().ned_from_body).map(|angle| angle as f32);
-    let [rollspeed, pitchspeed, yawspeed] = state.motion().rate_rad_s.map(|rate| rate as f32);
+    let motion = state.motion();
+    let [roll, pitch, yaw] = roll_pitch_yaw_rad(&motion.ned_from_body).map(|angle| angle as f32);
+    let [rollspeed, pitchspeed, yawspeed] = motion.rate_rad_s.map(|rate| rate as f32);
     MavMessage::ATTITUDE(ATTITUDE_DATA {
         time_boot_ms: boot_ms(state.time_s),
         roll,
@@ -79,8 +80,9 @@ fn millimetres(length_m: f64) -> i32 {
 }
 
 pub(super) fn position(state: &VehicleState<'_>) -> MavMessage {
-    let [north_m, east_m, down_m] = state.motion().position_m;
-    let [vx, vy, vz] = state.motion().velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
+    let motion = state.motion();
+    let [north_m, east_m, down_m] = motion.position_m;
+    let [vx, vy, vz] = motion.velocity_m_s.map(|speed_m_s| libm::round(100.0 * speed_m_s) as i16);
     let (lat, lon) = degrees_e7(state, north_m, east_m);
     MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
         time_boot_ms: boot_ms(state.time_s),
@@ -91,7 +93,7 @@ pub(super) fn position(state: &VehicleState<'_>) -> MavMessage {
         vx,
         vy,
         vz,
-        hdg: libm::round(100.0 * heading_deg(&state.motion().ned_from_body)) as u16 % 36_000,
+        hdg: libm::round(100.0 * heading_deg(&motion.ned_from_body)) as u16 % 36_000,
     })
 }
 
@@ -116,8 +118,9 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
 /// kept. A vehicle without sensors has no receiver.
 pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
-    let [north_m, east_m, down_m] = state.motion().position_m;
-    let [north_m_s, east_m_s, _] = state.motion().velocity_m_s;
+    let motion = state.motion();
+    let [north_m, east_m, down_m] = motion.position_m;
+    let [north_m_s, east_m_s, _] = motion.velocity_m_s;
     let (lat, lon) = degrees_e7(state, north_m, east_m);
     let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
     let fix_type = match state.sensors.last {
