@@ -18,7 +18,7 @@
 //! * `links` (the same feature): the open links of a program, together;
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
 //! * [`mission`]: which mission is meant;
-//! * [`book`]: who did what, as a chain of hashes;
+//! * [`book`]: who did what, with a signed hash over all of it;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
 //! * [`hostile`]: hostile input for tests and fuzzing.

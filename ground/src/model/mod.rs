@@ -409,7 +409,7 @@ pub enum Request {
     Sign { step: u8, void: bool },
 }
 
-/// A line of the book: who did what. The run loop adds the time and the chain.
+/// A line of the book: who did what. The run loop adds the time and the number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BookLine {
     /// As in `key`, `commanded`, `signed`.

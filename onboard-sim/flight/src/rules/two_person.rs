@@ -61,8 +61,7 @@ pub struct Station {
     pub system: u8,
     /// MAVLink component.
     pub component: u8,
-    /// Which of those that were heard under these ids: every station has another number. 0 in logs from before they were
-    /// told apart.
+    /// Which of those that were heard under these ids: every station has another number.
     pub number: u32,
 }
 
