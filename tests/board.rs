@@ -73,10 +73,10 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     screen.wait_for("GO: every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
-    screen.wait_for("AERO_DESCENT");
+    screen.wait_for("Falling");
     screen.type_bytes(b"\x18\r");
-    screen.wait_for("CHUTE");
-    screen.wait_for("TOUCHDOWN");
+    screen.wait_for("Parachute");
+    screen.wait_for("On the ground");
     let world = chain.wait();
     assert_eq!(world.code, Some(4), "{}", world.output);
     for words in ["ABORTED", "parachute deployed"] {

@@ -58,7 +58,7 @@ fn started(root: &Path) -> Terminal {
 
 fn land(root: &Path) -> Result<(), Failure> {
     let mut terminal = started(root);
-    let shown = ["BOOST", "AERO_DESCENT", "POWERED", "TOUCHDOWN"];
+    let shown = ["Rising", "Falling", "Landing", "On the ground"];
     for phase in shown {
         wait(&terminal, phase)?;
     }
@@ -72,7 +72,7 @@ fn land(root: &Path) -> Result<(), Failure> {
 /// With room for the parachute an abort opens it, and the landing motor is inhibited.
 fn abort(root: &Path) -> Result<(), Failure> {
     let mut terminal = started(root);
-    wait(&terminal, "AERO_DESCENT")?;
+    wait(&terminal, "Falling")?;
     terminal.type_bytes(b"\x18\r");
     let seen = |window: &Window| {
         window
@@ -80,8 +80,8 @@ fn abort(root: &Path) -> Result<(), Failure> {
             .filter(|facts| facts.contains("acknowledged accepted  observed yes"))
     };
     terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
-    wait(&terminal, "CHUTE")?;
-    wait(&terminal, "TOUCHDOWN")?;
+    wait(&terminal, "Parachute")?;
+    wait(&terminal, "On the ground")?;
     let report = end(&mut terminal, Exit::RefusedOrAborted)?;
     expect(&report, "ABORTED")?;
     say("aborted in the descent, down under the parachute:")?;

@@ -145,7 +145,7 @@ impl Pad {
 
     /// The vehicle is heard and hears.
     fn expect_both_ways(&self) -> Result<(), Failure> {
-        let heard = |window: &e2e::Window| window.rows()[1].contains(" down 0s up 0s").then_some(());
+        let heard = |window: &e2e::Window| window.rows()[0].contains(" down 0s up 0s").then_some(());
         if self.screen.wait_within(e2e::PATIENCE, heard).is_none() {
             return Err(
                 format!("the pad's link is dead on\n{}", self.screen.window().rows().join("\n")).into()

@@ -9,13 +9,13 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
-    rig.terminal.wait_for("AERO_DESCENT");
+    rig.terminal.wait_for("Falling");
     let (arms, starts) = (rig.sent(ARM, 1.0), rig.sent(START, 0.0));
     rig.reboot_vehicle();
     rig.terminal.wait_for("the vehicle has REBOOTED");
     rig.terminal.wait_until("a pad and nothing armed", |window| {
-        let top = window.rows().swap_remove(1);
-        (top.starts_with(" PAD_IDLE ") && top.contains(" disarmed ") && top.contains(" down 0s up 0s"))
+        let top = window.rows()[..2].concat();
+        (top.contains(" On the pad ") && top.contains(" disarmed ") && top.contains(" down 0s up 0s"))
             .then_some(())
     });
     // What was known before the reboot is gone: the flight, and commands that were waiting.
@@ -30,7 +30,7 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     // Commands work again.
     rig.arm();
     rig.start();
-    rig.terminal.wait_for("AERO_DESCENT");
+    rig.terminal.wait_for("Falling");
     rig.abort();
     rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     rig.terminal.signal(Signal::SIGTERM);
@@ -60,7 +60,7 @@ fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
     rig.reboot_vehicle();
     rig.terminal.wait_for("the vehicle has REBOOTED");
     rig.terminal.wait_until("a vehicle that is new and must not be approached", |window| {
-        let fresh = window.rows()[1].contains(" down 0s up 0s");
+        let fresh = window.rows()[0].contains(" down 0s up 0s");
         (fresh && window.shows("do not approach for")).then_some(())
     });
     rig.type_until(b"0AARM\r", "cannot arm: do not approach for");
@@ -90,7 +90,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
         station.wait_for("[x] armed, says HEARTBEAT");
         station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
-        station.wait_for("AERO_DESCENT");
+        station.wait_for("Falling");
     };
     fly(&mut station, &mut first);
     first.signal(Signal::SIGKILL);
@@ -100,7 +100,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
     station.wait_for("the vehicle has REBOOTED");
     station.wait_until("a disarmed pad", |window| {
         let top = window.rows().swap_remove(1);
-        (top.starts_with(" PAD_IDLE ") && top.contains(" disarmed ")).then_some(())
+        (top.contains(" On the pad ") && top.contains(" disarmed ")).then_some(())
     });
     fly(&mut station, &mut second);
     second.signal(Signal::SIGTERM);

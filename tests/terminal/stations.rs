@@ -45,7 +45,7 @@ fn ground_without_arguments_beside_a_station_is_the_demonstration_and_reports_th
     demonstration.wait_for("GO: every arming check passes");
     demonstration.type_until(b"AARM\r", " ARMED ");
     demonstration.type_until(b"SSTART\r", "START  commanded");
-    demonstration.wait_for("AERO_DESCENT");
+    demonstration.wait_for("Falling");
     assert!(station.pad.proxy.commands().is_empty(), "the real vehicle was commanded");
     demonstration.signal(Signal::SIGTERM);
     demonstration.wait_for_end();

@@ -11,6 +11,7 @@ pub mod screen;
 pub mod server;
 pub mod station;
 pub mod stations;
+pub mod terminal;
 pub mod wire;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};

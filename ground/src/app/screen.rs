@@ -30,6 +30,7 @@ use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
 use super::programs::{Voice, VoiceEnded};
+use super::terminal::Thrifty;
 use crate::cli::Characters;
 use crate::config::Config;
 use crate::key::Key;
@@ -58,7 +59,7 @@ static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 pub struct Screen {
     /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic. [`restore`] does the
     /// clean-up.
-    terminal: ManuallyDrop<Terminal<CrosstermBackend<FrameBuffer>>>,
+    terminal: ManuallyDrop<Terminal<Thrifty<FrameBuffer>>>,
     writer: TerminalWriter,
     events: EventStream,
     theme: Theme,
@@ -152,7 +153,7 @@ impl Screen {
     pub fn bell(&mut self) {
         if self.bell {
             // Writing to a buffer in memory cannot fail.
-            let _ = io::Write::write_all(self.terminal.backend_mut(), b"\x07");
+            let _ = io::Write::write_all(&mut self.terminal.backend_mut().0, b"\x07");
             self.writer.send();
         }
     }
@@ -214,13 +215,13 @@ fn theme(config: &Config) -> Theme {
     Theme { palette, ascii }
 }
 
-fn take_terminal() -> io::Result<(Terminal<CrosstermBackend<FrameBuffer>>, TerminalWriter)> {
+fn take_terminal() -> io::Result<(Terminal<Thrifty<FrameBuffer>>, TerminalWriter)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
-    Ok((Terminal::new(CrosstermBackend::new(buffer))?, writer))
+    Ok((Terminal::new(Thrifty(CrosstermBackend::new(buffer)))?, writer))
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

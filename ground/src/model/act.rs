@@ -171,6 +171,16 @@ impl Act {
         }
     }
 
+    /// One word for the row of the keys.
+    pub fn short(self) -> &'static str {
+        match self {
+            Self::Acknowledge => "seen",
+            Self::HoldCountdown => "hold",
+            Self::RangeTest => "radio test",
+            act => act.definition().map_or("", |definition| definition.name),
+        }
+    }
+
     /// Its definition; `None` for the page that shares another one's key.
     pub fn definition(self) -> Option<&'static Definition> {
         DEFINITIONS.iter().find(|definition| definition.act == self)

@@ -11,6 +11,41 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
+/// The phase in the words of the crew, as in `Ready to light`.
+pub fn doing(phase: TdPhase) -> &'static str {
+    match phase {
+        TdPhase::TD_PHASE_SAFE => "Safe",
+        TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => "On the pad",
+        TdPhase::TD_PHASE_BOOST => "Rising",
+        TdPhase::TD_PHASE_COAST => "Coasting",
+        TdPhase::TD_PHASE_DEPLOY => "Fins opening",
+        TdPhase::TD_PHASE_AERO_DESCENT => "Falling",
+        TdPhase::TD_PHASE_LAND_ARMED => "Ready to light",
+        TdPhase::TD_PHASE_IGNITION => "Lighting",
+        TdPhase::TD_PHASE_POWERED => "Landing",
+        TdPhase::TD_PHASE_TOUCHDOWN => "On the ground",
+        TdPhase::TD_PHASE_SAFED => "Flight over",
+        TdPhase::TD_PHASE_CHUTE => "Parachute",
+    }
+}
+
+/// The event that begins a phase, as the timeline names it; `None` if the crew need not see it there.
+pub fn event(phase: TdPhase) -> Option<&'static str> {
+    Some(match phase {
+        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
+        TdPhase::TD_PHASE_SAFED => "over",
+        TdPhase::TD_PHASE_BOOST => "lift-off",
+        TdPhase::TD_PHASE_COAST => "burn-out",
+        TdPhase::TD_PHASE_DEPLOY => "fins",
+        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
+        TdPhase::TD_PHASE_LAND_ARMED => "ready",
+        TdPhase::TD_PHASE_IGNITION => "ignition",
+        TdPhase::TD_PHASE_POWERED => "burns",
+        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
+        TdPhase::TD_PHASE_CHUTE => "parachute",
+    })
+}
+
 /// A boot number as eight hexadecimal digits.
 pub fn boot(number: u32) -> String {
     format!("{number:08X}")

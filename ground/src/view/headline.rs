@@ -9,9 +9,9 @@ use ratatui::text::Line;
 use tui_big_text::{BigText, PixelSize};
 
 use super::top_lines::readiness;
-use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed};
+use super::{STALE_MARK, TextRole, Theme, age_mark, fixed};
 use crate::model::{
-    Approach, Ending, Model, Sample, Spot,
+    Approach, Ending, Model, Page, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_liftoff_by_itself, is_on_pad,
 };
@@ -123,6 +123,8 @@ pub struct Banner {
     /// Its end: for how long, and why.
     rest: String,
     pub role: TextRole,
+    /// Whether it is about approaching a vehicle that is down.
+    is_of_approach: bool,
 }
 
 /// The present words; `None` on the pad and in flight, as long as all is as planned.
@@ -140,19 +142,20 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         };
         let words = approach.headline();
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
-        return Some(Banner { words, lead, rest: approach.reason(), role });
+        return Some(Banner { words, lead, rest: approach.reason(), role, is_of_approach: true });
     }
     if ending.is_none() && may_have_left(vehicle, now).is_some() {
         return Some(may_fly(model));
     }
     if is_liftoff_by_itself(vehicle) {
         let rest = " that nobody commanded: TAKE COVER, look up".to_owned();
-        return Some(Banner { words: LIFT_OFF, lead: format!(" {LIFT_OFF}"), rest, role: TextRole::Alarm });
+        let lead = format!(" {LIFT_OFF}");
+        return Some(Banner { words: LIFT_OFF, lead, rest, role: TextRole::Alarm, is_of_approach: false });
     }
     ending.filter(|ending| *ending == Ending::Lost)?;
     let words = Ending::Lost.word();
     let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
-    Some(Banner { words, lead: format!(" {words}"), rest, role: TextRole::Alarm })
+    Some(Banner { words, lead: format!(" {words}"), rest, role: TextRole::Alarm, is_of_approach: false })
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
@@ -160,15 +163,15 @@ fn may_fly(model: &Model) -> Banner {
     let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
     let place = match model.meant_to_come_down() {
         Some(Spot { north_m, east_m, error_m }) if libm::hypot(north_m, east_m) < 1.0 => {
-            format!("meant to land within {error_m:.0} m of the pad")
+            format!("meant to land within {error_m:.0} m")
         }
         Some(Spot { north_m, east_m, error_m }) => {
-            format!("meant to land {north_m:.0} m N, {east_m:.0} m E, within {error_m:.0} m")
+            format!("meant {north_m:.0} m N, {east_m:.0} m E, within {error_m:.0} m")
         }
         None => "where is not told".to_owned(),
     };
-    let rest = format!(" since T-0, not heard since T-{left_s:.1} s; {place}");
-    Banner { words: MAY_FLY, lead: String::new(), rest, role: TextRole::Alarm }
+    let rest = format!(" since T-0, unheard from T-{left_s:.1} s; {place}");
+    Banner { words: MAY_FLY, lead: format!(" {MAY_FLY}"), rest, role: TextRole::Alarm, is_of_approach: false }
 }
 
 impl Banner {
@@ -177,24 +180,28 @@ impl Banner {
         format!("{}{}", self.lead, self.rest)
     }
 
+    /// Whether the words stand in large letters on this page. The others keep their rows; the line stands on every page.
+    pub fn is_large_on(&self, page: Page) -> bool {
+        let of_a_phase = matches!(page, Page::Ascent | Page::Descent | Page::Landing);
+        matches!(page, Page::Pad | Page::Review) || (of_a_phase && !self.is_of_approach)
+    }
+
     /// The words and the reason in one line, for small screens and without a screen.
     pub fn sentence(&self) -> String {
         format!("{}{}", self.words, self.rest)
     }
 }
 
-/// Draws the reason and, in letters as large as the room allows, the words. Returns the area below.
+/// Draws the words in letters as large as the room allows. Returns the area below.
 pub fn draw_banner(banner: &Banner, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let reason = theme.line(banner.reason(), banner.role);
-    draw_line(frame, area, reason);
-    let below = Rect { y: area.y + area.height.min(1), height: area.height.saturating_sub(1), ..area };
     let letters = u16::try_from(banner.words.chars().count()).unwrap_or(u16::MAX);
-    draw_headline(&[word("", banner.words, letters, banner.role)], theme, frame, below)
+    draw_headline(&[word("", banner.words, letters, banner.role)], theme, frame, area)
 }
 
 /// What a page shows largest; nothing while larger words stand above every page.
 pub fn headline(model: &Model, now: Duration, of_page: fn(&Model, Duration) -> Vec<Item>) -> Vec<Item> {
-    if banner(model, now).is_some() { Vec::new() } else { of_page(model, now) }
+    let large = banner(model, now).is_some_and(|banner| banner.is_large_on(model.page()));
+    if large { Vec::new() } else { of_page(model, now) }
 }
 
 // What each page shows largest: on the pad GO or NO-GO, in flight phase, height, speed and time, in the burn the time

@@ -1,7 +1,7 @@
 //! Draws the screen: one pure function from the model and the time to a frame.
 //!
-//! Every page has the same frame: [`top_lines`] (identity, phase, armed, countdown, link, what an abort would do), the
-//! page, and [`status_lines`] and the page names at the bottom. [`pages`] has the pages; [`panels`], [`pictures`],
+//! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an abort would do in the
+//! colour of the danger), the page, and [`status_lines`] (the flight along its time, the keys). [`pages`] has the pages; [`panels`], [`pictures`],
 //! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
 //! there are plain lines, the most important first. For terminals without Unicode, [`theme`] converts the result.
 
@@ -24,7 +24,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::{Act, CommandKind, LookBack, Model, Page, TextEntry};
+use crate::model::{Act, CommandKind, LookBack, Model, TextEntry};
 pub use theme::{Ink, TextRole, Theme};
 use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
 
@@ -84,61 +84,50 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
     draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
 }
 
-// The layout from 80x22 on: identity, top lines, pinned numbers, the page, the bar of the flight, the alarm line, the
-// page names.
-
-/// From this width on every page is named; below, those with a letter are not.
-const EVERY_NAME_COLUMNS: u16 = 100;
+// The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
+// approaching; pinned numbers; the page; the flight along its time, or an alarm; the keys.
 
 pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let bar_rows = u16::from(status_lines::shows_flight_bar(model));
-    // The top lines, dialogs and the alarm line always show the present.
+    // Everything but the page always shows the present.
     let past = model.past();
     let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
-    let past_rows = u16::from(past.is_some());
-    let pinned_rows = u16::from(!model.pages.pinned.is_empty());
-    let [identity, status, abort, command, past_mark, pinned, body, bar, alarm, names] = stacked(
+    let banner = headline::banner(model, now);
+    let messages = status_lines::message_rows(model, theme, (now, shown_at), area.width);
+    let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
+    let [identity, state, words, past_mark, pinned, body, message, keys] = stacked(
         area,
         [
             Length(1),
-            Length(1),
-            Length(1),
-            Length(1),
-            Length(past_rows),
-            Length(pinned_rows),
+            Length(state_rows),
+            Length(banner.is_some().into()),
+            Length(past.is_some().into()),
+            Length((!model.pages.pinned.is_empty()).into()),
             Fill(1),
-            Length(bar_rows),
-            Length(1),
+            Length(messages.len() as u16),
             Length(1),
         ],
     );
+    for raised in [identity, keys] {
+        frame.buffer_mut().set_style(raised, theme.raised());
+    }
     top_lines::draw_identity(model, theme, now, frame, identity);
-    draw_status(model, theme, now, frame, status);
-    draw_line(frame, abort, top_lines::abort(model, theme, now));
-    draw_line(frame, command, top_lines::command(model, theme, now));
+    top_lines::draw_state(model, theme, now, frame, state);
+    if let Some(banner) = &banner {
+        frame.buffer_mut().set_style(words, theme.level(top_lines::level(model, now)));
+        draw_line(frame, words, Line::from(banner.reason()));
+    }
     if let Some(looks) = model.look_back.filter(|_| past.is_some()) {
         draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
     }
     draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
     // Also over the past: whether people may approach is a matter of the present.
-    let body =
-        headline::banner(model, now).map_or(body, |words| headline::draw_banner(&words, theme, frame, body));
+    let large = banner.filter(|banner| banner.is_large_on(model.page()));
+    let body = large.map_or(body, |words| headline::draw_banner(&words, theme, frame, body));
     pages::draw(shown, theme, shown_at, frame, body);
-    status_lines::draw_flight_bar(model, theme, (now, shown_at), frame, bar);
-    status_lines::draw_alarm_line(model, theme, now, frame, alarm);
-    draw_line(frame, names, names_line(model, theme, names.width));
+    draw_lines(frame, message, &messages);
+    status_lines::draw_keys(model, theme, now, frame, keys);
     dialog::draw_palette(model, theme, now, frame, body);
     dialog::draw_dialog(model, theme, now, frame, body);
-}
-
-fn draw_status(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [phase, armed, countdown, link, abort] =
-        side_by_side(area, [Length(14), Length(11), Length(11), Fill(1), Length(20)]);
-    draw_line(frame, phase, top_lines::phase(model, theme, now).into());
-    draw_line(frame, armed, top_lines::armed(model, theme, now).into());
-    draw_line(frame, countdown, top_lines::countdown(model, theme, now).into());
-    draw_line(frame, link, top_lines::link(model, theme, now));
-    draw_line(frame, abort, theme.line(top_lines::abort_key(model), TextRole::Key));
 }
 
 /// Says that the page shows the past, and for how long.
@@ -149,37 +138,6 @@ fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -
         " PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move"
     );
     theme.line(words, TextRole::Alarm)
-}
-
-/// Keys and names of the pages, the shown one in brackets, and whether it is held.
-fn names_line(model: &Model, theme: Theme, columns: u16) -> Line<'static> {
-    let shown = model.page();
-    let every = columns >= EVERY_NAME_COLUMNS;
-    let lettered = Page::LETTERED.contains(&shown);
-    let mut spans = Vec::new();
-    for page in Page::all() {
-        let is_shown = page == shown.keyed();
-        if !every && !is_shown && Page::LETTERED.contains(&page) {
-            continue;
-        }
-        let (left, right, role) =
-            if is_shown { ("[", "]", TextRole::Key) } else { (" ", "", TextRole::Label) };
-        // Ascent and descent share a key.
-        let name = if is_shown { shown.name() } else { page.name() };
-        let key = model.settings.keys.name(Act::Show(page));
-        spans.push(theme.span(format!("{left}{key}{name}{right}"), role));
-    }
-    if every || !lettered {
-        let key = model.settings.keys.name(Act::Palette);
-        spans.push(theme.label(format!(" {key}more")));
-    }
-    let (word, role) = match model.pages.held {
-        Some(_) if every || !lettered => (" HELD 0", TextRole::Caution),
-        Some(_) => (" HELD", TextRole::Caution),
-        None => (" auto", TextRole::Good),
-    };
-    spans.push(theme.span(word, role));
-    Line::from(spans)
 }
 
 // The layout for terminals smaller than 80x22: plain lines, the most important first.

@@ -102,7 +102,7 @@ pub fn draw_side_view(
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;
     let label = |text: String| theme.line(text, TextRole::Label);
     let canvas = canvas(theme, [left, right], [bottom, top], |context| {
-        context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: theme.ink(Ink::Ground) });
+        context.draw(&Line { x1: left, y1: 0.0, x2: right, y2: 0.0, color: theme.ink(Ink::Scale) });
         for side in [-PAD_HALF_M, PAD_HALF_M] {
             context.draw(&Line { x1: side, y1: 0.0, x2: side, y2: bottom, color: theme.ink(Ink::Body) });
         }
@@ -110,8 +110,8 @@ pub fn draw_side_view(
             let y2 = LIMIT_DOTS * per_dot;
             context.draw(&Line { x1: x, y1: 0.0, x2: x, y2, color: theme.ink(Ink::Limit) });
         }
-        context.draw(&Points { coords: predicted, color: theme.ink(Ink::Planned) });
-        draw_flown(context, &flown, theme.ink(Ink::Flown));
+        context.draw(&Points { coords: predicted, color: theme.ink(Ink::Predicted) });
+        draw_flown(context, &flown, theme.ink(Ink::Measured));
         if let Some(((x, y), radius)) = lost {
             context.draw(&Circle { x, y, radius, color: theme.ink(Ink::Predicted) });
             context.print(x, y, "+");
@@ -248,10 +248,10 @@ pub fn draw_top_view(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         for (x1, y1, x2, y2) in [(-pad, 0.0, pad, 0.0), (0.0, -pad, 0.0, pad)] {
             context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Body) });
         }
-        draw_flown(context, &flown, theme.ink(Ink::Flown));
+        draw_flown(context, &flown, theme.ink(Ink::Measured));
         if let Some(at) = down {
             let radius = at.radius_m.max(2.0 * per_dot);
-            context.draw(&Circle { x: at.east_m, y: at.north_m, radius, color: theme.ink(Ink::Planned) });
+            context.draw(&Circle { x: at.east_m, y: at.north_m, radius, color: theme.ink(Ink::Predicted) });
             context.print(at.east_m, at.north_m, "x");
         }
         if let Some(at) = lost {
@@ -343,7 +343,7 @@ pub fn draw_fins(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         context.draw(&Circle { x: 0.0, y: 0.0, radius: BODY, color: theme.ink(Ink::Body) });
         for ((number, heading_deg), fin) in (1..).zip(HEADING_DEG).zip(&fins.value) {
             let (east, north) = libm::sincos(heading_deg.to_radians() + roll_rad);
-            arm(context, (east, north), fin, theme.ink(Ink::Planned), theme.ink(Ink::Ground));
+            arm(context, (east, north), fin, theme.ink(Ink::Predicted), theme.ink(Ink::Scale));
             let apart = fin.error_deg() > APART_DEG;
             let degrees = fixed(fin.measured_rad.to_degrees(), 0);
             let words = format!("{number}{mark}{degrees}{}", if apart { "!" } else { "" });

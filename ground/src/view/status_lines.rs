@@ -5,13 +5,14 @@ use std::time::Duration;
 use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
 use protocol::log::record::EventLevel;
 use ratatui::Frame;
+use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
-use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
-use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest};
+use super::{Ink, STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest, side_by_side};
 use crate::model::{
-    Alarm, GRAVITY_M_S2, Model, Playback, RADIO_FRESH, Role, Vehicle, is_on_pad, latch_cause, words,
+    Act, Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, Vehicle, is_burning, is_on_pad,
+    latch_cause, words,
 };
 
 /// A vehicle that is slower than this is not falling, m/s.
@@ -34,7 +35,6 @@ pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Lin
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), rest.to_owned()));
     match phase {
-        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => None,
         TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
         TdPhase::TD_PHASE_COAST => {
             let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
@@ -51,25 +51,24 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
             let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
             Some((format!("touchdown{}", within(left_s)), String::new()))
         }
-        TdPhase::TD_PHASE_TOUCHDOWN => {
-            words("SAFED", " once the motor is burnt out and cool, or the pin is in")
-        }
-        TdPhase::TD_PHASE_SAFED => words("nothing", ": the flight is over"),
+        TdPhase::TD_PHASE_TOUCHDOWN => words("over", " once the motor is cool, or pinned"),
         TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
+        // On the pad the crew decides; afterwards the flight is over.
+        _ => None,
     }
 }
 
 fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String) {
     if vehicle.interlocks().is_some() && !vehicle.may_light() {
         let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
-        return ("the ground".to_owned(), format!(": the motor will NOT be lit{why}"));
+        return ("the ground".to_owned(), format!(", NO BURN{why}"));
     }
     let descent = vehicle.descent();
     let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
     let chosen_m =
         descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
     let at = chosen_m.map_or_else(String::new, |height_m| format!(" at {} m", fixed(height_m, 0)));
-    let armed = if phase == TdPhase::TD_PHASE_LAND_ARMED { ", motor armed" } else { ", motor not armed yet" };
+    let armed = if phase == TdPhase::TD_PHASE_LAND_ARMED { ", motor armed" } else { ", motor not armed" };
     (format!("IGNITION{}", within(left_s)), format!("{at}{armed}"))
 }
 
@@ -78,12 +77,12 @@ fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String) {
     let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
     let Some(descent) = vehicle.descent().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
-        return ("chute opens".to_owned(), format!(": fired, still falling fast{motor}"));
+        return ("chute opens".to_owned(), format!(", still fast{motor}"));
     };
     let sinks_m_s = -f64::from(descent.value.vertical_speed_m_s);
     let falls_s = f64::from(descent.value.height_m) / sinks_m_s - descent.age(now).as_secs_f64();
     let left_s = Some(falls_s).filter(|_| sinks_m_s > FALLS_M_S);
-    ("the ground".to_owned(), format!("{} under the parachute{motor}", within(left_s)))
+    ("ground".to_owned(), format!("{}{motor}", within(left_s)))
 }
 
 /// As in ` in 3.4 s`; empty if the time is unknown or over.
@@ -196,6 +195,32 @@ fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     Line::from(spans)
 }
 
+/// Whether the log records, and for how long.
+pub fn recording(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
+    if model.settings.role == Role::Replaying {
+        return theme.label(" recorded ");
+    }
+    if model.settings.log_path.is_none() {
+        return theme.span(" NOT RECORDED ", TextRole::Caution);
+    }
+    if model.log.failed {
+        return theme.span(" LOG FAILED ", TextRole::Alarm);
+    }
+    let seconds = now.as_secs();
+    let words = format!(" ● REC {:02}:{:02} ", seconds / 60, seconds % 60);
+    theme.span(words, if model.log.dropped > 0 { TextRole::Caution } else { TextRole::Plain })
+}
+
+/// How much is heard, and how much of it is lost.
+pub fn rates(model: &Model, now: Duration) -> String {
+    let rate_kb_s = model.link.stats.figures(now).rx_bytes_s / 1e3;
+    let capacity = model
+        .settings
+        .link_capacity_bytes_s
+        .map_or_else(String::new, |most| format!("/{:.1}", f64::from(most) / 1e3));
+    format!("{rate_kb_s:.1}{capacity} kB/s, {} lost  ", percent(model.link.loss(now)))
+}
+
 fn log_state(model: &Model, theme: Theme) -> Span<'static> {
     let (words, role) = if model.settings.role == Role::Replaying {
         ("  replay".to_owned(), TextRole::Plain)
@@ -220,20 +245,31 @@ const KEY_FROM_COLUMNS: usize = 40;
 /// The shortest useful part of a text.
 const TEXT_COLUMNS_MIN: usize = 12;
 
-/// Draws the foremost alarm; without one, the newest event.
-pub fn draw_alarm_line(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if let Some(playing) = &model.playing {
-        return draw_line(frame, area, replay_line(playing, theme));
+/// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its time, or the newest event. While an
+/// alarm rings, a message has a row of its own.
+pub fn message_rows(
+    model: &Model,
+    theme: Theme,
+    (now, shown_at): (Duration, Duration),
+    columns: u16,
+) -> Vec<Line<'static>> {
+    let columns = usize::from(columns);
+    let message = super::top_lines::message(model, theme, now);
+    let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
+    if let Some(alarm) = alarm_text(model, theme, now, columns).filter(|_| rings) {
+        return message.into_iter().chain([alarm]).collect();
     }
-    if let Some(alarm) = alarm_text(model, theme, now, usize::from(area.width)) {
-        return draw_line(frame, area, alarm);
-    }
-    let last = model.events.newest(1).next().map_or_else(Line::default, |event| {
+    let flight = || shows_flight(model).then(|| timeline(model, theme, (now, shown_at), columns));
+    let row = message.or_else(flight).or_else(|| newest_event(model, theme));
+    vec![row.unwrap_or_default()]
+}
+
+fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    model.events.newest(1).next().map(|event| {
         let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
         let head = format!(" {:.1} ", event.at.as_secs_f64());
         theme.line(format!("{head}{}{}", event.mark().trim_start(), event.text), role)
-    });
-    draw_line(frame, area, last);
+    })
 }
 
 /// The position of a replay, and its keys.
@@ -242,7 +278,7 @@ pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
     let state = if playing.paused { "PAUSED" } else { "plays" };
     theme.line(
         format!(
-            " REPLAY {state} {at:.1} of {of:.1} s x{}  Space  Left Right 5 s  [ ] phase  + -",
+            " REPLAY {state} {at:.1} of {of:.1} s x{}  Space Left Right [ ] + -",
             shortest(playing.speed)
         ),
         TextRole::Title,
@@ -311,98 +347,191 @@ pub fn cut(text: &str, columns: usize) -> String {
     format!("{}..", kept.trim_end())
 }
 
-// The bar of the whole flight: its phases along time, warnings and errors, and the shown moment.
+// The flight along its time: what has been, what is expected, warnings and errors, and the shown moment.
 
-/// How long the bar of a flight in progress is, so that it is rarely drawn anew, s.
-const LENGTHS_S: [f64; 8] = [30.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
-/// The mark of the shown moment, of a warning or an error, and of the time that has passed.
-const NOW: char = '•';
+/// How long the line of a flight in progress is, so that it is rarely drawn anew, s.
+const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
+/// The mark of the shown moment, of what has been, of what is expected, of a warning or an error; the time that has passed, and
+/// that is to come.
+const NOW: char = '◆';
+const BEEN: char = '●';
+const EXPECTED: char = '○';
 const EVENT: char = '!';
-const PASSED: char = '─';
-
-/// A part of the flight that the bar shows.
-struct Shown {
-    from: Duration,
-    length_s: f64,
-}
+const PASSED: char = '━';
+const TO_COME: char = '┄';
 
 /// Whether there is a flight to show.
-pub fn shows_flight_bar(model: &Model) -> bool {
+fn shows_flight(model: &Model) -> bool {
     model.playing.is_some() || flight_began(model).is_some()
 }
 
 /// When the flight began.
-fn flight_began(model: &Model) -> Option<Duration> {
+pub fn flight_began(model: &Model) -> Option<Duration> {
     model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
 }
 
-/// Draws the bar up to the present, with a mark at the shown moment.
-pub fn draw_flight_bar(
-    model: &Model,
-    theme: Theme,
-    (now, shown_at): (Duration, Duration),
-    frame: &mut Frame,
-    area: Rect,
-) {
-    if area.height > 0 && shows_flight_bar(model) {
-        draw_line(frame, area, flight_bar_line(model, theme, (now, shown_at), usize::from(area.width)));
-    }
+/// What the vehicle has told that will come, with its time.
+pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
+    let vehicle = &model.vehicle;
+    let Some(phase) = vehicle.phase_now().filter(|_| vehicle.in_flight()) else { return Vec::new() };
+    let apogee = vehicle.of_descent(|d| d.time_to_apogee_s).filter(|left| left.value > 0.0);
+    let ignition = vehicle.ignition_in_s(now).filter(|_| !is_burning(phase));
+    let touchdown = vehicle.touchdown_in_s(now).filter(|_| is_burning(phase));
+    let left = [
+        ("apogee", apogee.map(|left| left.value - left.age(now).as_secs_f64())),
+        ("ignition", ignition.map(|left| left.value)),
+        ("touchdown", touchdown.map(|left| left.value)),
+    ];
+    let known =
+        left.into_iter().filter_map(|(name, left_s)| Some((name, left_s.filter(|left_s| *left_s >= 0.0)?)));
+    known.map(|(name, left_s)| (name, now + Duration::from_secs_f64(left_s))).collect()
 }
 
-fn flight_bar_line(
+fn timeline(
     model: &Model,
     theme: Theme,
     (now, shown_at): (Duration, Duration),
     columns: usize,
 ) -> Line<'static> {
     let columns = columns.saturating_sub(2).max(1);
-    let (phases, span): (&[(TdPhase, Duration)], Shown) = if let Some(playing) = &model.playing {
-        let length_s = playing.length.as_secs_f64().max(1.0);
-        (&playing.phases, Shown { from: Duration::ZERO, length_s })
-    } else {
-        let from = flight_began(model).unwrap_or(now);
-        let passed_s = now.saturating_sub(from).as_secs_f64();
-        let length_s = LENGTHS_S.into_iter().find(|length_s| passed_s < *length_s).unwrap_or(passed_s);
-        (&model.history.timeline, Shown { from, length_s })
-    };
+    let to_come = expected(model, now);
+    let (phases, from, length_s): (&[(TdPhase, Duration)], Duration, f64) =
+        if let Some(playing) = &model.playing {
+            (&playing.phases, Duration::ZERO, playing.length.as_secs_f64().max(1.0))
+        } else {
+            let from = flight_began(model).unwrap_or(now);
+            let last = to_come.iter().map(|(_, at)| *at).max().unwrap_or(now).max(now);
+            let needed_s = last.saturating_sub(from).as_secs_f64();
+            let length_s = LENGTHS_S.into_iter().find(|length_s| needed_s < *length_s).unwrap_or(needed_s);
+            (&model.history.timeline, from, length_s)
+        };
     let column = |at: Duration| {
-        let share = at.saturating_sub(span.from).as_secs_f64() / span.length_s;
-        ((share * columns as f64) as usize).min(columns.saturating_sub(1))
+        let share = at.saturating_sub(from).as_secs_f64() / length_s;
+        ((share * columns as f64) as usize).min(columns - 1)
     };
-    let mut cells = vec![' '; columns];
-    for cell in cells.iter_mut().take(column(now) + 1) {
-        *cell = PASSED;
-    }
-    let mut free_from = 0;
-    for (phase, at) in phases.iter().filter(|(phase, at)| !is_on_pad(*phase) || *at >= span.from) {
-        let begin = column(*at);
-        let name = words::phase(*phase);
-        if begin < free_from || begin + name.len() >= columns {
-            continue;
-        }
-        for (cell, letter) in cells[begin..].iter_mut().zip(name.chars()) {
-            *cell = letter;
-        }
-        free_from = begin + name.len() + 1;
-    }
+    let mut cells: Vec<(char, Ink)> = (0..columns)
+        .map(|place| {
+            let passed = place <= column(now) || model.playing.is_some();
+            if passed { (PASSED, Ink::Measured) } else { (TO_COME, Ink::Predicted) }
+        })
+        .collect();
     for event in model.events.newest(usize::MAX) {
-        let cell = &mut cells[column(event.at).min(columns.saturating_sub(1))];
-        if event.level != EventLevel::Info && event.at >= span.from && (*cell == PASSED || *cell == ' ') {
-            *cell = EVENT;
+        if event.level != EventLevel::Info && event.at >= from {
+            cells[column(event.at)] = (EVENT, Ink::Body);
+        }
+    }
+    let been =
+        phases.iter().filter_map(|(phase, at)| Some((words::event(*phase)?, *at, BEEN, Ink::Measured)));
+    let to_come = to_come.iter().map(|(name, at)| (*name, *at, EXPECTED, Ink::Predicted));
+    let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
+    for (place, (name, at, mark, ink)) in marks.iter().enumerate() {
+        let begin = column(*at);
+        let end = marks.get(place + 1).map_or(columns, |(_, next, ..)| column(*next));
+        cells[begin] = (*mark, *ink);
+        if begin + 1 + name.len() < end {
+            for (cell, letter) in cells[begin + 1..].iter_mut().zip(name.chars()) {
+                *cell = (letter, *ink);
+            }
         }
     }
     let here = column(shown_at);
-    if let Some(cell) = cells.get_mut(here).filter(|cell| !cell.is_alphabetic()) {
-        *cell = NOW;
+    if !cells[here].0.is_alphabetic() {
+        cells[here] = (NOW, Ink::Body);
     }
-    let part = |cells: &[char], role| theme.span(cells.iter().collect::<String>(), role);
-    let (before, rest) = cells.split_at(here);
-    Line::from(vec![
-        Span::raw(" "),
-        part(before, TextRole::Plain),
-        part(&rest[..1], TextRole::Key).patch_style(Modifier::REVERSED),
-        part(&rest[1..], TextRole::Plain),
-    ])
+    let span = |run: &[(char, Ink)]| {
+        let text: String = run.iter().map(|(letter, _)| *letter).collect();
+        Span::styled(text, theme.ground().fg(theme.ink(run[0].1)))
+    };
+    let runs = cells.chunk_by(|(_, one), (_, next)| one == next).map(span);
+    Line::from(std::iter::once(Span::raw(" ")).chain(runs).collect::<Vec<_>>())
+}
+
+// The keys that count now, and the pages.
+
+/// The keys come in this order.
+const KEYS: [Act; 18] = [
+    Act::Tap,
+    Act::HoldCountdown,
+    Act::Acknowledge,
+    Act::Arm,
+    Act::Start,
+    Act::Disarm,
+    Act::TakeCommand,
+    Act::ReplayFlight,
+    Act::Report,
+    Act::Download,
+    Act::SignStep,
+    Act::VoidStep,
+    Act::Check,
+    Act::RangeTest,
+    Act::Checklist,
+    Act::Filter,
+    Act::Pin,
+    Act::AskParameters,
+];
+/// At least this many columns are for the keys, if every page need not be named.
+const KEY_COLUMNS: u16 = 34;
+
+/// Draws the keys that do something now, and the pages with the shown one in brackets and whether it is held.
+pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let pages = pages(model, theme, area.width.saturating_sub(KEY_COLUMNS));
+    let [left, right] = side_by_side(area, [Fill(1), Length(pages.width() as u16)]);
+    draw_line(frame, right, pages);
+    if let Some(playing) = &model.playing {
+        return draw_line(frame, left, replay_line(playing, theme));
+    }
+    let keys = &model.settings.keys;
+    let rings = model.alarms.unacknowledged() > 0;
+    let works = |act: &Act| act.works(model, now) && (*act != Act::Acknowledge || rings);
+    let mut room = usize::from(left.width);
+    let spans = KEYS
+        .into_iter()
+        .filter(works)
+        .map(|act| [theme.key(format!(" {}", keys.name(act))), theme.label(format!(" {} ", act.short()))]);
+    let fits = |pair: &[Span; 2]| {
+        let width = pair.iter().map(Span::width).sum();
+        let fits = width <= room;
+        room = room.saturating_sub(width);
+        fits
+    };
+    draw_line(frame, left, Line::from(spans.take_while(fits).flatten().collect::<Vec<_>>()));
+}
+
+fn pages(model: &Model, theme: Theme, room: u16) -> Line<'static> {
+    let shown = model.page();
+    let keys = &model.settings.keys;
+    let (word, role) = match model.pages.held {
+        Some(_) => (" HELD 0", TextRole::Caution),
+        None => (" auto", TextRole::Good),
+    };
+    let more = theme.label(format!(" {}more", keys.name(Act::Palette)));
+    let of = |page: Page| {
+        let key = keys.name(Act::Show(page));
+        if page == shown.keyed() {
+            // Ascent and descent share a key.
+            theme.key(format!(" [{key}{}]", shown.name()))
+        } else {
+            theme.label(format!(" {key}{}", page.name()))
+        }
+    };
+    let is_shown = |page: &Page| *page == shown.keyed();
+    let needed: usize =
+        more.width() + word.len() + Page::all().filter(is_shown).map(|page| of(page).width()).sum::<usize>();
+    let mut left = usize::from(room).saturating_sub(needed);
+    let mut spans: Vec<Span> = Vec::new();
+    for page in Page::all() {
+        let span = of(page);
+        if is_shown(&page) {
+            spans.push(span);
+        } else if span.width() <= left {
+            left -= span.width();
+            spans.push(span);
+        } else {
+            left = 0;
+        }
+    }
+    spans.extend([more, theme.span(word, role)]);
+    Line::from(spans)
 }
 
 // The line of the pinned numbers.

@@ -43,21 +43,42 @@ impl TextRole {
     ];
 }
 
-/// A part of a picture.
+/// A part of a picture: what was measured, what is predicted and what limits have one colour each, everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
-    Flown,
-    Planned,
-    Limit,
+    /// Drawn as a thick line.
+    Measured,
+    /// Drawn as dots.
     Predicted,
-    Ground,
-    /// The vehicle, its fins, the pad.
+    /// Drawn as a thin line.
+    Limit,
+    /// The vehicle, the pad, the present moment.
     Body,
+    Flame,
+    /// Scales and the ground.
+    Scale,
 }
 
 impl Ink {
     pub const ALL: [Self; 6] =
-        [Self::Flown, Self::Planned, Self::Limit, Self::Predicted, Self::Ground, Self::Body];
+        [Self::Measured, Self::Predicted, Self::Limit, Self::Body, Self::Flame, Self::Scale];
+}
+
+/// How dangerous the vehicle is: the colour of the row of its state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Disarmed on its pad, or not known.
+    Calm,
+    /// Armed, in flight, or one person may approach.
+    Armed,
+    /// The motor burns or may light near people.
+    Danger,
+    /// It may be approached.
+    Free,
+}
+
+impl Level {
+    pub const ALL: [Self; 4] = [Self::Calm, Self::Armed, Self::Danger, Self::Free];
 }
 
 /// A set of colours.
@@ -95,41 +116,59 @@ impl Palette {
     }
 }
 
-/// Numbers of xterm's 256 colours.
+/// Numbers of xterm's 256 colours: half the bytes of a colour by its parts, and every terminal with colours has them.
 struct Colours {
     back: u8,
+    /// Behind the header, the large numbers and the keys.
+    raised: u8,
     plain: u8,
+    label: u8,
     good: u8,
     caution: u8,
     /// Text and background.
     alarm: (u8, u8),
+    border: u8,
     /// In the order of [`Ink::ALL`].
     inks: [u8; 6],
+    /// Text and background, in the order of [`Level::ALL`].
+    levels: [(u8, u8); 4],
 }
 
 const DARK: Colours = Colours {
-    back: 16,
+    back: 233,
+    raised: 234,
     plain: 255,
-    good: 114,
-    caution: 221,
+    label: 249,
+    good: 79,
+    caution: 215,
     alarm: (231, 124),
-    inks: [221, 80, 210, 177, 255, 255],
+    border: 240,
+    inks: [75, 221, 218, 255, 215, 249],
+    levels: [(231, 238), (16, 214), (231, 124), (16, 79)],
 };
 const LIGHT: Colours = Colours {
     back: 231,
+    raised: 231,
     plain: 16,
+    label: 239,
     good: 22,
     caution: 88,
     alarm: (231, 124),
-    inks: [16, 19, 88, 54, 16, 16],
+    border: 246,
+    inks: [19, 88, 90, 16, 88, 239],
+    levels: [(231, 240), (16, 214), (231, 124), (231, 22)],
 };
 const CONTRAST: Colours = Colours {
     back: 16,
+    raised: 16,
     plain: 231,
+    label: 231,
     good: 46,
     caution: 226,
     alarm: (16, 231),
-    inks: [231, 51, 226, 225, 231, 231],
+    border: 231,
+    inks: [51, 226, 225, 231, 226, 231],
+    levels: [(231, 16), (16, 226), (16, 231), (16, 46)],
 };
 
 /// What the terminal can show, and in which colours.
@@ -182,17 +221,47 @@ impl Theme {
         self.ground().bg.unwrap_or(Color::Reset)
     }
 
+    /// The style of the header, the large numbers and the keys, which stand out a little.
+    pub fn raised(self) -> Style {
+        self.palette.colours().map_or_else(Style::new, |colours| {
+            Style::new().fg(Color::Indexed(colours.plain)).bg(Color::Indexed(colours.raised))
+        })
+    }
+
+    /// The style of the lines between panels: nothing depends on them.
+    pub fn border(self) -> Style {
+        let colours = self.palette.colours();
+        colours.map_or_else(Style::new, |colours| Style::new().fg(Color::Indexed(colours.border)))
+    }
+
+    /// The style of the rows of the state.
+    pub fn level(self, level: Level) -> Style {
+        let bold = Style::new().add_modifier(Modifier::BOLD);
+        if let Some(colours) = self.palette.colours() {
+            let (fore, back) = colours.levels[level as usize];
+            return bold.fg(Color::Indexed(fore)).bg(Color::Indexed(back));
+        }
+        let colour = match level {
+            Level::Calm => None,
+            Level::Armed => Some(Color::Yellow),
+            Level::Danger => Some(Color::Red),
+            Level::Free => Some(Color::Green),
+        };
+        Style {
+            fg: colour.filter(|_| self.palette == Palette::Sixteen),
+            ..bold.add_modifier(Modifier::REVERSED)
+        }
+    }
+
     /// The style of a role. A letter's weight and slant say the same without colour.
     pub fn style(self, role: TextRole) -> Style {
         let plain = Style::new();
         let style = if let Some(colours) = self.palette.colours() {
             let on_back = |colour| plain.fg(Color::Indexed(colour));
             match role {
-                // Labels are as strong as values: pale ones cannot be read in the sun, and every change of colour costs
-                // twenty bytes on the line.
-                TextRole::Plain | TextRole::Label | TextRole::Stale | TextRole::Title | TextRole::Key => {
-                    on_back(colours.plain)
-                }
+                TextRole::Plain | TextRole::Stale | TextRole::Title | TextRole::Key => on_back(colours.plain),
+                // Paler than a value, and still readable in the sun: 7:1.
+                TextRole::Label => on_back(colours.label),
                 TextRole::Good => on_back(colours.good),
                 TextRole::Caution => on_back(colours.caution),
                 TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
@@ -245,11 +314,10 @@ impl Theme {
         }
         match ink {
             _ if self.palette == Palette::None => Color::Reset,
-            Ink::Flown => Color::Yellow,
-            Ink::Planned => Color::Cyan,
-            Ink::Limit => Color::Red,
-            Ink::Predicted => Color::Magenta,
-            Ink::Ground | Ink::Body => Color::Reset,
+            Ink::Measured => Color::Cyan,
+            Ink::Predicted | Ink::Flame => Color::Yellow,
+            Ink::Limit => Color::Magenta,
+            Ink::Body | Ink::Scale => Color::Reset,
         }
     }
 }
@@ -273,18 +341,23 @@ fn ascii(c: char) -> char {
     match c {
         '─' | '━' => '-',
         '│' | '┃' | '▐' | '▌' => '|',
-        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' => '+',
+        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '╭' | '╮' | '╰' | '╯' | '✓' => {
+            '+'
+        }
         '█' | '▙' | '▛' | '▜' | '▟' | '▇' => '#',
         '▀' => '"',
         '▄' | '▁' | '▂' | '▃' => '_',
         '°' => 'd',
-        '·' | '▖' | '▗' | '▘' | '▝' => '.',
-        '•' => '*',
+        '·' | '▖' | '▗' | '▘' | '▝' | '┄' => '.',
+        '•' | '●' => '*',
+        '○' => 'o',
+        '×' => 'x',
+        '┊' => ':',
         '▚' | '▞' => '%',
         '▅' | '▆' => '=',
-        '↑' => '^',
+        '↑' | '◆' | '▲' => '^',
         '↓' => 'v',
-        '→' | '…' => '>',
+        '→' | '…' | '▶' => '>',
         '←' => '<',
         _ => match u32::from(c).checked_sub(BRAILLE) {
             Some(dots @ 0..=0xFF) => match dots.count_ones() {

@@ -3,39 +3,125 @@
 use std::time::Duration;
 
 use protocol::command::result_words;
-use protocol::identity::Address;
+use protocol::dialect::TdPhase;
+use protocol::identity::VEHICLE;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, CommandKind, Foreign, LinkState, Model, Role, Standing, TrackedCommand, abort_too_late,
-    dead_reckoning::may_have_left, hold_words, standing, unheard_hints, why_not_reached, why_other_mission,
-    words,
+    Acknowledgement, Approach, CommandKind, Ending, Foreign, LinkState, Model, Page, Role, Standing,
+    TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself,
+    is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, words,
 };
 
-/// Columns of `REPLAY SIM` with its spaces.
-const MODE_COLUMNS: u16 = 12;
-/// Columns of `by ` and a few names.
-const CREW_COLUMNS: u16 = 14;
+/// Columns of the state: armed, phase, clock, each in its place.
+const ARMED_COLUMNS: u16 = 9;
+const PHASE_COLUMNS: u16 = 15;
+const CLOCK_COLUMNS: u16 = 9;
+/// From this width on the state and what an abort would do, with its key, stand in one row, otherwise in two.
+pub const ONE_ROW_COLUMNS: u16 = 160;
+const ABORT_COLUMNS: u16 = 84;
+/// From this width on the rate and the loss of the link are shown beside its ages.
+const RATES_COLUMNS: u16 = 110;
 
-/// Draws the line; each part has a fixed place.
+/// Draws who and what is seen, how well it is heard, and whether that is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let vehicle = vehicle(model, theme, now);
-    let crew = crew(model, theme, now);
-    let crew_columns = CREW_COLUMNS.max(crew.width() as u16);
-    let [mode_area, vehicle_area, station_area, crew_area] = side_by_side(
-        area,
-        [Length(MODE_COLUMNS), Length(vehicle.width() as u16 + 1), Fill(1), Length(crew_columns)],
+    let mut right = if area.width < RATES_COLUMNS {
+        Vec::new()
+    } else {
+        vec![theme.label(status_lines::rates(model, now))]
+    };
+    right.extend(link(model, theme, now).spans);
+    right.push(status_lines::recording(model, theme, now));
+    let right = Line::from(right);
+    let [left_area, right_area] = side_by_side(area, [Fill(1), Length(right.width() as u16)]);
+    let left = [
+        mode(model, theme),
+        Span::raw(" "),
+        vehicle(model, theme, now),
+        Span::raw(" "),
+        crew(model, theme, now),
+    ];
+    draw_line(frame, left_area, Line::from(left.to_vec()));
+    draw_line(frame, right_area, right);
+}
+
+/// How dangerous the vehicle is now, as far as it is known.
+pub fn level(model: &Model, now: Duration) -> Level {
+    use TdPhase as P;
+    let vehicle = &model.vehicle;
+    match Approach::of(vehicle, now) {
+        Some(Approach::DoNot(_)) => return Level::Danger,
+        Some(Approach::OneForThePin(_)) => return Level::Armed,
+        Some(Approach::May(_)) => return Level::Free,
+        None => {}
+    }
+    let lost = Ending::of(vehicle, now) == Some(Ending::Lost) || may_have_left(vehicle, now).is_some();
+    let several = model.beside(now).is_some();
+    match vehicle.phase_now() {
+        _ if lost || several || is_liftoff_by_itself(vehicle) => Level::Danger,
+        Some(P::TD_PHASE_BOOST | P::TD_PHASE_IGNITION | P::TD_PHASE_POWERED) => Level::Danger,
+        _ if vehicle.is_armed() || vehicle.in_flight() => Level::Armed,
+        _ => Level::Calm,
+    }
+}
+
+/// Draws the rows in the colour of the danger: state and what comes next, or an alarm that was seen; what an abort would do, and
+/// its key.
+pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    frame.buffer_mut().set_style(area, theme.level(level(model, now)));
+    let plain = |span: Span<'static>| Line::from(span.content);
+    let first = Rect { height: area.height.min(1), ..area };
+    let [armed_area, phase_area, clock_area, middle, abort_area] = side_by_side(
+        first,
+        [
+            Length(ARMED_COLUMNS),
+            Length(PHASE_COLUMNS),
+            Length(CLOCK_COLUMNS),
+            Fill(1),
+            Length(if area.height > 1 { 0 } else { ABORT_COLUMNS }),
+        ],
     );
-    draw_line(frame, mode_area, mode(model, theme).into());
-    draw_line(frame, vehicle_area, vehicle.into());
-    let Address { system_id, component_id } = model.settings.us;
-    let station = format!("{system_id}/{component_id} {}", model.settings.link_name);
-    draw_line(frame, station_area, theme.line(station, TextRole::Label));
-    draw_line(frame, crew_area, crew.into());
+    for (at, part) in [
+        (armed_area, armed(model, theme, now)),
+        (phase_area, phase(model, theme, now)),
+        (clock_area, countdown(model, theme, now)),
+    ] {
+        draw_line(frame, at, plain(part));
+    }
+    if let Some(line) = in_the_middle(model, theme, now, usize::from(middle.width)) {
+        draw_line(frame, middle, line);
+    }
+    let below = Rect { y: area.y + 1, height: 1, ..area };
+    draw_abort(model, theme, now, frame, if area.height > 1 { below } else { abort_area });
+}
+
+/// An alarm that was seen, or what comes next.
+fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
+    let seen = status_lines::alarm_text(model, theme, now, columns);
+    let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
+    let next = || status_lines::next_event_line(model, theme, now).map(|line| line.to_string());
+    // The Pad page says it itself.
+    let ready =
+        || readiness(model, now).filter(|_| model.page() != Page::Pad).map(|(words, _)| format!(" {words}"));
+    let words = seen.or_else(next).or_else(ready)?;
+    Some(Line::from(status_lines::cut(&words, columns)))
+}
+
+/// What an abort would do, and its key at the right end; a begun or sent abort in their place.
+fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let key = format!(" {} ", abort_key(model));
+    let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
+    let line = abort(model, theme, now);
+    let acts = model.abort_chord.is_begun(now)
+        || model.link.abort_unsent
+        || model.commands.of(CommandKind::Abort).is_some();
+    draw_line(frame, words, if acts { line } else { Line::from(line.to_string()) });
+    draw_line(frame, key_area, Line::from(key));
 }
 
 /// The same for narrow screens.
@@ -85,9 +171,12 @@ fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         return theme.span(words, TextRole::Alarm);
     }
     let boot = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
-    let name = model.settings.vehicle_name.as_deref().unwrap_or_default();
-    let words = format!("system {} boot {boot} {name}", model.settings.vehicle.system_id);
-    theme.plain(words)
+    let told = model.vehicle.mission().map(|mission| mission.name);
+    let system = model.settings.vehicle.system_id;
+    let name =
+        model.settings.vehicle_name.clone().or(told).map_or_else(String::new, |name| format!("{name} "));
+    let system = if system == VEHICLE.system_id { String::new() } else { format!("system {system} ") };
+    theme.plain(format!("{system}{name}boot {boot}"))
 }
 
 /// Whether other screens than this one can command.
@@ -174,9 +263,15 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         Some(phase) => {
             let (mark, stale) = age_mark(&phase, now);
             let role = if stale == TextRole::Stale { stale } else { TextRole::Title };
-            theme.span(format!("{mark}{}", words::phase(phase.value)), role)
+            theme.span(format!("{mark}{}", doing(model, phase.value)), role)
         }
     }
+}
+
+/// What the vehicle does, in words.
+pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
+    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    if is_on_pad(phase) && counts { "Countdown" } else { words::doing(phase) }
 }
 
 /// Whether the vehicle is armed, from HEARTBEAT.
@@ -240,7 +335,7 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         }
         state => direction("up", "UP", state),
     };
-    Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up])
+    Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up, Span::raw(" ")])
 }
 
 /// What an abort would do now, or the progress of the commanded abort.
@@ -264,7 +359,8 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 /// In the countdown: until when a hold works.
 fn hold_until(model: &Model, now: Duration) -> Option<String> {
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    let last_s = model.last_hold_s().filter(|_| counts)?;
+    let may_fly = may_have_left(&model.vehicle, now).is_some();
+    let last_s = model.last_hold_s().filter(|_| counts && !may_fly)?;
     if model.is_past_hold(now) {
         return Some("; TOO LATE to hold".to_owned());
     }
@@ -373,6 +469,16 @@ fn refusal(result: u8) -> &'static str {
         2..=6 => result_words(result),
         _ => "unknown",
     }
+}
+
+/// What the row above the keys says instead of the flight: that a check moves the surfaces, a command, or a hold.
+pub fn message(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
+    let shown = latest.filter(|track| !answered_long_ago(track, now) || open_command(model, now).is_some());
+    hands_off(model, theme, now)
+        .or_else(|| open_command(model, now).map(|track| command_facts(track, theme, now)))
+        .or_else(|| hold(model, theme))
+        .or_else(|| shown.map(|track| command_facts(track, theme, now)))
 }
 
 /// The first of these that applies: that a check moves the surfaces; a command (other than an abort) that is not observed

@@ -228,7 +228,7 @@ pub fn draw_sparkline(
         .data(heights.collect::<Vec<_>>())
         .absent_value_symbol(" ")
         .max(STEPS as u64)
-        .style(theme.ground().fg(theme.ink(crate::view::theme::Ink::Planned)));
+        .style(theme.ground().fg(theme.ink(crate::view::theme::Ink::Predicted)));
     frame.render_widget(widget, bars);
 }
 

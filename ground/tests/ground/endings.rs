@@ -46,7 +46,7 @@ fn four_ends_have_four_words_everywhere() {
         for digit in "123456789".chars() {
             rig.key(Key::Char(digit));
             let screen = rig.screen(80, 24);
-            let reason = screen.lines().nth(4).unwrap_or_default();
+            let reason = screen.lines().nth(3).unwrap_or_default();
             assert!(reason.contains(&format!("{word}; do not approach")), "{digit}: {screen}");
             assert!(!screen.contains("NOT LANDED") && !screen.contains("Table 2"), "{screen}");
         }
@@ -119,13 +119,13 @@ fn no_time_is_told_before_the_canopy_carries() {
         rig.state(4.0, 90.0, -0.6, -40.0, 88.0);
         rig.run(0.1);
         let screen = rig.screen(80, 24);
-        assert!(screen.contains(" next chute opens: fired, still falling fast, LIVE MOTOR"), "{screen}");
-        assert!(!screen.contains("the ground in"), "{screen}");
+        assert!(screen.contains(" next chute opens, still fast, LIVE MOTOR"), "{screen}");
+        assert!(!screen.contains("ground in"), "{screen}");
     }
     rig.descent_with(72.0, -6.0, TdChute::TD_CHUTE_OPEN);
-    assert!(rig.screen(80, 24).contains(" next the ground in 12.0 s under the parachute, LIVE MOTOR"));
+    assert!(rig.screen(80, 24).contains(" next ground in 12.0 s, LIVE MOTOR"));
     rig.run(0.5);
-    assert!(rig.screen(80, 24).contains(" next the ground in 11.5 s"), "{}", rig.screen(80, 24));
+    assert!(rig.screen(80, 24).contains(" next ground in 11.5 s"), "{}", rig.screen(80, 24));
 }
 
 /// The reason of a latch stands beside the word, on every page.
@@ -204,10 +204,10 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     for digit in "123456789?pftvx".chars() {
         rig.key(Key::Char(digit));
         let screen = rig.screen(80, 24);
-        let reason = " since T-0, not heard since T-1.8 s; meant to land within 120 m of the pad";
-        assert!(screen.lines().nth(4).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
+        let reason = " since T-0, unheard from T-1.8 s; meant to land within 120 m";
+        assert!(screen.lines().nth(3).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
         assert!(screen.contains(" IN THE AIR?") && screen.contains("~T+12.0"), "{digit}: {screen}");
-        assert!(!screen.contains("~PAD_ARMED"), "{screen}");
+        assert!(!screen.contains("~On the pad"), "{screen}");
         assert!(rig.screen(60, 12).contains(" MAY BE IN THE AIR since T-0"), "{}", rig.screen(60, 12));
     }
     assert!(rig.screen(20, 5).contains("MAY BE IN THE AIR"), "{}", rig.screen(20, 5));
@@ -251,7 +251,7 @@ fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
         rig.key(Key::Char(digit));
         let screen = rig.screen(80, 24);
         let reason = " LIFT-OFF that nobody commanded: TAKE COVER";
-        assert!(screen.lines().nth(4).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
+        assert!(screen.lines().nth(3).is_some_and(|line| line.contains(reason)), "{digit}: {screen}");
         assert!(screen.contains("abort now: ABORTED already: parachute at apogee"), "{digit}: {screen}");
     }
     assert!(rig.screen(20, 5).contains("LIFT-OFF"), "{}", rig.screen(20, 5));

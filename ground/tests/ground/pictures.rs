@@ -391,8 +391,8 @@ fn regress_the_pictures_of_the_pages() {
 fn the_pictures_of_the_pages_say_what_the_vehicle_sent() {
     for (name, palette, moment) in moments() {
         let screen = rows(&drawn(&moment.rig, SIZES[0], palette)).join("\n");
-        let phase = format!("{:?}", moment.phase);
-        assert!(screen.contains(phase.trim_start_matches("TD_PHASE_")), "{name}: {phase}\n{screen}");
+        let phase = ground::model::words::doing(moment.phase);
+        assert!(screen.contains(&format!(" {phase} ")), "{name}: {phase}\n{screen}");
         let (effect, words) = match name {
             "pad-light" => (TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD, "disarm and inhibit on the pad"),
             "descent-dark" => {

@@ -10,7 +10,7 @@ use crate::keys::ladder;
 use crate::rig::{Rig, is_arm};
 
 fn top(rig: &Rig) -> String {
-    rig.screen(80, 24).lines().nth(1).unwrap_or_default().to_owned()
+    rig.screen(80, 24).lines().next().unwrap_or_default().to_owned()
 }
 
 /// Only the uplink is cut; the vehicle is still heard.

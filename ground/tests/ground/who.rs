@@ -124,7 +124,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
         let [first, second] = [0, 1].map(|row| screen.lines().nth(row).unwrap_or_default());
         assert!(first.contains("TWO VEHICLES under id 1"), "{step}: {screen}");
         assert!(
-            second.contains("PAD_ARMED") && second.contains("ARMED") && second.contains("T-8.0"),
+            second.contains("Countdown") && second.contains("ARMED") && second.contains("T-8.0"),
             "{screen}"
         );
         assert!(screen.contains("also 00000009 PAD_IDLE") && !screen.contains("REBOOTED"), "{screen}");

@@ -107,7 +107,7 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     let dataset = Dataset::default()
         .marker(Marker::Braille)
         .graph_type(GraphType::Line)
-        .style(theme.ground().fg(theme.ink(Ink::Flown)))
+        .style(theme.ground().fg(theme.ink(Ink::Measured)))
         .data(&points);
     let chart = Chart::new(vec![dataset])
         .style(theme.ground())
