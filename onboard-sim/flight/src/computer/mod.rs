@@ -6,6 +6,7 @@
 //!
 //! * [`table`]: the phase table as the computer uses it: each event goes through it once; what an abort would do now.
 //! * [`crew`]: the crew's requests, and the decision about each.
+//! * [`findings`]: what went wrong in a flight.
 //! * [`news`]: the computer's messages to the crew.
 //! * [`pad_check`]: the check that the crew asks for on the pad.
 //! * [`pad`]: from power-up to the release.
@@ -15,6 +16,7 @@
 
 pub mod crew;
 mod digest;
+pub mod findings;
 pub mod news;
 pub mod pad;
 pub mod pad_check;

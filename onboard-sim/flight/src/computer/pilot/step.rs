@@ -363,6 +363,13 @@ impl Pilot {
         prediction.height_m > enough_m
     }
 
+    /// The first gate check that fails now, if the gate was asked.
+    pub fn gate_check_that_fails(&self, mode: &Mode, input: &Input<'_>) -> Option<&'static str> {
+        // The parachute that was thrown out because of it is no reason.
+        let asked = Mode { phase: Phase::LandArmed, ..*mode };
+        self.estimate.and_then(|estimate| self.gate_shut_by(&self.gate_input(&asked, input, &estimate)))
+    }
+
     fn gate_open(&mut self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> bool {
         self.gate_refusal = self.gate_shut_by(&self.gate_input(mode, input, estimate));
         self.gate_refusal.is_none()

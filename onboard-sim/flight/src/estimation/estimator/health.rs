@@ -55,9 +55,10 @@ impl fmt::Display for Health {
     }
 }
 
-impl fmt::Display for Doubt {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(match self {
+impl Doubt {
+    /// The reason in words.
+    pub fn words(self) -> &'static str {
+        match self {
             Self::Restarted => "estimate diverged and started afresh",
             Self::Imu => "no usable inertial samples",
             Self::Surprised => "satellite velocities kept disagreeing",
@@ -65,7 +66,13 @@ impl fmt::Display for Doubt {
             Self::Height => "height uncertain",
             Self::Horizontal => "horizontal position uncertain",
             Self::Tilt => "tilt uncertain",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(self.words())
     }
 }
 

@@ -1,0 +1,569 @@
+//! What went wrong in a flight, from what its computer knows: first in time, each with the numbers that it rests on.
+//!
+//! [`Findings::note`] looks at the computer after each of its frames. Nothing on board depends on it: the vehicle sends what
+//! was found, and a report begins with it. The truth of a simulation is not used, because a real flight has none.
+//!
+//! Each [`Sign`] has one rule, in [`Watcher::seen`] and [`RULES`].
+
+use alloc::format;
+use alloc::string::{String, ToString as _};
+use alloc::vec::Vec;
+
+use super::pilot::Sensed;
+use super::{Computer, FRAME_S, Input};
+use crate::estimation::estimator::{Estimate, Health, ImuSample};
+use crate::estimation::motor_estimate::MotorStage;
+use crate::guidance::powered::ControlLevel;
+use crate::rules::outputs::Line;
+use crate::rules::phase::{Latch, Phase};
+use crate::vehicle::airframe::{Airframe, MassModel, Servo};
+
+/// Something that no flight shows as long as its vehicle does what it should.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sign {
+    /// The computer was away for a while.
+    Restart,
+    Gnss,
+    Barometer,
+    Lidar,
+    /// The accelerometer repeats one sample.
+    Accelerometer,
+    /// The barometer does not fit the other heights.
+    HeightsDisagree,
+    /// The flight computer doubts its own estimate.
+    Estimate,
+    /// Gimbal pitch and yaw, then the fins: it is not where its commands take it.
+    Surface(u8),
+    Battery,
+    /// The ascent motor gave less than its curve.
+    AscentMotor,
+    /// The booster is still there after its charge was fired.
+    Separation,
+    /// The vehicle falls fast although the parachute was thrown out.
+    Parachute,
+    /// The landing motor lit later than any that is known.
+    LateLight,
+    /// The landing motor is weaker or stronger than the mission's.
+    Impulse,
+    /// The landing motor went out before its time.
+    BurntOutEarly,
+    /// No plan lands, and none is left.
+    NoPlan,
+    /// The nose points below the horizon while the motor burns.
+    Tumbles,
+    /// The ignition gate stayed shut.
+    Gate,
+    /// Something else has latched an abort or inhibited the landing motor.
+    Latched,
+}
+
+/// Every sign, and how long it must last to be a finding, s. A moment of it is noise, a dropped sample or a gust.
+const RULES: [(Sign, f64); 24] = [
+    (Sign::Restart, 0.0),
+    (Sign::Gnss, 0.0),
+    (Sign::Barometer, 0.0),
+    (Sign::Lidar, 0.0),
+    (Sign::Accelerometer, 0.0),
+    (Sign::HeightsDisagree, 0.5),
+    (Sign::Estimate, 0.2),
+    (Sign::Surface(0), 0.1),
+    (Sign::Surface(1), 0.1),
+    (Sign::Surface(2), 0.3),
+    (Sign::Surface(3), 0.3),
+    (Sign::Surface(4), 0.3),
+    (Sign::Surface(5), 0.3),
+    (Sign::Battery, 0.1),
+    (Sign::AscentMotor, 0.0),
+    (Sign::Separation, 0.5),
+    (Sign::Parachute, 0.0),
+    (Sign::LateLight, 0.0),
+    (Sign::Impulse, 0.2),
+    (Sign::BurntOutEarly, 0.0),
+    (Sign::NoPlan, 0.5),
+    (Sign::Tumbles, 0.05),
+    (Sign::Gate, 0.0),
+    (Sign::Latched, 0.0),
+];
+
+/// Gimbal pitch and yaw, then four fins.
+const SURFACES: usize = 6;
+const GIMBALS: usize = 2;
+const SURFACE_NAMES: [&str; SURFACES] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
+
+/// Something that went wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    pub sign: Sign,
+    /// When it began, s since the release.
+    pub since_s: f64,
+    /// How long it has been so altogether, s.
+    pub held_s: f64,
+    /// What was measured at its worst, in the words' unit.
+    pub value: f64,
+    /// What it stands against, or a second number.
+    pub beside: f64,
+    /// A word that belongs to it.
+    pub detail: &'static str,
+}
+
+impl Finding {
+    /// The finding as a short sentence, without its time.
+    pub fn words(&self) -> String {
+        let Self { value, beside, detail, held_s, .. } = *self;
+        match self.sign {
+            Sign::Restart => format!("flight computer away for {value:.2} s"),
+            Sign::Gnss => format!("GNSS lost for {value:.1} s"),
+            Sign::Barometer => format!("barometer silent for {value:.1} s"),
+            Sign::Lidar => format!("lidar silent from {beside:.0} m down"),
+            Sign::Accelerometer => format!("accelerometer repeats one sample for {value:.1} s"),
+            Sign::HeightsDisagree => format!("barometer {value:.1} m from the other heights"),
+            Sign::Estimate => format!("estimate doubted for {held_s:.1} s: {detail}"),
+            Sign::Surface(surface) => {
+                let name = SURFACE_NAMES.get(usize::from(surface)).unwrap_or(&"surface");
+                format!("{name} {value:.1} deg from where its commands take it, at {beside:.1} deg")
+            }
+            Sign::Battery => format!("battery down to {value:.2} V"),
+            Sign::AscentMotor => format!("ascent motor gave {value:.2} of its impulse"),
+            Sign::Separation => "booster did not separate".to_string(),
+            Sign::Parachute => format!("falls at {value:.0} m/s under its parachute"),
+            Sign::LateLight => format!("landing motor lit {value:.2} s after its command, not {beside:.2} s"),
+            Sign::Impulse => format!("landing motor's impulse {value:.3} of the mission's"),
+            Sign::BurntOutEarly => format!("landing motor went out {value:.1} s early"),
+            Sign::NoPlan => format!("no plan that lands for {held_s:.1} s"),
+            Sign::Tumbles => format!("nose below the horizon in the burn: tilt {value:.0} deg"),
+            Sign::Gate if detail.is_empty() => "ignition gate stayed shut".to_string(),
+            Sign::Gate => format!("ignition gate stayed shut: {detail}"),
+            Sign::Latched => detail.to_string(),
+        }
+    }
+}
+
+/// What holds in a frame: since when, s, and the finding's numbers.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    since_s: f64,
+    /// How bad it is: the worst is kept.
+    size: f64,
+    value: f64,
+    beside: f64,
+    detail: &'static str,
+}
+
+/// A sign that is being watched.
+#[derive(Debug, Clone, Copy, Default)]
+struct Watch {
+    since_s: Option<f64>,
+    /// The place of its finding.
+    found: Option<usize>,
+    worst: f64,
+}
+
+/// The findings of a flight.
+#[derive(Debug, Clone)]
+pub struct Findings {
+    watcher: Option<Watcher>,
+    watches: [Watch; RULES.len()],
+    found: Vec<Finding>,
+    thrust_over_weight: Option<f64>,
+}
+
+impl Default for Findings {
+    fn default() -> Self {
+        let watches = [Watch::default(); RULES.len()];
+        Self { watcher: None, watches, found: Vec::new(), thrust_over_weight: None }
+    }
+}
+
+impl Findings {
+    /// Thrust over weight when a foot first touched the ground in the landing burn.
+    pub fn thrust_over_weight_at_contact(&self) -> Option<f64> {
+        self.thrust_over_weight
+    }
+
+    /// Looks at the computer after a frame.
+    pub fn note(&mut self, computer: &Computer) {
+        let Some((flown, estimate)) = computer.flown().zip(computer.pilot().estimate()) else { return };
+        let watcher = self.watcher.get_or_insert_with(|| Watcher::new(computer, &flown));
+        watcher.take(computer, &flown, estimate);
+        if flown.contact && computer.pilot().ignited_at_s().is_some() && self.thrust_over_weight.is_none() {
+            self.thrust_over_weight = Some(thrust_over_weight(computer, flown.time_s));
+        }
+        for ((sign, lasts_s), watch) in RULES.into_iter().zip(&mut self.watches) {
+            let Some(seen) = watcher.seen(sign, computer, &flown, estimate) else {
+                watch.since_s = None;
+                continue;
+            };
+            let since_s = *watch.since_s.get_or_insert(seen.since_s);
+            // A multiple of the frame is not exact.
+            if flown.time_s - since_s < lasts_s - 0.5 * FRAME_S {
+                continue;
+            }
+            let &mut place = watch.found.get_or_insert_with(|| {
+                let Seen { value, beside, detail, .. } = seen;
+                self.found.push(Finding {
+                    sign,
+                    since_s,
+                    held_s: flown.time_s - since_s,
+                    value,
+                    beside,
+                    detail,
+                });
+                self.found.len() - 1
+            });
+            let finding = &mut self.found[place];
+            finding.held_s += FRAME_S;
+            if seen.size > watch.worst {
+                watch.worst = seen.size;
+                (finding.value, finding.beside) = (seen.value, seen.beside);
+            }
+        }
+    }
+
+    /// What was found so far, first in time.
+    pub fn found(&self) -> Vec<Finding> {
+        let mut found = self.found.clone();
+        found.sort_by(|a, b| a.since_s.total_cmp(&b.since_s).then(a.sign.cmp(&b.sign)));
+        found
+    }
+}
+
+/// Thrust over weight now.
+fn thrust_over_weight(computer: &Computer, time_s: f64) -> f64 {
+    let pilot = computer.pilot();
+    let (mission, burn) = (pilot.mission(), pilot.motor().burn(pilot.curve()));
+    let burning_s = pilot.burning_s(time_s);
+    let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
+    let mass = MassModel::new(&mission.airframe.mass, pilot.curve().propellant_mass_kg()).at(burnt_kg);
+    burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)) / (mass.mass_kg * mission.gravity_m_s2)
+}
+
+/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a second and drops one sample
+/// in 50.
+const GNSS_LOST_S: f64 = 1.5;
+/// The same where its last fix came before the boost was over, s: none of three receivers keeps its fix in a boost.
+const GNSS_LOST_IN_BOOST_S: f64 = 6.0;
+/// The barometer speaks 50 times a second.
+const BAROMETER_LOST_S: f64 = 0.25;
+/// A lidar that says nothing for this long, s, where it must see the ground: from this slant range, m, down to the dust, and
+/// while its beam leans less than this (40 deg).
+const LIDAR_LOST_S: f64 = 0.25;
+const LIDAR_SEES_M: [f64; 2] = [3.0, 10.0];
+const LIDAR_COS_TILT: f64 = 0.766;
+/// Beyond this tilt (60 deg) the nose is astray: no plan leans so far.
+const ASTRAY_COS_TILT: f64 = 0.5;
+/// So many equal samples in a row do not happen to noise.
+const FROZEN_FRAMES: u32 = 10;
+/// A gimbal and a fin this far from where their servo's data take them do not follow, rad. Feedback, play and an unknown
+/// half frame of delay make 1 deg of it for a gimbal; the fins' feedback is coarser.
+const AWAY_RAD: [f64; 2] = [0.035, 0.14];
+/// Common regulators of 5 V give up here, V.
+const BATTERY_LOW_V: f64 = 6.6;
+/// Less than this share of the ascent motor's certified impulse was felt.
+const ASCENT_WEAK: f64 = 0.8;
+/// A parachute fills within this time, s, and carries more slowly than this, m/s.
+const CHUTE_FILLS_S: f64 = 4.0;
+const CHUTE_CARRIES_M_S: f64 = 15.0;
+/// A delay beyond the mission's by more than this is not known, s.
+const LATE_S: f64 = 0.2;
+/// An impact is felt for less time than this, s.
+const SHOCK_S: f64 = 0.1;
+/// So many standard deviations of the prior is no motor of this kind.
+const IMPULSE_SIGMAS: f64 = 3.0;
+/// A tail-off is not known better, s.
+const EARLY_S: f64 = 0.3;
+/// The barometer and the other heights differ by less, m: 3 m of the pressure of the own exhaust, and a slow offset.
+const HEIGHTS_APART_M: f64 = 6.0;
+/// Below this height a plan ends, m.
+const PLANS_ABOVE_M: f64 = 2.0;
+
+/// What the rules need of the frames before.
+#[derive(Debug, Clone)]
+struct Watcher {
+    frame: u64,
+    /// Frames that are missing before this one.
+    missing: u64,
+    /// When each sensor last spoke, s.
+    gnss_s: f64,
+    barometer_s: f64,
+    lidar_s: f64,
+    gnss_since_boost: bool,
+    imu: ImuSample,
+    frozen_frames: u32,
+    surfaces: [ServoModel; SURFACES],
+    /// Specific force along the nose over the boost, m/s.
+    boost_m_s: f64,
+    ejected_s: Option<f64>,
+    /// When the separation charge was fired.
+    parted_s: Option<f64>,
+    /// Since when the lidar must see the ground, s.
+    must_see_s: Option<f64>,
+    /// The nose was astray in the burn: what is felt along it tells little of the motor from then on.
+    astray: bool,
+    /// A foot has touched the ground: nothing after it was the flight's.
+    down: bool,
+    /// The gate check that failed when the gate was given up.
+    gate: Option<&'static str>,
+}
+
+impl Watcher {
+    fn new(computer: &Computer, flown: &Input<'_>) -> Self {
+        let airframe = &computer.pilot().mission().airframe;
+        Self {
+            frame: flown.frame.saturating_sub(1),
+            missing: 0,
+            gnss_s: flown.time_s,
+            barometer_s: flown.time_s,
+            lidar_s: flown.time_s,
+            gnss_since_boost: false,
+            imu: ImuSample::NONE,
+            frozen_frames: 0,
+            surfaces: servos(airframe, flown),
+            boost_m_s: 0.0,
+            ejected_s: None,
+            parted_s: None,
+            must_see_s: None,
+            astray: false,
+            down: false,
+            gate: None,
+        }
+    }
+
+    fn take(&mut self, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) {
+        self.missing = flown.frame.saturating_sub(self.frame + 1);
+        self.frame = flown.frame;
+        let (time_s, phase) = (flown.time_s, computer.mode().phase);
+        if self.missing > 0 {
+            // Nobody knows what was commanded or measured meanwhile.
+            self.surfaces = servos(&computer.pilot().mission().airframe, flown);
+            (self.gnss_s, self.barometer_s, self.lidar_s) = (time_s, time_s, time_s);
+        }
+        if let Sensed::Measured(measured) = &flown.sensed {
+            if measured.gnss.is_some() {
+                self.gnss_s = time_s;
+                self.gnss_since_boost = phase != Phase::Boost;
+            }
+            if measured.pressure_altitude_m.is_some() {
+                self.barometer_s = time_s;
+            }
+            if measured.lidar_range_m.is_some() {
+                self.lidar_s = time_s;
+            }
+            let same = measured.imu.specific_force_m_s2 == self.imu.specific_force_m_s2;
+            self.frozen_frames = if same { self.frozen_frames + 1 } else { 0 };
+            self.imu = measured.imu;
+            if phase == Phase::Boost {
+                self.boost_m_s += measured.imu.specific_force_m_s2.x * FRAME_S;
+            }
+        }
+        let commands = computer.commands();
+        for (servo, command_rad) in
+            self.surfaces.iter_mut().zip(commands.gimbal_rad.into_iter().chain(commands.fins_rad))
+        {
+            servo.step(command_rad);
+        }
+        for (line, since_s) in
+            [(Line::Parachute, &mut self.ejected_s), (Line::Separation, &mut self.parted_s)]
+        {
+            if commands.outputs.is_on(line) {
+                since_s.get_or_insert(time_s);
+            }
+        }
+        if self.gate.is_none() && computer.latch() == Some(Latch::Gate) {
+            self.gate = computer.pilot().gate_check_that_fails(computer.mode(), flown);
+        }
+        let nose_up = estimate.state.nose_in_world().z;
+        let near = estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up && nose_up > LIDAR_COS_TILT;
+        self.down |= flown.contact && !phase.before_apogee();
+        self.astray |= phase.in_landing_burn() && nose_up < ASTRAY_COS_TILT;
+        self.must_see_s = if near { self.must_see_s.or(Some(time_s)) } else { None };
+    }
+
+    /// Whether a sign shows in this frame.
+    fn seen(&self, sign: Sign, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) -> Option<Seen> {
+        let (phase, time_s) = (computer.mode().phase, flown.time_s);
+        let pilot = computer.pilot();
+        let mission = pilot.mission();
+        let has_sensors = matches!(flown.sensed, Sensed::Measured(_));
+        let in_air = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down;
+        let now = |value: f64, beside| Seen { since_s: time_s, size: value, value, beside, detail: "" };
+        let silent = |since_s: f64, longest_s: f64, beside: f64| {
+            let silent_s = time_s - since_s;
+            (in_air && has_sensors && silent_s > longest_s)
+                .then_some(Seen { since_s, ..now(silent_s, beside) })
+        };
+        match sign {
+            Sign::Restart => {
+                let away_s = self.missing as f64 * FRAME_S;
+                (in_air && self.missing > 1).then(|| Seen { since_s: time_s - away_s, ..now(away_s, 0.0) })
+            }
+            Sign::Gnss => {
+                let climbs = phase == Phase::Boost || !self.gnss_since_boost && mission.launch.is_some();
+                silent(self.gnss_s, if climbs { GNSS_LOST_IN_BOOST_S } else { GNSS_LOST_S }, 0.0)
+            }
+            Sign::Barometer => silent(self.barometer_s, BAROMETER_LOST_S, 0.0),
+            Sign::Gate | Sign::Latched => {
+                let detail = latched(computer.latch()?, sign, self.gate)?;
+                Some(Seen { detail, ..now(0.0, 0.0) })
+            }
+            _ if in_air => seen_in_flight(self, sign, computer, flown, estimate),
+            _ => None,
+        }
+    }
+}
+
+/// A sign that only a vehicle in the air has.
+fn seen_in_flight(
+    watcher: &Watcher,
+    sign: Sign,
+    computer: &Computer,
+    flown: &Input<'_>,
+    estimate: &Estimate,
+) -> Option<Seen> {
+    let (pilot, mode, time_s) = (computer.pilot(), computer.mode(), flown.time_s);
+    let (mission, motor) = (pilot.mission(), pilot.motor());
+    let burns = mode.phase == Phase::Powered;
+    let tilt_rad = libm::acos(estimate.state.nose_in_world().z.clamp(-1.0, 1.0));
+    let height_m = estimate.state.position_m.z;
+    let seen = |since_s, value: f64, beside, detail| Seen { since_s, size: value, value, beside, detail };
+    let now = |value, beside| seen(time_s, value, beside, "");
+    match sign {
+        Sign::Lidar => {
+            let [low_m, high_m] = LIDAR_SEES_M;
+            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
+            let must_see_s = watcher.must_see_s.filter(|_| falls && height_m >= low_m)?;
+            let silent_s = time_s - watcher.lidar_s.max(must_see_s);
+            (silent_s > LIDAR_LOST_S).then(|| seen(time_s - silent_s, silent_s, high_m, ""))
+        }
+        Sign::Accelerometer => (watcher.frozen_frames >= FROZEN_FRAMES).then(|| {
+            let frozen_s = f64::from(watcher.frozen_frames) * FRAME_S;
+            seen(time_s - frozen_s, frozen_s, 0.0, "")
+        }),
+        Sign::HeightsDisagree => {
+            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
+            let apart_m = estimate.heights.disagreement_m().filter(|_| falls)?;
+            (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
+        }
+        Sign::Estimate => match estimate.health {
+            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.words())),
+            _ => None,
+        },
+        Sign::Surface(surface) => {
+            let surface = usize::from(surface);
+            let at_rad = surfaces_rad(flown)[surface];
+            let away_rad = (at_rad - watcher.surfaces[surface].at_rad).abs();
+            (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)])
+                .then(|| now(away_rad.to_degrees(), at_rad.to_degrees()))
+        }
+        Sign::Battery => {
+            let volts = flown.battery_v.filter(|volts| *volts < BATTERY_LOW_V)?;
+            Some(Seen { size: BATTERY_LOW_V - volts, ..now(volts, BATTERY_LOW_V) })
+        }
+        Sign::AscentMotor => {
+            let booster = &mission.launch.as_ref()?.booster;
+            let burnt_kg = 0.5 * booster.motor_curve.propellant_mass_kg();
+            let mass_kg = mission.airframe.mass.loaded_kg + booster.dry_kg + burnt_kg;
+            let share = watcher.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
+            (mode.phase == Phase::Coast && share < ASCENT_WEAK).then(|| now(share, 1.0))
+        }
+        Sign::Separation => (flown.booster_attached && watcher.parted_s.is_some()).then(|| now(1.0, 0.0)),
+        Sign::Parachute => {
+            let sinks_m_s = -estimate.state.velocity_m_s.z;
+            let since_s = watcher.ejected_s? + CHUTE_FILLS_S;
+            (time_s > since_s && sinks_m_s > CHUTE_CARRIES_M_S).then(|| now(sinks_m_s, CHUTE_CARRIES_M_S))
+        }
+        Sign::LateLight => {
+            // The shock of an impact is shorter than any burn.
+            let took_s =
+                motor.ignition_s().filter(|lit_s| time_s - lit_s > SHOCK_S)? - pilot.ignited_at_s()?;
+            let known_s = mission.ignition.delay_s;
+            (took_s > known_s + LATE_S)
+                .then(|| seen(pilot.ignited_at_s().unwrap_or(time_s), took_s, known_s, ""))
+        }
+        Sign::Impulse => {
+            let sigma = motor.sigmas()[0];
+            let off = (motor.impulse_scale() - 1.0).abs();
+            let known = burns
+                && !watcher.astray
+                && off > IMPULSE_SIGMAS * mission.motor.impulse_sigma
+                && off > 2.0 * sigma;
+            let lit_s = motor.ignition_s().unwrap_or(time_s);
+            known.then(|| Seen { size: off, ..seen(lit_s, motor.impulse_scale(), 1.0, "") })
+        }
+        Sign::BurntOutEarly => {
+            let MotorStage::EndedEarly { at_s } = motor.stage() else { return None };
+            let ends_s = motor.ignition_s()? + motor.burn_time_stretch() * pilot.curve().burn_time_s();
+            (ends_s - at_s > EARLY_S).then(|| seen(at_s, ends_s - at_s, 0.0, ""))
+        }
+        Sign::NoPlan => {
+            let none = computer.level() == ControlLevel::Stabiliser;
+            (burns && none && height_m > PLANS_ABOVE_M).then(|| now(1.0, 0.0))
+        }
+        Sign::Tumbles => {
+            (burns && tilt_rad > core::f64::consts::FRAC_PI_2).then(|| now(tilt_rad.to_degrees(), 90.0))
+        }
+        Sign::Restart | Sign::Gnss | Sign::Barometer | Sign::Gate | Sign::Latched => None,
+    }
+}
+
+/// What latched, in words: for a gate that was given up the check that failed then.
+fn latched(latch: Latch, sign: Sign, gate: Option<&'static str>) -> Option<&'static str> {
+    let words = match latch {
+        Latch::Gate => gate.unwrap_or(""),
+        Latch::Commanded => "abort of the crew",
+        Latch::UncommandedLiftOff => "lifted off although nobody had armed it",
+        Latch::UncommandedRelease => "released although nobody had cleared it",
+        Latch::NoSeparation => "abort: the booster stayed on",
+        Latch::NoLight => "landing motor did not light in time",
+        Latch::Other => "ascent motor did not lift the vehicle off",
+    };
+    ((latch == Latch::Gate) == (sign == Sign::Gate)).then_some(words)
+}
+
+/// Where gimbal and fins are, rad.
+fn surfaces_rad(flown: &Input<'_>) -> [f64; SURFACES] {
+    let ([pitch, yaw], [a, b, c, d]) = (flown.gimbal_rad, flown.fins_rad);
+    [pitch, yaw, a, b, c, d]
+}
+
+/// A servo as its data describe it: a delay, then a rate.
+#[derive(Debug, Clone)]
+struct ServoModel {
+    /// The last commands, the oldest at `next`.
+    line_rad: [f64; LINE_FRAMES],
+    next: usize,
+    delay_frames: usize,
+    step_rad: f64,
+    at_rad: f64,
+}
+
+/// An airframe's servo delay is 0.1 s at most.
+const LINE_FRAMES: usize = 24;
+
+impl ServoModel {
+    fn new(servo: &Servo, at_rad: f64) -> Self {
+        Self {
+            line_rad: [at_rad; LINE_FRAMES],
+            next: 0,
+            delay_frames: (libm::round(servo.delay_s / FRAME_S) as usize).min(LINE_FRAMES - 1),
+            step_rad: servo.rate_rad_s() * FRAME_S,
+            at_rad,
+        }
+    }
+
+    /// Moves for a frame under the commands before it, and takes the next one.
+    fn step(&mut self, command_rad: f64) {
+        let delayed = (self.next + LINE_FRAMES - 1 - self.delay_frames) % LINE_FRAMES;
+        self.at_rad += (self.line_rad[delayed] - self.at_rad).clamp(-self.step_rad, self.step_rad);
+        self.line_rad[self.next] = command_rad;
+        self.next = (self.next + 1) % LINE_FRAMES;
+    }
+}
+
+/// Servos at rest where their surfaces are.
+fn servos(airframe: &Airframe, flown: &Input<'_>) -> [ServoModel; SURFACES] {
+    let at_rad = surfaces_rad(flown);
+    core::array::from_fn(|surface| {
+        let servo = if surface < GIMBALS { &airframe.gimbal.servo } else { &airframe.fins.servo };
+        ServoModel::new(servo, at_rad[surface])
+    })
+}
