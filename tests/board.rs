@@ -70,7 +70,7 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     ground.args(["--connect", &chain.radio.far_link(), "--log", "ground.mcap"]).current_dir(folder.path());
     ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
     let mut screen = Terminal::start(&ground, (100, 40), false);
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
     screen.wait_for("Falling");

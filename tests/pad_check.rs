@@ -46,7 +46,7 @@ fn a_crew_checks_its_vehicle_and_then_arms_it() {
     let mut screen = station(folder.path());
     let link = format!("udpout:127.0.0.1:{}", screen.bound_port(Bound::Udp));
     let vehicle = vehicle(folder.path(), &link, &[]);
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"X\r", "RUNS");
     // Meanwhile an arming is refused, and ends the check. It is not typed again behind the refusal: then it would arm.
     screen.type_until(b"AARM\r", "ARM REFUSED by the vehicle");
@@ -76,7 +76,7 @@ fn a_fin_that_is_stuck_closed_is_found_by_the_check_alone() {
     let mut screen = station(folder.path());
     let link = format!("udpout:127.0.0.1:{}", screen.bound_port(Bound::Udp));
     let vehicle = vehicle(folder.path(), &link, &["--fault", "fin-stuck:1@pad+1"]);
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"X\r", "RUNS");
     screen.wait_for("FAILED: 3 outside");
     let row = screen.wait_for(" fin 2 ");

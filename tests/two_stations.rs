@@ -68,7 +68,7 @@ impl Launch {
         };
         let (ann, bob) = (station("Ann", "255"), station("Bob", "254"));
         for screen in [&ann, &bob] {
-            screen.wait_for("GO: every arming check passes");
+            screen.wait_for("every arming check passes");
         }
         Self { ann, bob, vehicle, _folder: folder }
     }

@@ -124,7 +124,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     let (mut screen, port) = listening(folder.path());
     let link = format!("udpout:127.0.0.1:{port}");
     let mut first = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", " ARMED ");
     screen.type_until(b"0SSTART\r", "observed yes");
     let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
@@ -152,7 +152,7 @@ fn two_vehicles_with_one_boot_number_are_two() {
     std::fs::write(folder.path().join("uid"), "4711\n").unwrap();
     let copy = ["--stay", "--profile", "mk2", "--boot-number", "42", "--uid-file", "uid"];
     let first = Running::start(vehicle(folder.path(), &[&link]).args(copy));
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     let second = Running::start(vehicle(folder.path(), &[&link]).args(copy));
     screen.wait_for("TWO VEHICLES under id 1");
     screen.type_until(b"0AARM\r", "cannot arm: TWO VEHICLES under id 1");
@@ -181,7 +181,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
     );
     let link = format!("udpout:127.0.0.1:{port}");
     let vehicle = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", "ARM acknowledged: accepted");
     assert!(!other.was_sent(ARM), "the other vehicle was armed, too");
     screen.type_bytes(b"\x18\r");
@@ -255,7 +255,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
         |operator: &str| Terminal::start(&ground(&anns, &["attach", "--operator", operator]), SIZE, false);
     let (mut bob_at_ann_s, mut ann) = (attach("Bob"), attach("Ann"));
     for screen in [&bob, &bob_at_ann_s, &ann] {
-        screen.wait_for("GO: every arming check passes");
+        screen.wait_for("every arming check passes");
     }
     // It says so before anything is typed.
     bob_at_ann_s.wait_for("HOLD/ABORT ONLY TWO-PERSON");
@@ -295,7 +295,7 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
         Running::start(&mut ground(folder.path(), &["daemon", "--connect", &link, "--log", "none"]));
     daemon.wait_for_line("PAD_IDLE");
     let mut screen = Terminal::start(&ground(folder.path(), &["attach", "--operator", "ann"]), SIZE, false);
-    screen.wait_for("GO: every arming check passes");
+    screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", "armed, says HEARTBEAT");
     daemon.signal(Signal::SIGKILL);
     daemon.wait();
@@ -342,7 +342,7 @@ fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_ali
     let station =
         || Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let mut one = station();
-    one.wait_for("GO: every arming check passes");
+    one.wait_for("every arming check passes");
     one.type_until(b"0AARM\r", "armed, says HEARTBEAT");
     one.type_until(b"0SSTART\r", "hold until T-2");
     one.wait_for("armed here");

@@ -50,7 +50,7 @@ fn started(root: &Path) -> Terminal {
     let mut chain = emulate(root, &["chain"]);
     chain.env("XDG_RUNTIME_DIR", &settings).env("XDG_CONFIG_HOME", &settings);
     let mut terminal = Terminal::start(&chain, SIZE, false);
-    terminal.wait_for("GO: every arming check passes");
+    terminal.wait_for("every arming check passes");
     terminal.type_until(b"AARM\r", " ARMED ");
     terminal.type_until(b"SSTART\r", "START  commanded");
     terminal

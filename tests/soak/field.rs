@@ -104,10 +104,10 @@ impl Field {
             terminal.type_bytes(page);
         }
         for terminal in [&*screen, &*watching, &*distant] {
-            terminal.wait_for("GO: every arming check passes");
+            terminal.wait_for("every arming check passes");
         }
         screen.type_until(b"AARM\r", " ARMED ");
-        screen.wait_for("[x] armed, says HEARTBEAT");
+        screen.wait_for("✓ armed, says HEARTBEAT");
         screen.type_until(b"SSTART\r", "START  commanded");
         vehicle.wait_for_line("to AERO_DESCENT");
         self.proxy.impair(impairment);

@@ -65,7 +65,7 @@ fn an_abort_whose_answers_are_lost_is_repeated_and_reported_as_observed() {
 #[test]
 fn an_arm_whose_answers_are_lost_is_repeated_for_two_seconds_done_once_and_the_heartbeat_decides() {
     let mut rig = Rig::new("mk2");
-    rig.terminal.wait_for("GO: every arming check passes");
+    rig.terminal.wait_for("every arming check passes");
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
     rig.terminal.type_by_hand(b"AARM\r");
     rig.wait_for_fact("ARM", "acknowledged NEVER  observed yes");

@@ -50,7 +50,7 @@ fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     ];
     for (end, tells_repeats) in endings {
         let mut rig = Rig::on_terminal("mk2", tells_repeats, "xterm-256color");
-        rig.terminal.wait_for("GO: every arming check passes");
+        rig.terminal.wait_for("every arming check passes");
         assert!(!rig.terminal.is_restored(), "the screen is not open");
         rig.terminal.type_bytes(b"5");
         rig.terminal.wait_for("[5Link]");

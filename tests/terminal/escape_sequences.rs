@@ -71,7 +71,7 @@ fn parameter(index: u16, bytes: &[u8]) -> MavMessage {
 #[test]
 fn texts_of_a_vehicle_never_control_the_terminal() {
     let mut rig = Rig::new("mk2");
-    rig.terminal.wait_for("GO: every arming check passes");
+    rig.terminal.wait_for("every arming check passes");
     let mut encoder = Encoder::new(VEHICLE);
     for page in ["[1Pad]", "[6Texts]", "[7Params]"] {
         rig.terminal.type_bytes(&page.as_bytes()[1..2]);

@@ -37,10 +37,10 @@ fn a_paste_into_an_armed_station_starts_nothing() {
 #[test]
 fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
     let mut rig = Rig::new("mk2");
-    rig.terminal.wait_for("GO: every arming check passes");
+    rig.terminal.wait_for("every arming check passes");
     rig.terminal.type_in_bunches(b"AARM\r", &[2, 3]);
     assert!(rig.terminal.confirm_if_asked(" ARMED "), "keys that came together were taken for typed ones");
-    rig.terminal.wait_for("[x] armed, says HEARTBEAT");
+    rig.terminal.wait_for("✓ armed, says HEARTBEAT");
     rig.terminal.type_in_bunches(b"SSTART\r", &[1, 4, 2]);
     assert!(rig.terminal.confirm_if_asked("START  commanded"));
     rig.wait_for_fact("START", "observed yes");
@@ -66,7 +66,7 @@ fn bytes_that_arrive_faster_than_typing_start_nothing() {
 fn ten_kilobytes_of_text_neither_quit_nor_command() {
     for marked in [true, false] {
         let mut rig = Rig::new("mk2");
-        rig.terminal.wait_for("GO: every arming check passes");
+        rig.terminal.wait_for("every arming check passes");
         if marked {
             rig.terminal.paste(&long_text());
         } else {

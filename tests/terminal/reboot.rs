@@ -20,7 +20,7 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     });
     // What was known before the reboot is gone: the flight, and commands that were waiting.
     assert!(!rig.terminal.window().shows("commanded "));
-    rig.terminal.wait_for("GO: every arming check passes");
+    rig.terminal.wait_for("every arming check passes");
     assert_eq!(
         (rig.sent(ARM, 1.0), rig.sent(START, 0.0)),
         (arms, starts),
@@ -84,10 +84,10 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
     let mut station =
         Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let fly = |station: &mut Terminal, flying: &mut Running| {
-        station.wait_for("GO: every arming check passes");
+        station.wait_for("every arming check passes");
         station.type_until(b"AARM\r", " ARMED ");
         flying.wait_for_line("PAD_ARMED");
-        station.wait_for("[x] armed, says HEARTBEAT");
+        station.wait_for("✓ armed, says HEARTBEAT");
         station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
         station.wait_for("Falling");

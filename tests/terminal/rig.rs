@@ -61,9 +61,9 @@ impl Rig {
 
     /// Types the arming sequence until the vehicle reports that it is armed; returns how often it was typed.
     pub(crate) fn arm(&mut self) -> usize {
-        self.terminal.wait_for("GO: every arming check passes");
+        self.terminal.wait_for("every arming check passes");
         let climbed = self.type_until(b"AARM\r", " ARMED ");
-        self.terminal.wait_for("[x] armed, says HEARTBEAT");
+        self.terminal.wait_for("✓ armed, says HEARTBEAT");
         climbed
     }
 

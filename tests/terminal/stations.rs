@@ -23,7 +23,7 @@ impl Station {
 
     fn attach(&self, operator: &str) -> Terminal {
         let screen = self.pad.attach(&["--operator", operator], &[]);
-        screen.wait_for("GO: every arming check passes");
+        screen.wait_for("every arming check passes");
         screen
     }
 
@@ -42,7 +42,7 @@ fn ground_without_arguments_beside_a_station_is_the_demonstration_and_reports_th
     demonstration.wait_for("a station runs: pid ");
     // On a narrower list the words "shows it" are on the next line.
     demonstration.wait_for("`ground attach`");
-    demonstration.wait_for("GO: every arming check passes");
+    demonstration.wait_for("every arming check passes");
     demonstration.type_until(b"AARM\r", " ARMED ");
     demonstration.type_until(b"SSTART\r", "START  commanded");
     demonstration.wait_for("Falling");

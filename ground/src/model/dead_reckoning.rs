@@ -82,6 +82,41 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     })
 }
 
+/// How far apart the points of a course are, s, and the longest one.
+const COURSE_STEP_S: f64 = 0.5;
+const COURSE_LONGEST_S: f64 = 120.0;
+
+/// Where the vehicle is expected to be: times from now, s, and places, to the ground as far as that can be told. On the way up
+/// only to apogee: nobody has told yet how it falls. Under the ascent motor, whose thrust is not known, nothing.
+pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
+    let (Some(motion), Some(phase)) = (vehicle.best_motion(), vehicle.phase_now()) else { return Vec::new() };
+    let left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
+    let untold = matches!(phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_DEPLOY);
+    if !vehicle.in_flight() || !left_pad || untold {
+        return Vec::new();
+    }
+    let last = LastMotion::of(vehicle, phase, &motion.value);
+    let age_s = motion.age(now).as_secs_f64();
+    let mut course: Vec<(f64, NorthEastUp)> = Vec::new();
+    for step in 0..(COURSE_LONGEST_S / COURSE_STEP_S) as u32 {
+        let ahead_s = f64::from(step) * COURSE_STEP_S;
+        let at = along_plan(vehicle, phase, now + Duration::from_secs_f64(ahead_s))
+            .unwrap_or_else(|| last.after(age_s + ahead_s));
+        let falls = course.last().is_some_and(|(_, before)| before[2] > at.altitude_m);
+        if phase == TdPhase::TD_PHASE_COAST && falls {
+            break;
+        }
+        course.push((
+            at.landed_after_s.map_or(ahead_s, |landed_s| (landed_s - age_s).clamp(0.0, ahead_s)),
+            [at.x_m, at.y_m, at.altitude_m.max(0.0)],
+        ));
+        if at.landed_after_s.is_some() {
+            break;
+        }
+    }
+    course
+}
+
 /// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and has reached zero since.
 /// A hold or an abort in the silence is not known here.
 pub fn may_have_left(vehicle: &Vehicle, now: Duration) -> Option<Duration> {

@@ -9,7 +9,9 @@ use super::{CUT_MARK, TextRole, Theme, fixed};
 use crate::model::{Act, Event, Mark, Model, Step, StepState, TextEntry, role_name};
 
 /// Columns before the text of an event: time, speaker and mark.
+const TIME_COLUMNS: usize = 7;
 const BEFORE_TEXT: usize = 18;
+const NARROW_COLUMNS: usize = 50;
 /// Narrower than this, a text is cut rather than wrapped.
 const WRAP_COLUMNS_MIN: usize = 20;
 
@@ -33,7 +35,10 @@ fn chosen(
     columns: usize,
     rows: usize,
 ) -> Vec<Line<'static>> {
-    let text_columns = columns.saturating_sub(BEFORE_TEXT);
+    // In a narrow panel the speaker is left out.
+    let is_narrow = columns < NARROW_COLUMNS;
+    let before = if is_narrow { TIME_COLUMNS + 3 } else { BEFORE_TEXT };
+    let text_columns = columns.saturating_sub(before);
     let of_events: Vec<Vec<Line>> = model
         .events
         .newest(rows)
@@ -44,7 +49,8 @@ fn chosen(
                 EventLevel::Warning => TextRole::Caution,
                 EventLevel::Error | EventLevel::Fatal => TextRole::Alarm,
             };
-            let head = format!("{:>7.1} {:<7} ", event.at.as_secs_f64(), event.speaker.name());
+            let time = format!("{:>TIME_COLUMNS$.1} ", event.at.as_secs_f64());
+            let head = if is_narrow { time } else { format!("{time}{:<7} ", event.speaker.name()) };
             let mark = event.mark();
             let pieces = if text_columns < WRAP_COLUMNS_MIN {
                 vec![event.text.clone()]
@@ -54,9 +60,8 @@ fn chosen(
             let mut pieces = pieces.into_iter();
             let first = pieces.next().unwrap_or_default();
             let first = Line::from(vec![theme.label(head), theme.span(format!("{mark}{first}"), role)]);
-            let rest = pieces.map(move |piece| {
-                Line::from(vec![Span::raw(" ".repeat(BEFORE_TEXT)), theme.span(piece, role)])
-            });
+            let rest = pieces
+                .map(move |piece| Line::from(vec![Span::raw(" ".repeat(before)), theme.span(piece, role)]));
             std::iter::once(first).chain(rest).collect()
         })
         .collect();

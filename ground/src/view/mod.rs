@@ -5,6 +5,8 @@
 //! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
 //! there are plain lines, the most important first. For terminals without Unicode, [`theme`] converts the result.
 
+pub mod band;
+pub mod bars;
 pub mod dialog;
 pub mod headline;
 pub mod lists;
@@ -122,7 +124,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
     // Also over the past: whether people may approach is a matter of the present.
     let large = banner.filter(|banner| banner.is_large_on(model.page()));
-    let body = large.map_or(body, |words| headline::draw_banner(&words, theme, frame, body));
+    let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     pages::draw(shown, theme, shown_at, frame, body);
     draw_lines(frame, message, &messages);
     status_lines::draw_keys(model, theme, now, frame, keys);

@@ -32,8 +32,8 @@ pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
         line("vertical", vehicle.of_motion(|m| m.climb_m_s), 2, "m/s"),
         line("horizontal", vehicle.of_motion(Motion::horizontal_m_s), 2, "m/s"),
         line("distance", vehicle.of_motion(Motion::distance_m), 1, "m"),
-        line("u axial", of_body(|b| b.u_m_s), 2, "m/s"),
-        line("lateral", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
+        line("along axis", of_body(|b| b.u_m_s), 2, "m/s"),
+        line("across", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
         line("tilt", vehicle.tilt_deg(), 2, "deg"),
         line("turn rate", vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
     ]
@@ -59,7 +59,7 @@ pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'
             theme.span(format!("{mark}{text:>17.17}"), role),
         ])
     };
-    let level = data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.level, "TD_CONTROL_LEVEL_"));
+    let level = data.map_or_else(|| "--".to_owned(), |d| steered(d.level));
     let status =
         data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.solver_status, "TD_SOLVER_STATUS_"));
     let kkt = data
@@ -67,15 +67,26 @@ pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'
     let missed = data.is_some_and(|d| d.deadline_margin_us < 0);
     let margin = number(data.map(|d| f64::from(d.deadline_margin_us) / 1_000.0));
     vec![
-        wide_text("level", level, data.map_or(TextRole::Label, |d| level_role(d.level))),
+        wide_text("burn", level, data.map_or(TextRole::Label, |d| level_role(d.level))),
         wide_text("solver", status, data.map_or(TextRole::Label, |d| status_role(d.solver_status))),
         row(theme, "iterations", number(data.map(|d| f64::from(d.iterations))), 0, "", now),
         row(theme, "solve time", number(data.map(|d| f64::from(d.solve_time_us) / 1_000.0)), 2, "ms", now),
         row(theme, if missed { "MISSED BY" } else { "margin" }, margin, 2, "ms", now),
         row(theme, "cost", number(data.map(|d| f64::from(d.cost))), 1, "", now),
         wide_text("KKT", kkt, TextRole::Plain),
-        row(theme, "thrust x", number(data.map(|d| f64::from(d.thrust_scale))), 3, "", now),
+        row(theme, "thrust", number(data.map(|d| f64::from(d.thrust_scale))), 3, "x", now),
     ]
+}
+
+/// What steers the burn, in words.
+fn steered(level: TdControlLevel) -> String {
+    match level {
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => "on its plan".to_owned(),
+        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => "near its plan".to_owned(),
+        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => "on its last plan".to_owned(),
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => "UPRIGHT, NO PLAN".to_owned(),
+        other => words::lower_case(&other, "TD_CONTROL_LEVEL_"),
+    }
 }
 
 fn level_role(level: TdControlLevel) -> TextRole {

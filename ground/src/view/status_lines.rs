@@ -11,9 +11,30 @@ use ratatui::text::{Line, Span};
 
 use super::{Ink, STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest, side_by_side};
 use crate::model::{
-    Act, Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, Vehicle, is_burning, is_on_pad,
-    latch_cause, words,
+    Act, Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, Vehicle, dead_reckoning::course,
+    is_burning, is_on_pad, latch_cause, words,
 };
+
+/// How long until the next event is shown large, so that the line needs not say it.
+fn is_large(page: Page, phase: TdPhase) -> bool {
+    let timed = matches!(
+        phase,
+        TdPhase::TD_PHASE_COAST
+            | TdPhase::TD_PHASE_AERO_DESCENT
+            | TdPhase::TD_PHASE_LAND_ARMED
+            | TdPhase::TD_PHASE_POWERED
+    );
+    timed && matches!(page, Page::Ascent | Page::Descent | Page::Landing)
+}
+
+/// The same line for the row of the state.
+pub fn next_event_beside(model: &Model, now: Duration) -> Option<String> {
+    let phase = model.vehicle.phase()?;
+    let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
+    let left = if is_large(model.page(), phase.value) { String::new() } else { left };
+    let mark = if phase.is_stale(now) { STALE_MARK } else { " " };
+    Some(format!(" next{mark}{event}{left}{rest}"))
+}
 
 /// A vehicle that is slower than this is not falling, m/s.
 const FALLS_M_S: f64 = 0.5;
@@ -21,19 +42,20 @@ const FALLS_M_S: f64 = 0.5;
 /// The next event of a flight; `None` on the pad, where the crew decides.
 pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
     let phase = model.vehicle.phase()?;
-    let (event, rest) = event(&model.vehicle, phase.value, now)?;
+    let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
+
     let stale = phase.is_stale(now);
     let (mark, role) = if stale { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Title) };
     Some(Line::from(vec![
         theme.label(" next"),
-        theme.span(format!("{mark}{event}"), role),
+        theme.span(format!("{mark}{event}{left}"), role),
         theme.span(rest, if stale { TextRole::Stale } else { TextRole::Plain }),
     ]))
 }
 
-/// The event, and what else is known about it.
-fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String)> {
-    let words = |event: &str, rest: &str| Some((event.to_owned(), rest.to_owned()));
+/// The event, in how long, and what else is known about it.
+fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
+    let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
         TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
         TdPhase::TD_PHASE_COAST => {
@@ -42,14 +64,14 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
             let attached =
                 vehicle.descent().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
             let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
-            Some((format!("{before}apogee{}", within(left_s)), after.to_owned()))
+            Some((format!("{before}apogee"), within(left_s), after.to_owned()))
         }
         TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
         TdPhase::TD_PHASE_IGNITION => words("thrust", " within 0.5 s, or NO LIGHT"),
         TdPhase::TD_PHASE_POWERED => {
             let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
-            Some((format!("touchdown{}", within(left_s)), String::new()))
+            Some(("touchdown".to_owned(), within(left_s), String::new()))
         }
         TdPhase::TD_PHASE_TOUCHDOWN => words("over", " once the motor is cool, or pinned"),
         TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
@@ -58,10 +80,10 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
     }
 }
 
-fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String) {
+fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String, String) {
     if vehicle.interlocks().is_some() && !vehicle.may_light() {
         let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
-        return ("the ground".to_owned(), format!(", NO BURN{why}"));
+        return ("the ground".to_owned(), String::new(), format!(", NO BURN{why}"));
     }
     let descent = vehicle.descent();
     let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
@@ -69,20 +91,20 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
         descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
     let at = chosen_m.map_or_else(String::new, |height_m| format!(" at {} m", fixed(height_m, 0)));
     let armed = if phase == TdPhase::TD_PHASE_LAND_ARMED { ", motor armed" } else { ", motor not armed" };
-    (format!("IGNITION{}", within(left_s)), format!("{at}{armed}"))
+    ("IGNITION".to_owned(), within(left_s), format!("{at}{armed}"))
 }
 
 /// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not for long.
-fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String) {
+fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String, String) {
     let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
     let Some(descent) = vehicle.descent().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
-        return ("chute opens".to_owned(), format!(", still fast{motor}"));
+        return ("chute opens".to_owned(), String::new(), format!(", still fast{motor}"));
     };
     let sinks_m_s = -f64::from(descent.value.vertical_speed_m_s);
     let falls_s = f64::from(descent.value.height_m) / sinks_m_s - descent.age(now).as_secs_f64();
     let left_s = Some(falls_s).filter(|_| sinks_m_s > FALLS_M_S);
-    ("ground".to_owned(), format!("{}{motor}", within(left_s)))
+    ("ground".to_owned(), within(left_s), motor.to_owned())
 }
 
 /// As in ` in 3.4 s`; empty if the time is unknown or over.
@@ -257,6 +279,8 @@ pub fn message_rows(
     let message = super::top_lines::message(model, theme, now);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
     if let Some(alarm) = alarm_text(model, theme, now, columns).filter(|_| rings) {
+        // In flight nothing moves for it.
+        let message = message.filter(|_| !model.vehicle.in_flight());
         return message.into_iter().chain([alarm]).collect();
     }
     let flight = || shows_flight(model).then(|| timeline(model, theme, (now, shown_at), columns));
@@ -350,7 +374,7 @@ pub fn cut(text: &str, columns: usize) -> String {
 // The flight along its time: what has been, what is expected, warnings and errors, and the shown moment.
 
 /// How long the line of a flight in progress is, so that it is rarely drawn anew, s.
-const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
+pub const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
 /// The mark of the shown moment, of what has been, of what is expected, of a warning or an error; the time that has passed, and
 /// that is to come.
 const NOW: char = '◆';
@@ -376,11 +400,13 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     let Some(phase) = vehicle.phase_now().filter(|_| vehicle.in_flight()) else { return Vec::new() };
     let apogee = vehicle.of_descent(|d| d.time_to_apogee_s).filter(|left| left.value > 0.0);
     let ignition = vehicle.ignition_in_s(now).filter(|_| !is_burning(phase));
-    let touchdown = vehicle.touchdown_in_s(now).filter(|_| is_burning(phase));
+    let touchdown = vehicle.touchdown_in_s(now).filter(|_| is_burning(phase)).map(|left| left.value);
+    let ground =
+        || course(vehicle, now).last().filter(|(_, [.., up_m])| *up_m < 1.0).map(|(ahead_s, _)| *ahead_s);
     let left = [
         ("apogee", apogee.map(|left| left.value - left.age(now).as_secs_f64())),
         ("ignition", ignition.map(|left| left.value)),
-        ("touchdown", touchdown.map(|left| left.value)),
+        ("touchdown", touchdown.or_else(ground)),
     ];
     let known =
         left.into_iter().filter_map(|(name, left_s)| Some((name, left_s.filter(|left_s| *left_s >= 0.0)?)));
@@ -428,10 +454,16 @@ fn timeline(
         let begin = column(*at);
         let end = marks.get(place + 1).map_or(columns, |(_, next, ..)| column(*next));
         cells[begin] = (*mark, *ink);
-        if begin + 1 + name.len() < end {
-            for (cell, letter) in cells[begin + 1..].iter_mut().zip(name.chars()) {
-                *cell = (letter, *ink);
-            }
+        let before = place.checked_sub(1).map_or(0, |before| column(marks[before].1) + 1);
+        let here = column(now).max(before) + 1;
+        let at = match () {
+            () if begin + 1 + name.len() < end => begin + 1,
+            // At the end of the line its name stands before it.
+            () if begin >= here + name.len() && place + 1 == marks.len() => begin - name.len(),
+            () => continue,
+        };
+        for (cell, letter) in cells[at..].iter_mut().zip(name.chars()) {
+            *cell = (letter, *ink);
         }
     }
     let here = column(shown_at);

@@ -104,7 +104,7 @@ pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
 fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let seen = status_lines::alarm_text(model, theme, now, columns);
     let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
-    let next = || status_lines::next_event_line(model, theme, now).map(|line| line.to_string());
+    let next = || status_lines::next_event_beside(model, now);
     // The Pad page says it itself.
     let ready =
         || readiness(model, now).filter(|_| model.page() != Page::Pad).map(|(words, _)| format!(" {words}"));

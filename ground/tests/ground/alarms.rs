@@ -204,7 +204,7 @@ fn after_the_loss_of_the_link_the_position_is_a_prediction_that_grows_uncertain(
     rig.speaks = false;
     rig.run(2.0);
     let early = rig.screen(80, 24);
-    assert!(early.contains("PREDICTED, not heard") && early.contains("free fall"), "{early}");
+    assert!(early.contains("┬ PREDICTED ─") && early.contains("free fall"), "{early}");
     // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + 2.5 t^2: the drag is not known.
     assert!(early.contains("30.4 ±12.5 m"), "{early}");
     rig.run(1.0);

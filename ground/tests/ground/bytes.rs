@@ -78,7 +78,8 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
         if now >= pace.redraw_at() {
             let theme = Theme { palette: Palette::Dark, ascii: false };
             terminal.draw(|frame| view(&model, theme, now, frame)).expect("memory takes it");
-            let bytes = std::mem::take(&mut *line.0.borrow_mut()).len();
+            let raw = std::mem::take(&mut *line.0.borrow_mut());
+            let bytes = raw.len();
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
             let phase = model.vehicle.phase().map_or(TdPhase::TD_PHASE_SAFE, |phase| phase.value);
             drawn.push((now, bytes, phase));

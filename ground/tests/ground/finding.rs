@@ -128,7 +128,7 @@ fn other_keys_open_the_same_ladder() {
     rig.run(1.0);
     rig.key(Key::Char('A'));
     assert_eq!(rig.model.dialog, None, "no longer its key");
-    assert!(rig.screen(80, 24).contains("Z, then ARM Enter"), "{}", rig.screen(80, 24));
+    assert!(rig.screen(80, 24).contains("Z, type ARM, Enter"), "{}", rig.screen(80, 24));
     rig.key(Key::Char('Z'));
     rig.key(Key::Enter);
     assert!(rig.take_commands().is_empty(), "the word is still needed");

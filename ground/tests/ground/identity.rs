@@ -213,7 +213,7 @@ fn a_station_is_not_stopped_by_a_slip_while_people_must_keep_away() {
 #[test]
 fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
     let mut rig = Rig::crewed();
-    assert!(!rig.screen(80, 24).contains("mission"), "{}", rig.screen(80, 24));
+    assert!(!rig.screen(80, 24).contains("from pad"), "{}", rig.screen(80, 24));
     let mut name = [0; 20];
     name[..3].copy_from_slice(b"mk2");
     let hash = MissionHash::of("a text");
@@ -224,7 +224,7 @@ fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
     }));
     for (columns, rows) in [(80, 24), (120, 36)] {
         let screen = rig.screen(columns, rows);
-        let line = screen.lines().find(|line| line.contains("mission")).unwrap_or_default();
+        let line = screen.lines().find(|line| line.contains("from pad")).unwrap_or_default();
         assert!(line.contains("mk2 from pad") && line.contains(&hash.to_string()[..8]), "{screen}");
     }
 }
@@ -258,7 +258,7 @@ fn nothing_is_said_of_approaching_in_flight_or_while_the_vehicle_is_being_prepar
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     rig.run(0.2);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("phase ") && !screen.contains(" next do not"), "{screen}");
+    assert!(screen.contains(" Parachute ") && !screen.contains(" next do not"), "{screen}");
     let mut rig = Rig::crewed();
     rig.pad_wait_s = 31;
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;

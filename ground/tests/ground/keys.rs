@@ -384,12 +384,7 @@ fn a_refusal_shows_the_answer_and_the_vehicles_words() {
     rig.answer(ARM, DENIED);
     rig.text("arming refused: pin: found in, required out");
     let screen = rig.screen(80, 24);
-    assert!(
-        screen.contains("REFUSED (denied)")
-            && screen.contains("found in,")
-            && screen.contains("required out"),
-        "{screen}"
-    );
+    assert!(screen.contains("REFUSED (denied)") && screen.contains("found in, required"), "{screen}");
 }
 
 #[test]

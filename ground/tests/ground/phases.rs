@@ -35,21 +35,18 @@ fn regress_ascent() {
 #[test]
 fn the_ascent_page_shows_apogee_and_booster_until_it_is_over() {
     let mut rig = coasting();
-    for words in [
-        "Ascent",
-        "apogee at        301 m",
-        "apogee in        4.9 s",
-        "booster     attached",
-        "T+3.5",
-        "[2Ascent]",
-    ] {
+    for words in ["apogee 301", "s to apogee", "next separation, apogee", "T+3.5", "[2Ascent]"] {
         assert!(rig.screen(80, 24).contains(words), "{words}: {}", rig.screen(80, 24));
     }
+    for words in ["apogee at        301 m", "apogee in        4.9 s", "booster     attached"] {
+        assert!(rig.screen(140, 45).contains(words), "{words}: {}", rig.screen(140, 45));
+    }
     rig.ascent(TdBooster::TD_BOOSTER_SEPARATING, 301.0, 2.5);
-    assert!(rig.screen(80, 24).contains("separating"));
+    assert!(rig.screen(140, 45).contains("separating"));
     // Under the ascent motor no apogee is known.
     rig.ascent(TdBooster::TD_BOOSTER_ATTACHED, f32::NAN, f32::NAN);
-    assert!(rig.screen(80, 24).contains("apogee at         -- m"), "{}", rig.screen(80, 24));
+    assert!(rig.screen(140, 45).contains("apogee at         -- m"), "{}", rig.screen(140, 45));
+    assert!(!rig.screen(80, 24).contains("s to apogee"), "{}", rig.screen(80, 24));
     rig.key(Key::Char('2'));
     assert!(rig.screen(80, 24).contains("[2Ascent]"));
     rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
@@ -125,7 +122,7 @@ fn in_phase(
 fn regress_coast() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE;
     let rig = in_phase(TdPhase::TD_PHASE_COAST, effect, (240.0, 31.0), (60.0, 4.0));
-    assert!(rig.screen(80, 24).contains(" next apogee in 3.2 s, then the fins open"));
+    assert!(rig.screen(80, 24).contains(" next apogee, then the fins open"));
     snapshot("coast", &rig);
 }
 
@@ -135,7 +132,11 @@ fn regress_land_armed() {
     let mut rig = in_phase(TdPhase::TD_PHASE_LAND_ARMED, effect, (90.0, -38.0), (200.0, 6.0));
     rig.descent_with(90.0, -38.0, TdChute::TD_CHUTE_STOWED);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains(" next IGNITION in 0.8 s at 58 m, motor armed"), "{screen}");
+    assert!(screen.contains(" next IGNITION at 58 m, motor armed"), "{screen}");
+    rig.key(Key::Char('5'));
+    let other = rig.screen(80, 24);
+    assert!(other.contains(" next IGNITION in 0.8 s at 58 m, motor armed"), "{other}");
+    rig.key(Key::Char('0'));
     assert!(rig.screen(20, 5).contains(" next IGNITION in 0…"), "{}", rig.screen(20, 5));
     snapshot("land_armed", &rig);
 }
@@ -178,5 +179,5 @@ fn in_flight_no_arming_check_is_shown_as_passed() {
     rig.key(Key::Char('1'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("off the pad nothing is checked for arming"), "{screen}");
-    assert!(!screen.contains(" GO ") && screen.contains("[ ] every check passes"), "{screen}");
+    assert!(!screen.contains(" GO ") && screen.contains("▶ every check passes"), "{screen}");
 }

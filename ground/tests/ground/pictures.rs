@@ -202,6 +202,7 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
         let plain = rows(&drawn(rig, size, Palette::None));
         for palette in Palette::ALL {
             let buffer = drawn(rig, size, palette);
+            let theme = Theme { palette, ascii: false };
             assert_eq!(rows(&buffer), plain, "{name} {palette:?}");
             for cell in &buffer.content {
                 assert!(!cell.modifier.contains(Modifier::DIM), "{name} {palette:?}: dim");
@@ -210,6 +211,11 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
                     continue;
                 }
                 let (fore, back) = colours(cell);
+                // Nothing depends on the lines between panels.
+                let is_line = "│─┌┐└┘├┤┬┴┼┄".contains(cell.symbol());
+                if is_line && theme.border().fg == Some(cell.fg) {
+                    continue;
+                }
                 let found = contrast(fore, back);
                 assert!(found >= contrast_min(palette), "{name} {palette:?}: {cell:?} {found:.1}");
             }
@@ -297,13 +303,14 @@ fn a_line_of_a_multiplexer_costs_no_picture() {
 #[test]
 fn the_headline_shows_no_old_height() {
     let mut lost = flying(TdPhase::TD_PHASE_AERO_DESCENT);
-    assert!(lost.screen(80, 24).contains("height m"));
+    let labels = |rig: &Rig| rig.screen(80, 24).lines().nth(3).unwrap_or_default().to_owned();
+    assert!(labels(&lost).contains("height m"), "{}", labels(&lost));
     lost.speaks = false;
     lost.run(6.0);
     for page in ['2', '3'] {
         lost.key(Key::Char(page));
-        let screen = lost.screen(80, 24);
-        assert!(!screen.contains("height m") && screen.contains("PREDICTED m up"), "{screen}");
+        let band = labels(&lost);
+        assert!(!band.contains("height m") && band.contains("PREDICTED m up"), "{band}");
     }
 }
 

@@ -48,7 +48,7 @@ fn a_failed_or_full_log_is_a_no_go_for_arming_from_this_station() {
         (LogHealth { dropped: 7, ..LogHealth::default() }, "station log loses records, 7 so far"),
     ] {
         let mut rig = on_the_pad();
-        assert!(rig.screen(80, 24).contains(" GO: every arming check passes"));
+        assert!(rig.screen(80, 24).contains(" every arming check passes"));
         rig.msg(Msg::Log(broken));
         let screen = rig.screen(80, 24);
         assert!(screen.contains(&format!("NO-GO: {words}")), "{screen}");

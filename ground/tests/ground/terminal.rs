@@ -49,7 +49,7 @@ fn a_station_survives_the_loss_of_its_terminal() {
         )
         .unwrap();
     };
-    assert!(wait_for(&directory.path().join("terminal.txt"), "Arming ladder"));
+    assert!(wait_for(&directory.path().join("terminal.txt"), "steps"));
     let process = std::fs::read_to_string(directory.path().join("pid")).unwrap().trim().to_owned();
     // The session is dropped, and its terminal disappears.
     terminal.kill().unwrap();
@@ -59,7 +59,7 @@ fn a_station_survives_the_loss_of_its_terminal() {
     let mut attached =
         on_a_terminal(directory.path(), &format!("sh -c 'stty rows 24 cols 80; exec {program} attach'"))
             .unwrap();
-    assert!(wait_for(&directory.path().join("terminal.txt"), "Arming ladder"));
+    assert!(wait_for(&directory.path().join("terminal.txt"), "steps"));
     attached.stdin.take().unwrap().write_all(b"q").unwrap();
     assert!(attached.wait().unwrap().success());
     assert!(signal("TERM", &process), "it still runs");

@@ -1,91 +1,91 @@
-//! The pages of ascent and descent, and their shared layout: the headline, the height gauge, the values, the pictures.
+//! The pages of ascent and descent: the band, height over time with what is to come, the place from above, the vehicle from two
+//! sides; on a larger screen values, fins and events below.
 
 use std::time::Duration;
 
 use protocol::dialect::{TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
 use ratatui::Frame;
-use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{is_roomy, titled};
+use super::{Room, Side, attitude, columns, events, framed, rows, table};
 use crate::model::{Model, Motion, Sample, words};
-use crate::view::pictures::FlightPart;
-use crate::view::{
-    TextRole, Theme, age_mark, draw_line, draw_lines, fixed, headline, panels, pictures, row, side_by_side,
-    stacked, status_lines, text_row, widgets,
-};
+use crate::view::pictures::height::draw_height;
+use crate::view::pictures::map::draw_map;
+use crate::view::{TextRole, Theme, age_mark, bars, fixed, headline, panels, row, text_row};
 
-/// Columns of the height gauge and of the values at 80 columns, and on a larger screen. At 80 columns they are those of
-/// the landing page: what stands in the same place costs a slow line nothing at ignition.
-const NARROW_COLUMNS: [u16; 2] = [33, 28];
-const ROOMY_COLUMNS: [u16; 2] = [30, 40];
-/// Columns of the picture of the fins.
-const FIN_COLUMNS: u16 = 27;
+/// Columns of the vehicle from one side at 80 columns.
+const SIDE_COLUMNS: u16 = 18;
+/// The same for its predicted position.
+pub const LOST_COLUMNS: u16 = 28;
+/// Rows of the panels under the pictures, with their borders.
+const BELOW_ROWS: u16 = 11;
 
-/// Draws a page with these values; the picture of the fins is drawn if they steer.
+/// Draws a page with these values.
 pub fn draw_flying(
     model: &Model,
     (title, values): (&str, Vec<Line<'static>>),
-    fins_steer: bool,
     theme: Theme,
     now: Duration,
     frame: &mut Frame,
     area: Rect,
 ) {
-    let roomy = is_roomy(area);
-    let area = headline::draw_headline(
-        &headline::headline(model, now, headline::flight_headline),
-        theme,
-        frame,
-        area,
-    );
-    let [gauge_columns, value_columns] = if roomy { ROOMY_COLUMNS } else { NARROW_COLUMNS };
-    let [gauge_area, middle, right] =
-        side_by_side(area, [Length(gauge_columns), Length(value_columns), Fill(1)]);
-    let inside = titled("Height, m", theme, frame, gauge_area);
-    draw_lines(frame, inside, &widgets::gauge_lines(model, theme, now, usize::from(inside.height)));
-    let title = if panels::is_lost(model, now) { panels::LOST_TITLE } else { title };
-    draw_values(model, (title, values, roomy), theme, now, frame, middle);
-    draw_pictures(model, fins_steer && roomy, theme, now, frame, right);
+    let room = Room::of(frame.area());
+    // What the newest report means, under the number.
+    let below = values.first().cloned().unwrap_or_default();
+    let area = if headline::replaces_band(model, now) {
+        area
+    } else {
+        headline::draw_flight_band(model, below, theme, now, frame, area)
+    };
+    if room == Room::Small {
+        let right = if panels::is_lost(model, now) { LOST_COLUMNS } else { SIDE_COLUMNS };
+        let [left, middle, right] = columns(area, [Fill(5), Fill(3), Length(right)]);
+        height(model, theme, now, frame, left);
+        map(model, theme, now, frame, middle);
+        side_or_lost(model, Side::South, theme, now, frame, right);
+        return;
+    }
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
+    let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
+    height(model, theme, now, frame, left);
+    both_sides_or_lost(model, theme, now, frame, sides);
+    map(model, theme, now, frame, right);
+    let [left, middle, right] = columns(below, [Percentage(33), Percentage(30), Fill(1)]);
+    table(title, &values, theme, frame, left);
+    bars::draw_surfaces(model, theme, now, frame, middle);
+    events(model, theme, frame, right);
 }
 
-/// The values, the most important first; those that do not fit are on the page of all values.
-fn draw_values(
-    model: &Model,
-    (title, mut values, roomy): (&str, Vec<Line<'static>>, bool),
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) {
-    let rows = u16::try_from(values.len() + 1).unwrap_or(u16::MAX).min(area.height);
-    let [numbers, below] = stacked(area, [Length(rows), Fill(1)]);
-    let inside = titled(title, theme, frame, numbers);
-    values.truncate(usize::from(inside.height));
-    draw_lines(frame, inside, &values);
-    if roomy {
-        let [link, lines] = stacked(below, [Length(2), Fill(1)]);
-        draw_line(frame, link, status_lines::link_line(model, theme, now, usize::from(link.width)));
-        let names = ["vertical speed", "height", "tilt", "horizontal speed", "distance", "link rate"];
-        widgets::draw_sparklines(&names, model, theme, now, frame, lines);
+fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = framed("height m", bars::flown_legend(theme), theme, frame, area);
+    draw_height(model, theme, now, frame, inside);
+}
+
+/// A panel with the place from above.
+pub fn map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = framed("from above", Line::default(), theme, frame, area);
+    draw_map(model, theme, now, frame, inside);
+}
+
+/// The vehicle from a side; after the loss of the link its predicted position instead.
+pub fn side_or_lost(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    if panels::is_lost(model, now) {
+        table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
+    } else {
+        attitude(model, side, theme, now, frame, area);
     }
 }
 
-fn draw_pictures(model: &Model, with_fins: bool, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [upper, sides] =
-        stacked(area, [if with_fins { Length(pictures::FIN_PICTURE_ROWS + 1) } else { Length(0) }, Fill(1)]);
-    if with_fins {
-        let [fin_area, above] = side_by_side(upper, [Length(FIN_COLUMNS), Fill(1)]);
-        let inside = titled(&pictures::fins_title(model, now), theme, frame, fin_area);
-        pictures::draw_fins(model, theme, now, frame, inside);
-        let inside = titled("From above", theme, frame, above);
-        pictures::draw_top_view(model, theme, now, frame, inside);
+/// The vehicle from both sides; after the loss of the link its predicted position instead.
+pub fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    if panels::is_lost(model, now) {
+        return side_or_lost(model, Side::South, theme, now, frame, area);
     }
-    for (from, title, area) in pictures::side_views(sides) {
-        let inside = titled(title, theme, frame, area);
-        pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
-    }
+    let [south, east] = columns(area, [Fill(1), Fill(1)]);
+    attitude(model, Side::South, theme, now, frame, south);
+    attitude(model, Side::East, theme, now, frame, east);
 }
 
 /// Adds height and vertical speed before the second value. After the loss of the link the prediction shows them.
@@ -97,33 +97,33 @@ pub fn insert_height(lines: &mut Vec<Line<'static>>, model: &Model, theme: Theme
     lines.insert(2, row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
 }
 
-// The ascent page: height gauge with the expected apogee, speed, tilt and booster, side views.
+// The ascent page.
 
 pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let values = ascent_values(model, theme, now);
-    draw_flying(model, ("Ascent", values), false, theme, now, frame, area);
+    draw_flying(model, ("ascent", values), theme, now, frame, area);
 }
 
 /// For small screens: the values, with height and speed, which have no headline there.
 pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = ascent_values(model, theme, now);
+    let mut lines = panels::lost_rows(model, theme, now);
+    lines.extend(ascent_values(model, theme, now));
     insert_height(&mut lines, model, theme, now);
     lines
 }
 
 /// The values, the most important first.
 fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
+    let mut lines = vec![motor(model, theme, now)];
     let of = |pick| model.vehicle.of_descent(pick);
-    lines.push(motor(model, theme, now));
     lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
     lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
     lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
     lines.push(booster(model, theme, now));
     lines.push(row(theme, "horizontal", model.vehicle.of_motion(Motion::horizontal_m_s), 1, "m/s", now));
     lines.push(row(theme, "distance", model.vehicle.of_motion(Motion::distance_m), 1, "m", now));
-    lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 0, "m", now));
-    lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 0, "m", now));
+    lines.push(row(theme, "lands N", of(|d| d.touchdown_x_m), 0, "m", now));
+    lines.push(row(theme, "lands E", of(|d| d.touchdown_y_m), 0, "m", now));
     lines
 }
 
@@ -168,27 +168,27 @@ fn state_row(
     text_row(theme, label, mark, text, if stale == TextRole::Stale { stale } else { role }, "")
 }
 
-// The descent page: height gauge with the ignition band, values of the descent, fins from above, side view.
+// The descent page.
 
 pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let values = descent_values(model, theme, now);
-    draw_flying(model, ("Descent", values), true, theme, now, frame, area);
+    draw_flying(model, ("descent", values), theme, now, frame, area);
 }
 
 /// For small screens: the values, with height and speed, which have no headline there.
 pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = descent_values(model, theme, now);
+    let mut lines = panels::lost_rows(model, theme, now);
+    lines.extend(descent_values(model, theme, now));
     insert_height(&mut lines, model, theme, now);
     lines
 }
 
 /// The values, the most important first.
 fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
+    let mut lines = vec![band_word(model, theme, now)];
     let of = |pick| model.vehicle.of_descent(pick);
     let of_motion = |pick| model.vehicle.of_motion(pick).filter(|sample| !sample.value.is_nan());
     let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
-    lines.push(band_word(model, theme, now));
     lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
     lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
     lines.push(band(model.vehicle.descent().as_ref(), theme, now));
@@ -200,9 +200,9 @@ fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     let (wind, from) = wind(model);
     lines.push(row(theme, "wind", wind, 1, "m/s", now));
     lines.push(row(theme, "wind from", from, 0, "deg", now));
-    lines.push(row(theme, "drag x", of(|d| d.drag_scale), 3, "", now));
-    lines.push(row(theme, "down north", of(|d| d.touchdown_x_m), 1, "m", now));
-    lines.push(row(theme, "down east", of(|d| d.touchdown_y_m), 1, "m", now));
+    lines.push(row(theme, "drag", of(|d| d.drag_scale), 2, "x", now));
+    lines.push(row(theme, "lands N", of(|d| d.touchdown_x_m), 1, "m", now));
+    lines.push(row(theme, "lands E", of(|d| d.touchdown_y_m), 1, "m", now));
     lines
 }
 

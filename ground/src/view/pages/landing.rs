@@ -1,109 +1,62 @@
-//! The landing page (flight, controller, touchdown, actuators, events and side view) and the review page after it.
+//! The landing page (the burn) and the review page after it.
 
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::{is_roomy, panel, plots, titled};
-use crate::model::{BodySpeed, Model, Motion, RED_AFTER, Sample, words};
+use super::flight::{LOST_COLUMNS, both_sides_or_lost, map, side_or_lost};
+use super::{Room, Side, columns, events, framed, rows, table};
+use crate::model::{BodySpeed, Model, RED_AFTER, Sample, words};
+use crate::view::band::draw_band;
+use crate::view::pictures::height::{draw_height, draw_sink};
 use crate::view::{
-    STALE_MARK, TextRole, Theme, draw_lines, fixed, headline, lists, panels, pictures, row, side_by_side,
-    stacked, status_lines, styled, top_lines,
+    STALE_MARK, TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked, status_lines,
+    styled, top_lines,
 };
 
-/// Rows of the panels, with their title.
-const PANEL_ROWS: u16 = 9;
-/// Columns left of the side view at 80 columns.
-const LEFT_COLUMNS: u16 = 61;
-/// Of those, columns of the touchdown: its widest row has 26 or 27, and then a bar of each limit.
-const TOUCHDOWN_COLUMNS: u16 = 33;
-/// Rows of the events on a larger screen, with their title, if fewer than the second number are left.
-const EVENT_ROWS: u16 = 8;
-const TALL_ROWS: u16 = 24;
-/// Rows of the fins on a larger screen, with their title.
-const FIN_ROWS: u16 = 5;
+/// Rows of the six limits with their borders; under pictures with room for more.
+const LIMIT_ROWS: u16 = 8;
+const BELOW_ROWS: u16 = 10;
 
-/// Draws the headline, the panels, the events and the side view.
+/// Draws the band, height over sink, the vehicle, the limits and the place.
 pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let first = if model.vehicle.verdict().is_some() {
-        headline::headline(model, now, headline::verdict_headline)
+    let room = Room::of(frame.area());
+    let below = panels::controller_rows(model, theme, now).into_iter().next().unwrap_or_default();
+    let area = if headline::replaces_band(model, now) {
+        area
     } else {
-        headline::headline(model, now, headline::burn_headline)
+        headline::draw_flight_band(model, below, theme, now, frame, area)
     };
-    let roomy = is_roomy(area);
-    let area = headline::draw_headline(&first, theme, frame, area);
-    let (left, right) = if roomy {
-        let [panels, below] = stacked(area, [Length(PANEL_ROWS + 1), Fill(1)]);
-        let [flight, landing, actuators] = side_by_side(panels, [Fill(1); 3]);
-        draw_flight(model, theme, now, frame, flight);
-        draw_touchdown(model, theme, now, frame, landing);
-        draw_actuators(model, theme, now, frame, actuators);
-        let [events, right] = side_by_side(below, [Fill(2), Fill(3)]);
-        // On a middling screen the newest are enough: a change of page should not fill a slow line.
-        let rows = if events.height < TALL_ROWS { EVENT_ROWS } else { events.height };
-        (Rect { height: events.height.min(rows), ..events }, right)
-    } else {
-        let [left, right] = side_by_side(area, [Length(LEFT_COLUMNS), Fill(1)]);
-        let [panels, events] = stacked(left, [Length(PANEL_ROWS), Fill(1)]);
-        let [landing, flight] = side_by_side(panels, [Length(TOUCHDOWN_COLUMNS), Fill(1)]);
-        draw_touchdown(model, theme, now, frame, landing);
-        draw_essentials(model, theme, now, frame, flight);
-        (events, right)
-    };
-    let inside = titled("Events", theme, frame, left);
-    let lines = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
-    draw_lines(frame, inside, &lines);
-    draw_pictures(model, theme, now, frame, right);
-}
-
-fn draw_pictures(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let shows = if panels::is_lost(model, now) { "PREDICTION +" } else { "flown, plan" };
-    for (from, title, area) in pictures::side_views(area) {
-        let shows = if from == pictures::Viewpoint::South { "flown" } else { shows };
-        let whole = format!("{title}: {shows}");
-        // With a blank on either side, one column and some rule.
-        let title = if whole.len() + 4 > usize::from(area.width) { title.to_owned() } else { whole };
-        let inside = titled(&title, theme, frame, area);
-        pictures::draw_side_view(model, (pictures::FlightPart::Burn, from), theme, now, frame, inside);
+    if room == Room::Small {
+        let middle = if panels::is_lost(model, now) { LOST_COLUMNS } else { 17 };
+        let [left, middle, right] = columns(area, [Fill(1), Length(middle), Length(32)]);
+        sink(model, theme, now, frame, left);
+        side_or_lost(model, Side::South, theme, now, frame, middle);
+        let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+        bars::draw_limits(model, theme, now, frame, limits);
+        if place.height > 5 {
+            map(model, theme, now, frame, place);
+        }
+        return;
     }
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
+    let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
+    sink(model, theme, now, frame, left);
+    both_sides_or_lost(model, theme, now, frame, sides);
+    map(model, theme, now, frame, right);
+    let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
+    bars::draw_limits(model, theme, now, frame, left);
+    bars::draw_surfaces(model, theme, now, frame, middle);
+    events(model, theme, frame, right);
 }
 
-/// Altitude, speeds and attitude; after the loss of the link the predicted position.
-fn draw_flight(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (title, mut rows) = panels::flight_panel(model, theme, now);
-    if !panels::is_lost(model, now) {
-        rows.splice(0..0, panels::controller_rows(model, theme, now).into_iter().take(1));
-    }
-    panel(title, &rows, theme, frame, area);
-}
-
-fn draw_touchdown(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (title, rows) = panels::touchdown_panel_with_bars(model, theme, now, usize::from(area.width));
-    panel(title, &rows, theme, frame, area);
-}
-
-/// Who steers, how upright, and the gimbal against its limit.
-fn draw_essentials(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if panels::is_lost(model, now) {
-        return draw_flight(model, theme, now, frame, area);
-    }
-    let inside = titled("Steering", theme, frame, area);
-    let mut lines: Vec<Line> = panels::controller_rows(model, theme, now).into_iter().take(1).collect();
-    let vehicle = &model.vehicle;
-    lines.push(row(theme, "tilt", vehicle.tilt_deg(), 2, "deg", now));
-    lines.push(row(theme, "horizontal", vehicle.of_motion(Motion::horizontal_m_s), 2, "m/s", now));
-    lines.push(row(theme, "distance", vehicle.of_motion(Motion::distance_m), 1, "m", now));
-    lines.extend(panels::gimbal_rows(model, theme, now));
-    draw_lines(frame, inside, &lines);
-}
-
-fn draw_actuators(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [fins, gimbal] = stacked(area, [Length(FIN_ROWS), Fill(1)]);
-    panel("Fins command|actual", &panels::fin_rows(model, theme, now), theme, frame, fins);
-    panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, gimbal);
+fn sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let legend = if area.width < 44 { Line::default() } else { bars::flown_legend(theme) };
+    let inside = framed("height m over sink", legend, theme, frame, area);
+    draw_sink(model, theme, now, frame, inside);
 }
 
 /// The same content as lines, the most important first.
@@ -124,7 +77,7 @@ pub fn landing_lines(
     if let Some(track) = top_lines::open_command(model, now) {
         lines.push(top_lines::command_facts_short(track, theme, now));
     }
-    lines.push(attitude(model, theme, now));
+    lines.push(lean(model, theme, now));
     let (title, touchdown) = panels::touchdown_panel(model, theme, now);
     let mut verdict = theme.line(format!(" {title}: "), TextRole::Label);
     verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(styled));
@@ -160,7 +113,7 @@ fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     Line::from(spans)
 }
 
-fn attitude(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+fn lean(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let body = model.vehicle.body_speed();
     let mut spans = value(theme, "tilt", model.vehicle.tilt_deg(), 1, now);
     spans.extend(value(theme, "u", body.map(|body| body.map(|b| b.u_m_s)), 1, now));
@@ -181,34 +134,50 @@ const PLAN_COLUMNS: usize = 37;
 const MAXIMA_COLUMNS: usize = 34;
 /// Columns of a phase with its time.
 const TIMELINE_COLUMNS: usize = 24;
-/// Rows of verdict, limits and timeline on a larger screen.
-const TABLE_ROWS: u16 = 17;
-/// Columns of them on a larger screen; the events are beside them.
-const TABLE_COLUMNS: u16 = 80;
 
-/// Draws the verdict in large letters, then the lines; on a larger screen the flight in pictures below.
+/// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let roomy = is_roomy(area);
-    let area = headline::draw_headline(
-        &headline::headline(model, now, headline::verdict_headline),
-        theme,
-        frame,
-        area,
-    );
-    let columns = if roomy { TABLE_COLUMNS } else { area.width };
-    let mut lines = review_lines(model, theme, now, usize::from(columns));
-    if !roomy {
-        // The bar of the flight below shows the phases too.
-        lines.truncate(usize::from(area.height));
-        return draw_lines(frame, area, &lines);
+    let room = Room::of(frame.area());
+    let (words, role) = match panels::ending_role(model, now) {
+        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
+        None => ("no verdict received yet".to_owned(), TextRole::Caution),
+    };
+    let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
+    let sentence = theme.line(format!(" {words}{silent}"), role);
+    let area = if headline::verdict_beside(model, now, frame.area().width).is_some() {
+        let [line, below] = stacked(area, [Length(1), Fill(1)]);
+        draw_line(frame, line, sentence);
+        below
+    } else {
+        draw_band(model, (&headline::verdict(model, now), sentence, &[]), theme, now, frame, area)
+    };
+    let height = |frame: &mut Frame, area: Rect| {
+        let inside = framed("height m", Line::default(), theme, frame, area);
+        draw_height(model, theme, now, frame, inside);
+    };
+    if room == Room::Small {
+        let [left, right] = columns(area, [Fill(6), Fill(5)]);
+        let [limits, below] = rows(left, [Length(LIMIT_ROWS.min(area.height)), Fill(1)]);
+        bars::draw_limits(model, theme, now, frame, limits);
+        if below.height > 5 {
+            height(frame, below);
+            map(model, theme, now, frame, right);
+        } else {
+            let [place, flight] = columns(right, [Fill(1), Fill(1)]);
+            map(model, theme, now, frame, place);
+            height(frame, flight);
+        }
+        return;
     }
-    let [table, pictures] = stacked(area, [Length(TABLE_ROWS), Fill(1)]);
-    let [left, right] = side_by_side(table, [Length(TABLE_COLUMNS), Fill(1)]);
-    draw_lines(frame, left, &lines);
-    let inside = titled("Events", theme, frame, right);
-    let events = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
-    draw_lines(frame, inside, &events);
-    plots::draw_path(model, theme, now, frame, pictures);
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS + 2)]);
+    let [left, right] = columns(above, [Percentage(60), Fill(1)]);
+    height(frame, left);
+    map(model, theme, now, frame, right);
+    let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
+    bars::draw_limits(model, theme, now, frame, left);
+    let (title, maxima) = maxima(model, theme, now);
+    table(title, &maxima, theme, frame, middle);
+    events(model, theme, frame, right);
 }
 
 /// The verdict, then limits and greatest values, then the timeline.
@@ -226,7 +195,9 @@ pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
     limits.insert(0, theme.line(title, TextRole::Title));
     let limit_columns = PLAN_COLUMNS;
     let mut lines = vec![head];
-    let maxima = maxima(model, theme, now);
+    let (title, mut maxima) = maxima(model, theme, now);
+    maxima.insert(0, theme.line(format!(" {title}"), TextRole::Title));
+    maxima.extend(unheard(model, now).map(|words| theme.line(format!(" {words}"), TextRole::Caution)));
     if columns > limit_columns + MAXIMA_COLUMNS {
         lines.extend(beside(limits, limit_columns + 1, maxima));
     } else {
@@ -254,21 +225,21 @@ fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -
         .collect()
 }
 
-fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+/// For how long nothing was heard of a flight, if it was long enough to count.
+fn unheard(model: &Model, now: Duration) -> Option<String> {
+    let silence_s =
+        model.history.maxima.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64())?;
+    if model.vehicle.in_flight() && !model.link.state(now).carries() {
+        return Some("link LOST before touchdown".to_owned());
+    }
+    Some(format!("silent for {} s of the flight", fixed(silence_s, 1)))
+}
+
+/// The title and the greatest values: what happened in a silence is not known.
+fn maxima(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     let most = &model.history.maxima;
-    let lost = most.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64());
-    // What happened in the silence is not known.
-    let title = if lost.is_some() { " Greatest values heard" } else { " Greatest values in flight" };
-    let mut lines = vec![theme.line(title, TextRole::Title)];
-    lines.extend(lost.map(|silence_s| {
-        let unheard = model.vehicle.in_flight() && !model.link.state(now).carries();
-        let words = if unheard {
-            " link LOST before touchdown".to_owned()
-        } else {
-            format!(" silent for {} s of the flight", fixed(silence_s, 1))
-        };
-        theme.line(words, TextRole::Caution)
-    }));
+    let title =
+        if unheard(model, now).is_some() { "greatest values heard" } else { "greatest values in flight" };
     let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
         let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
         Line::from(vec![
@@ -278,7 +249,7 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         ])
     };
     let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
-    lines.extend([
+    let lines = vec![
         row("altitude", most.altitude_m, 2, "m"),
         row("descent speed", most.descent_m_s, 2, "m/s"),
         row("distance", most.distance_m, 1, "m"),
@@ -288,8 +259,8 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
         row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
         row("silence", most.silence_s, 1, "s"),
-    ]);
-    lines
+    ];
+    (title, lines)
 }
 
 /// Each phase and when it began, several on a line.

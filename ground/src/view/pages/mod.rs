@@ -11,10 +11,13 @@ pub mod plots;
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Constraint, Layout, Rect, Spacing};
+use ratatui::symbols::merge::MergeStrategy;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Borders};
 
+use super::band::Room;
+use super::pictures::attitude::{Side, draw_attitude, tilt_words};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{Model, Page};
 
@@ -69,6 +72,52 @@ pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect 
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
     inside
+}
+
+/// Splits an area into panels beside each other, which share a border.
+fn columns<const N: usize>(area: Rect, columns: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::horizontal(columns).spacing(Spacing::Overlap(1)))
+}
+
+/// Splits an area into panels above each other, which share a border.
+fn rows<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::vertical(rows).spacing(Spacing::Overlap(1)))
+}
+
+/// Draws the border of a panel with its title, and what stands at the right end of it. Returns its inside.
+pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
+    let title = theme.line(format!(" {title} "), TextRole::Title);
+    let block =
+        Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact).title(title);
+    let block = if right.width() == 0 { block } else { block.title(right.right_aligned()) };
+    let inside = block.inner(area);
+    frame.render_widget(block, area.intersection(frame.area()));
+    inside
+}
+
+/// A panel with the vehicle from a side.
+fn attitude(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let tilt = if side == Side::South { tilt_words(model, now) } else { String::new() };
+    // A narrow panel has room for the number.
+    let tilt = if area.width < 21 { tilt.trim_start_matches("tilt ").to_owned() } else { tilt };
+    let right =
+        if tilt.is_empty() { Line::default() } else { theme.line(format!(" {tilt} "), TextRole::Plain) };
+    let inside = framed(side.title(), right, theme, frame, area);
+    draw_attitude(model, side, theme, now, frame, inside);
+}
+
+/// A panel with the newest events.
+fn events(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
+    let inside = framed("events", Line::default(), theme, frame, area);
+    let lines = super::lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
+    draw_lines(frame, inside, &lines);
+}
+
+/// A panel with lines.
+fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
+    let inside = framed(title, Line::default(), theme, frame, area);
+    // The most important first; the rest is on the page of all values.
+    draw_lines(frame, inside, &lines[..lines.len().min(usize::from(inside.height))]);
 }
 
 /// Draws lines with a title and a rule above them.

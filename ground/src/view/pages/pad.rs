@@ -4,94 +4,146 @@ use std::time::Duration;
 
 use protocol::dialect::{TD_CONTROLLER_DATA, TdCheck, TdInterlock, TdPhase};
 use ratatui::Frame;
-use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{is_roomy, panel, titled};
+use super::{Room, Side, attitude, columns, events, framed, rows, table};
 use crate::model::{
-    Act, CommandKind, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints,
-    why_not_here, words,
+    Act, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here, words,
 };
+use crate::view::band::{Item, draw_band, word};
+use crate::view::pictures::map::draw_map;
 use crate::view::{
-    STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, panels, pictures,
-    side_by_side, stacked, status_lines, top_lines,
+    STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, panels, status_lines,
+    top_lines,
 };
 
-/// Columns of the checks at 80 columns.
-const CHECK_COLUMNS: u16 = 47;
-/// The most rows of checks or steps, with their title.
+/// Columns and rows of the checks and of the checklist.
+const CHECK_COLUMNS: u16 = 49;
 const CHECK_ROWS: u16 = 16;
-/// Rows of the vehicle's state on a larger screen, with a title.
-const NOW_ROWS: u16 = 13;
-/// Rows of GO or NO-GO at 80 columns, with a title.
-const GO_ROWS: u16 = 5;
-/// Columns of the ladder on a larger screen.
-const LADDER_COLUMNS: u16 = 40;
+/// Columns of the steps on a small and on a larger screen.
+const STEP_COLUMNS: [u16; 2] = [30, 38];
+/// Rows of the panels under the pictures.
+const BELOW_ROWS: u16 = 12;
 
-/// Draws GO or NO-GO, the checks and the ladder, the events below.
+/// Draws GO or what fails, the next step, the steps; and the vehicle with the place where it will land, or the checks while
+/// something is amiss.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let foremost = headline::headline(model, now, headline::pad_headline);
-    let (checks, ladder) = (checks(model, theme, now), ladder(model, theme, now));
-    let lists_steps = model.checklist.is_some() && model.pages.checklist && !is_roomy(area);
-    let go_rows = if foremost.is_empty() { 0 } else { GO_ROWS };
-    let besides = if is_roomy(area) { 1 } else { 1 + go_rows };
-    let rows = (checks.len() as u16 + 1).max(ladder.len() as u16 + besides);
-    let upper_rows = if lists_steps { CHECK_ROWS } else { rows.min(CHECK_ROWS) };
-    let (checks_area, ladder_area, events) = if is_roomy(area) {
-        let area = headline::draw_headline(&foremost, theme, frame, area);
-        let [upper, below] = stacked(area, [Length(upper_rows.max(NOW_ROWS)), Fill(1)]);
-        let [left, middle, right] =
-            side_by_side(upper, [Length(CHECK_COLUMNS + 4), Length(LADDER_COLUMNS), Fill(1)]);
-        draw_now(model, theme, now, frame, right);
-        let shares = if model.checklist.is_some() { [4, 4, 3] } else { [3, 0, 2] };
-        let [events, list, picture] = side_by_side(below, shares.map(Fill));
-        if model.checklist.is_some() {
-            draw_checklist(model, theme, now, frame, list);
+    let room = Room::of(frame.area());
+    let area =
+        if headline::replaces_band(model, now) { area } else { draw_go(model, theme, now, frame, area) };
+    let ladder = ladder(model, theme, now);
+    if room == Room::Small {
+        let [left, right] = columns(area, [Length(STEP_COLUMNS[0]), Fill(1)]);
+        table("steps", &ladder, theme, frame, left);
+        if model.checklist.is_some() && model.pages.checklist {
+            draw_checklist(model, theme, now, frame, right);
+        } else if is_amiss(model, now) {
+            draw_checks(model, theme, now, frame, right);
+        } else {
+            let [middle, right] = columns(right, [Length(18), Fill(1)]);
+            attitude(model, Side::South, theme, now, frame, middle);
+            place(model, theme, now, frame, right);
         }
-        draw_rehearsal(model, theme, now, frame, picture);
-        (left, middle, events)
-    } else {
-        let [upper, events] = stacked(area, [Length(upper_rows), Fill(1)]);
-        let [left, right] = side_by_side(upper, [Length(CHECK_COLUMNS), Fill(1)]);
-        let [go, below] = stacked(right, [Length(go_rows), Fill(1)]);
-        if go_rows > 0 {
-            let inside = titled("Now", theme, frame, go);
-            headline::draw_headline(&foremost, theme, frame, inside);
-        }
-        (left, below, events)
-    };
-    if lists_steps {
-        draw_checklist(model, theme, now, frame, checks_area);
-    } else {
-        panel(&summary(model, now).0, &checks, theme, frame, checks_area);
+        return;
     }
-    panel("Arming ladder", &ladder, theme, frame, ladder_area);
-    let inside = titled("Events", theme, frame, events);
-    let lines = lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
-    draw_lines(frame, inside, &lines);
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
+    let [left, south, east, right] =
+        columns(above, [Length(STEP_COLUMNS[1]), Percentage(17), Percentage(17), Fill(1)]);
+    table("steps", &ladder, theme, frame, left);
+    attitude(model, Side::South, theme, now, frame, south);
+    attitude(model, Side::East, theme, now, frame, east);
+    place(model, theme, now, frame, right);
+    let list = if model.checklist.is_some() { Percentage(40) } else { Length(1) };
+    let [left, middle, right] = columns(below, [Length(CHECK_COLUMNS + 4), list, Fill(1)]);
+    let lines = checks(model, theme, now);
+    table("checks", &lines, theme, frame, left);
+    if model.checklist.is_some() {
+        draw_checklist(model, theme, now, frame, middle);
+    }
+    if room == Room::Large && model.checklist.is_none() {
+        let [right, supplies] = columns(right, [Fill(1), Length(46)]);
+        events(model, theme, frame, right);
+        draw_now(model, theme, now, frame, supplies);
+    } else {
+        events(model, theme, frame, right);
+    }
+}
+
+/// Whether the checks are more important than the pictures.
+fn is_amiss(model: &Model, now: Duration) -> bool {
+    let ready = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
+    let on_the_way = model.vehicle.is_armed() || ready;
+    !on_the_way || !model.alarms.list().is_empty() || model.beside(now).is_some()
+}
+
+/// The band: GO or NO-GO, and the next step large.
+fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
+    let keys = &model.settings.keys;
+    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    let next = [(Act::Arm, "ARM"), (Act::Start, "START")].into_iter().find(|(act, _)| act.works(model, now));
+    let good = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
+    let others: Vec<Item> = next
+        .filter(|_| good && !counts)
+        .map(|(act, typed)| {
+            let text = format!("{} {typed}", keys.name(act));
+            word("next: press, then type, Enter", &text, text.len() as u16, TextRole::Title)
+        })
+        .into_iter()
+        .collect();
+    let (words, role) = match summary(model, now) {
+        (_, TextRole::Good) => (format!(" every arming check passes{}", counted(model)), TextRole::Good),
+        (words, role) => (format!(" {words}"), role),
+    };
+    let (words, role) = if counts { (hold(model, now), TextRole::Plain) } else { (words, role) };
+    draw_band(model, (&headline::pad(model, now), theme.line(words, role), &others), theme, now, frame, area)
+}
+
+/// What still stops a countdown.
+fn hold(model: &Model, now: Duration) -> String {
+    let key = model.settings.keys.name(Act::HoldCountdown);
+    if model.is_past_hold(now) {
+        return " seconds to the release; only the ABORT ends it now".to_owned();
+    }
+    format!(" seconds to the release; {key} Enter holds")
+}
+
+/// How many checks pass.
+fn counted(model: &Model) -> String {
+    let failed = model.vehicle.status.as_ref().map_or(TdCheck::empty(), |status| status.value.checks_failed);
+    let all = TdCheck::all();
+    let pass = all.iter().filter(|bit| !failed.contains(*bit)).count();
+    format!(", {pass} of {}", all.iter().count())
+}
+
+fn place(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = framed("where it lands", Line::default(), theme, frame, area);
+    draw_map(model, theme, now, frame, inside);
+}
+
+/// The checks, and the newest events below.
+fn draw_checks(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let lines = checks(model, theme, now);
+    let [upper, below] = rows(area, [Length((lines.len() as u16 + 2).min(area.height)), Fill(1)]);
+    table("checks", &lines, theme, frame, upper);
+    if below.height > 2 {
+        events(model, theme, frame, below);
+    }
 }
 
 /// The state of the vehicle and of the link.
 fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = titled("Now", theme, frame, area);
+    let inside = framed("now", Line::default(), theme, frame, area);
     let mut lines = panels::flight_rows(model, theme, now);
-    lines.extend(panels::gimbal_rows(model, theme, now).into_iter().take(2));
     lines.push(status_lines::link_line(model, theme, now, usize::from(inside.width)));
     draw_lines(frame, inside, &lines);
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = titled(&lists::checklist_title(model, now), theme, frame, area);
+    let inside = framed(&lists::checklist_title(model, now), Line::default(), theme, frame, area);
     let size = (usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
-}
-
-/// The landing that the vehicle has planned on the pad.
-fn draw_rehearsal(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = titled("Rehearsed landing: plan", theme, frame, area);
-    let seen = (pictures::FlightPart::Burn, pictures::Viewpoint::East);
-    pictures::draw_side_view(model, seen, theme, now, frame, inside);
 }
 
 /// Failing checks first, because a small screen must show them.
@@ -158,21 +210,6 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
-    // Without --mission nothing but the crew compares it with what they mean to fly.
-    lines.extend(
-        model
-            .vehicle
-            .mission()
-            .map(|mission| {
-                let fits = usize::from(CHECK_COLUMNS).saturating_sub(24);
-                theme.plain(format!(
-                    "    {mark}{:<19}{}",
-                    "mission",
-                    status_lines::cut(&format!("{} {}", mission.in_words(), mission.hash), fits)
-                ))
-            })
-            .map(Line::from),
-    );
     if !station_log_fails {
         lines.push(station_log);
     }
@@ -296,46 +333,42 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let two = model.people() == Some(2);
     let then = |act: Act, word: &str| {
         let key = keys.name(act);
-        if two {
-            format!("{key}, {word} Enter, then CONFIRM")
-        } else {
-            format!("{key}, then {word} Enter (10 s)")
-        }
+        if two { format!("{key}, {word}, Enter; CONFIRM") } else { format!("{key}, type {word}, Enter") }
     };
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
-        (model.link.uplink.is_proven(now), "it hears us: uplink proven".to_owned()),
+        (model.link.uplink.is_proven(now), "it hears us".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
         (checked && model.why_checklist(now).is_none(), checks_rung(model, now)),
         (armed, then(Act::Arm, "ARM")),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
         (counting, then(Act::Start, "START")),
     ];
+    let next = rungs.iter().position(|(stands, _)| !stands);
     let mut lines: Vec<Line> = rungs
         .into_iter()
-        .map(|(stands, words)| {
-            let (mark, role) = if stands { (" [x] ", TextRole::Good) } else { (" [ ] ", TextRole::Label) };
-            Line::from(vec![theme.span(mark, role), theme.plain(words)])
+        .enumerate()
+        .map(|(place, (stands, words))| {
+            let (mark, mark_role, role) = match () {
+                () if stands => (" ✓ ", TextRole::Good, TextRole::Label),
+                () if Some(place) == next => (" ▶ ", TextRole::Caution, TextRole::Title),
+                () => (" · ", TextRole::Label, TextRole::Label),
+            };
+            Line::from(vec![theme.span(mark, mark_role), theme.span(words, role)])
         })
         .collect();
+    // Without --mission nothing but the crew compares it with what they mean to fly.
+    lines.extend(vehicle.mission().map(|mission| {
+        theme.line(format!("   {} {:.8}", mission.in_words(), mission.hash.to_string()), TextRole::Plain)
+    }));
     if let Some(number) = model.commanded_by() {
         let here = number == model.own_number();
         let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
         lines.push(theme.line(words, TextRole::Plain));
     }
     let watches = model.settings.role.why_not_command();
-    let only_stops = why_not_here(model).map(|_| "HOLD and ABORT only from here");
-    lines.push(match watches.or(only_stops) {
-        Some(why) => theme.line(format!(" {why}"), TextRole::Label),
-        None => Line::from(vec![
-            theme.key(format!(" {}", keys.name(Act::Disarm))),
-            theme.label(" disarm   "),
-            theme.key(top_lines::ABORT_KEY),
-            theme.label(" ABORT"),
-        ]),
-    });
-    let arming = model.commands.of(CommandKind::Arm).filter(|_| !armed);
-    lines.extend(arming.map(|track| top_lines::command_facts_short(track, theme, now)));
+    let only_stops = why_not_here(model).map(|_| "only HOLD and ABORT here");
+    lines.extend(watches.or(only_stops).map(|why| theme.line(format!(" {why}"), TextRole::Label)));
     lines
 }
 

@@ -14,10 +14,10 @@ use crate::model::{
     Act, Model, Motion, is_on_pad,
     quantity::{self, ALL, Quantity},
 };
-use crate::view::pictures::{FlightPart, Viewpoint};
+use crate::view::pictures::map::{self, draw_map};
+use crate::view::pictures::side::{Viewpoint, draw_side_view};
 use crate::view::{
-    Ink, TextRole, Theme, age_mark, draw_line, draw_lines, fixed, panels, pictures, row, side_by_side,
-    stacked, widgets,
+    Ink, TextRole, Theme, age_mark, draw_line, draw_lines, fixed, panels, row, side_by_side, stacked, widgets,
 };
 
 /// Columns of the list of quantities.
@@ -141,10 +141,10 @@ pub fn draw_path(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         (Viewpoint::South, "From south, east right", south),
     ] {
         let inside = titled(title, theme, frame, at);
-        pictures::draw_side_view(model, (FlightPart::Whole, from), theme, now, frame, inside);
+        draw_side_view(model, from, theme, now, frame, inside);
     }
     let inside = titled("From above, north up", theme, frame, above);
-    pictures::draw_top_view(model, theme, now, frame, inside);
+    draw_map(model, theme, now, frame, inside);
     draw_line(frame, legend, comes_down(model, theme, now));
 }
 
@@ -166,7 +166,7 @@ pub fn path_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
 
 /// Where it will come down.
 fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let words = match pictures::comes_down(model, now) {
+    let words = match map::comes_down(model, now) {
         Some(at) => {
             let words = format!(
                 " x comes down {} m N, {} m E, moved ±{} m in 5 s*",
@@ -183,8 +183,6 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page of all values: flight, descent, controller with its residuals, actuators, link.
 
-/// Rows of the fins' panel, with its title.
-const FIN_ROWS: u16 = 5;
 /// The columns of every panel on a larger screen.
 const PANEL_COLUMNS: u16 = 30;
 
@@ -209,13 +207,6 @@ pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, below_controller);
     panel("Descent", &descent_rows(model, theme, now), theme, frame, right);
     if roomy {
-        let below = Rect {
-            y: flight_area.bottom() + FIN_ROWS + 1,
-            height: below_flight.height.saturating_sub(FIN_ROWS + 1),
-            ..left
-        };
-        let inside = titled(&pictures::fins_title(model, now), theme, frame, below);
-        pictures::draw_fins(model, theme, now, frame, inside);
         let names: Vec<&str> = quantity::ALL.iter().map(|quantity| quantity.name).collect();
         widgets::draw_sparklines(&names, model, theme, now, frame, lines);
     }
@@ -245,10 +236,10 @@ fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         line("apogee at", of(|d| d.apogee_m), 0, "m"),
         line("wind north", of(|d| d.wind_x_m_s), 1, "m/s"),
         line("wind east", of(|d| d.wind_y_m_s), 1, "m/s"),
-        line("drag x", of(|d| d.drag_scale), 3, ""),
-        line("thrust x", of(|d| d.thrust_scale), 3, ""),
-        line("down north", of(|d| d.touchdown_x_m), 1, "m"),
-        line("down east", of(|d| d.touchdown_y_m), 1, "m"),
+        line("drag", of(|d| d.drag_scale), 3, "x"),
+        line("thrust", of(|d| d.thrust_scale), 3, "x"),
+        line("lands N", of(|d| d.touchdown_x_m), 1, "m"),
+        line("lands E", of(|d| d.touchdown_y_m), 1, "m"),
     ];
     if model.vehicle.descent().is_none() {
         rows.insert(0, theme.line(" no data", TextRole::Caution));

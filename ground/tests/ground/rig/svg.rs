@@ -136,9 +136,11 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
                     .replace('&', "&amp;")
                     .replace('<', "&lt;")
                     .replace('>', "&gt;");
+                let stretched =
+                    if length > CELL.0 { format!(" textLength=\"{length}\"") } else { String::new() };
                 let _ = writeln!(
                     texts,
-                    "<text x=\"{x}\" y=\"{}\" textLength=\"{length}\" fill=\"{}\"{bold}>{escaped}</text>",
+                    "<text x=\"{x}\" y=\"{}\"{stretched} fill=\"{}\"{bold}>{escaped}</text>",
                     y + BASELINE,
                     hex(fore)
                 );

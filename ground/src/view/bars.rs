@@ -1,0 +1,163 @@
+//! Values as bars: the limits of a touchdown with their marks, fins and gimbal, supplies.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::panels::{LimitRow, decimals, limit_rows};
+use super::theme::Ink;
+use super::{TextRole, Theme, age_mark, draw_line, fixed, pages};
+use crate::model::{Deflection, Model};
+
+/// Where the limit stands on a bar, so that an excess can be seen.
+const LIMIT_AT: f64 = 0.8;
+/// Columns before the bar of a limit: mark, name and value.
+const BEFORE_BAR: u16 = 19;
+/// Columns of a limit with its unit.
+const LIMIT_COLUMNS: u16 = 11;
+/// The most columns of a bar: a longer one says no more.
+const BAR_COLUMNS: u16 = 30;
+/// The widest panel that has no room for them.
+const NARROW: u16 = 44;
+
+/// What a thick line and dots mean, at the right end of a title.
+pub fn flown_legend(theme: Theme) -> Line<'static> {
+    let ink = |ink| theme.ground().fg(theme.ink(ink));
+    Line::from(vec![
+        Span::styled(" ━", ink(Ink::Measured)),
+        theme.label(" flown "),
+        Span::styled("┄", ink(Ink::Predicted)),
+        theme.label(" predicted "),
+    ])
+}
+
+/// What the bars of fins and gimbal mean.
+fn legend(theme: Theme) -> Line<'static> {
+    let ink = |ink| theme.ground().fg(theme.ink(ink));
+    Line::from(vec![
+        Span::styled(" ▄", ink(Ink::Measured)),
+        theme.label(" is "),
+        Span::styled("│", ink(Ink::Predicted)),
+        theme.label(" asked "),
+    ])
+}
+
+/// A bar in one row from one share of it to another, with a mark across it. Half a row high, so that rows stay apart.
+fn bar([from, to]: [f64; 2], ink: Style, mark: Option<(f64, Style)>, frame: &mut Frame, at: Rect) {
+    if at.width < 3 || at.height == 0 {
+        return;
+    }
+    let at = Rect { width: at.width.min(BAR_COLUMNS), ..at };
+    let column = |share: f64| {
+        let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+        (share * f64::from(at.width)).round() as u16
+    };
+    let (begin, end) = (column(from.min(to)), column(from.max(to)));
+    frame.buffer_mut().set_string(at.x + begin, at.y, "▄".repeat((end - begin).into()), ink);
+    if let Some((place, style)) = mark {
+        let column = (place.clamp(0.0, 1.0) * f64::from(at.width - 1)).round() as u16;
+        frame.buffer_mut().set_string(at.x + column, at.y, "│", style);
+    }
+}
+
+/// Draws the panel of the six limits: reached or predicted, each with its mark.
+pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let vehicle = &model.vehicle;
+    let judged = vehicle.verdict().map(|verdict| verdict.map(|verdict| verdict.touchdown));
+    let predicted = vehicle.prediction.map(|prediction| prediction.map(|prediction| prediction.touchdown));
+    let is_judged = judged.is_some();
+    let title = if is_judged { "touchdown" } else { "touchdown predicted" };
+    let Some(at) = judged.or(predicted) else {
+        let inside = pages::framed(title, Line::default(), theme, frame, area);
+        return draw_line(frame, inside, theme.line(" no prediction", TextRole::Label));
+    };
+    let words = match at.value.violations() {
+        None => theme.line(" inside every limit ", TextRole::Good),
+        Some(names) => theme.line(format!(" OUTSIDE {names} "), TextRole::Alarm),
+    };
+    let words =
+        if words.width() + title.len() + 4 <= usize::from(area.width) { words } else { Line::default() };
+    let inside = pages::framed(title, words, theme, frame, area);
+    let (mark, role) = if is_judged { (" ", TextRole::Plain) } else { age_mark(&at, now) };
+    let ink = theme.ground().fg(theme.ink(if is_judged { Ink::Measured } else { Ink::Predicted }));
+    let rows = limit_rows(&at.value, vehicle.limits().as_ref());
+    for (row, y) in rows.into_iter().zip(inside.top()..inside.bottom()) {
+        limit(&row, (mark, role, ink), theme, frame, Rect { y, height: 1, ..inside });
+    }
+}
+
+fn limit(
+    row: &LimitRow,
+    (mark, role, ink): (&'static str, TextRole, Style),
+    theme: Theme,
+    frame: &mut Frame,
+    at: Rect,
+) {
+    let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+    let role = if role == TextRole::Plain { TextRole::Title } else { role };
+    draw_line(
+        frame,
+        at,
+        Line::from(vec![
+            theme.span(word, word_role),
+            theme.label(format!(" {:<8}", row.name)),
+            theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
+        ]),
+    );
+    let limit_columns = if at.width < NARROW { 0 } else { LIMIT_COLUMNS };
+    let style = theme.ground().fg(theme.ink(Ink::Limit));
+    let bar_at =
+        Rect { x: at.x + BEFORE_BAR, width: at.width.saturating_sub(BEFORE_BAR + limit_columns), ..at };
+    bar([0.0, LIMIT_AT * row.used], ink, Some((LIMIT_AT, style)), frame, bar_at);
+    if limit_columns > 0 {
+        let words = theme.either_side(&format!(" {} {}", row.limit, row.unit));
+        draw_line(
+            frame,
+            Rect { x: at.right() - limit_columns, width: limit_columns, ..at },
+            Line::styled(words, style),
+        );
+    }
+}
+
+/// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
+pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let area = pages::framed("fins, gimbal", legend(theme), theme, frame, area);
+    let (fins, gimbal) = (model.vehicle.fins(), model.vehicle.gimbal());
+    let limit_deg = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
+    let limit_deg = limit_deg.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(20.0);
+    let fin =
+        |k: usize| (format!("fin {}", k + 1), fins.map(|fins| fins.map(|fins| fins[k])), [0.0, 90.0], 0);
+    let plane = |name: &str, angles| (name.to_owned(), angles, [-limit_deg, limit_deg], 1);
+    let rows = (0..4).map(fin).chain([
+        plane("pitch", gimbal.map(|gimbal| gimbal.map(|gimbal| gimbal.pitch))),
+        plane("yaw", gimbal.map(|gimbal| gimbal.map(|gimbal| gimbal.yaw))),
+    ]);
+    for ((name, angles, [low, high], digits), y) in rows.zip(area.top()..area.bottom()) {
+        let at = Rect { y, height: 1, ..area };
+        let (mark, role) = angles.as_ref().map_or((" ", TextRole::Label), |angles| age_mark(angles, now));
+        let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
+        let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
+        let text = measured.map_or_else(|| "--".to_owned(), |deg| fixed(deg, digits));
+        let role = if role == TextRole::Plain { TextRole::Title } else { role };
+        let words = vec![
+            theme.label(format!(" {name:<6}")),
+            theme.span(format!("{mark}{text:>5}"), role),
+            theme.label("°"),
+        ];
+        draw_line(frame, at, Line::from(words));
+        let share = |deg: f64| (deg - low) / (high - low);
+        let asked = theme.ground().fg(theme.ink(Ink::Predicted));
+        let bar_at = Rect { x: at.x + 16, width: at.width.saturating_sub(17), ..at };
+        let ink = theme.ground().fg(theme.ink(Ink::Measured));
+        bar(
+            [share(0.0), measured.map_or(share(0.0), share)],
+            ink,
+            commanded.map(|deg| (share(deg), asked)),
+            frame,
+            bar_at,
+        );
+    }
+}

@@ -1,0 +1,202 @@
+//! The place from above, north up, fitted to what matters: the fence, where it will come down, the pad, the track, the wind.
+
+use std::time::Duration;
+
+use protocol::dialect::TdPhase;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::widgets::canvas::Line;
+
+use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme, circle};
+use crate::model::{Model, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity};
+use crate::view::{fixed, shortest, widgets};
+
+/// The least that the picture shows to every side, m; in the burn the scale of the last 30 m.
+const REACH_MIN_M: f64 = 10.0;
+const BURN_REACH_M: f64 = 15.0;
+/// The fence is included if it enlarges the picture by no more than this factor.
+const FENCE_COST_MAX: f64 = 15.0;
+/// Where the circle of the uncertainty may stand, and how large it may be, dots.
+const SPREAD_STEP_DOTS: f64 = 4.0;
+/// How far back predictions of the touchdown count for its uncertainty.
+const SCATTER_OVER: Duration = Duration::from_secs(5);
+
+/// Where the vehicle will come down: east and north of the pad and the radius of the uncertainty, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComesDown {
+    pub east_m: f64,
+    pub north_m: f64,
+    /// How far the prediction has moved within five seconds.
+    pub radius_m: f64,
+}
+
+/// The predicted touchdown in flight; `None` while it is unknown or stale.
+pub fn comes_down(model: &Model, now: Duration) -> Option<ComesDown> {
+    if !model.vehicle.in_flight() {
+        return None;
+    }
+    let fresh = |name| {
+        let quantity = Quantity::named(name)?;
+        let sample = quantity.read(model, now).filter(|sample| !sample.is_stale(now))?;
+        Some((quantity, sample.value))
+    };
+    let ((north, north_m), (east, east_m)) = (fresh("touchdown north")?, fresh("touchdown east")?);
+    let from = now.saturating_sub(SCATTER_OVER);
+    let trace = &model.history.trace;
+    let past = trace.values(north, from, now).zip(trace.values(east, from, now));
+    let radius_m = past
+        .map(|((_, past_north), (_, past_east))| libm::hypot(past_north - north_m, past_east - east_m))
+        .fold(0.0, f64::max);
+    Some(ComesDown { east_m, north_m, radius_m })
+}
+
+/// The landing that is rehearsed on the pad: east and north, m.
+fn rehearsed(model: &Model) -> Option<(f64, f64)> {
+    let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
+    let prediction = model.vehicle.prediction.filter(|_| on_pad)?;
+    Some((0.0, prediction.value.touchdown.x_m)).filter(|(_, north_m)| north_m.is_finite())
+}
+
+/// The middle of the picture and how far it reaches, m.
+fn box_around(points: &[(f64, f64)], least_m: f64) -> ((f64, f64), f64) {
+    let of = |pick: fn(&(f64, f64)) -> f64| {
+        let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
+        if low <= high { (f64::midpoint(low, high), (high - low) / 2.0) } else { (0.0, 0.0) }
+    };
+    let ((x, half_x), (y, half_y)) = (of(|point| point.0), of(|point| point.1));
+    ((x, y), (1.25 * half_x.max(half_y)).max(least_m))
+}
+
+/// Draws the picture; both axes have the same scale.
+pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    if area.width < 12 || area.height < 4 {
+        return;
+    }
+    let vehicle = &model.vehicle;
+    let flown: Vec<(f64, f64)> =
+        vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
+    let down = comes_down(model, now);
+    let lost = predict_position(vehicle, now);
+    let fence_m = vehicle.limits().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
+    let phase = vehicle.phase_now();
+    let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
+    let stands = flown.last().copied().filter(|_| stands);
+    let burns = phase.is_some_and(is_burning);
+    let here = vehicle.best_motion().filter(|motion| motion.value.x_m.is_finite() && !motion.is_stale(now));
+    let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
+    let rehearsed = rehearsed(model);
+    let around =
+        |at: (f64, f64), radius: f64| [(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)];
+    let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).collect();
+    points.extend(lost.iter().flat_map(|at| around((at.y_m, at.x_m), at.error_m.min(500.0))));
+    points.extend(down.iter().map(|at| (at.east_m, at.north_m)));
+    if !burns || points.is_empty() {
+        points.push((0.0, 0.0));
+        points.extend(rehearsed);
+    }
+    let (mut middle, mut reach_m) = box_around(&points, if burns { BURN_REACH_M } else { REACH_MIN_M });
+    // The whole fence, unless it would make everything small; on the ground only the way to the vehicle matters.
+    let whole =
+        fence_m.filter(|fence_m| stands.is_none() && !burns && *fence_m < FENCE_COST_MAX * reach_m.max(30.0));
+    if let Some(fence_m) =
+        whole.filter(|fence_m| points.iter().all(|(x, y)| libm::hypot(*x, *y) < 1.2 * fence_m))
+    {
+        (middle, reach_m) = ((0.0, 0.0), 1.08 * fence_m);
+    }
+    let (across, up) = (f64::from(area.width) * DOTS_ACROSS, f64::from(area.height) * DOTS_UP);
+    let per_dot = 2.0 * reach_m / across.min(up);
+    let (half_x, half_y) = (per_dot * across / 2.0, per_dot * up / 2.0);
+    let plane =
+        Plane { area, x: [middle.0 - half_x, middle.0 + half_x], y: [middle.1 - half_y, middle.1 + half_y] };
+    // In whole steps, so that it does not tremble.
+    let step_m = SPREAD_STEP_DOTS * per_dot;
+    let spread = down.map(|at| {
+        let [east_m, north_m] = [at.east_m, at.north_m].map(|place_m| (place_m / step_m).round() * step_m);
+        circle((east_m, north_m), ((at.radius_m / step_m).round() * step_m).max(step_m))
+    });
+    let error = lost.map(|at| circle((at.y_m, at.x_m), at.error_m));
+    plane.draw(theme, frame, |context| {
+        if let Some(fence_m) = fence_m {
+            for pair in circle((0.0, 0.0), fence_m).windows(2) {
+                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
+                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Limit) });
+            }
+        }
+        plane.measured(context, &flown, theme.ink(Ink::Measured));
+        for dotted in [&spread, &error].into_iter().flatten() {
+            plane.predicted(context, dotted, theme.ink(Ink::Predicted));
+        }
+        if let Some(at) = stands {
+            plane.predicted(context, &[(0.0, 0.0), at], theme.ink(Ink::Body));
+        }
+    });
+    let ink = |ink| theme.ground().fg(theme.ink(ink));
+    let beside = |x: f64| x + 2.0 * DOTS_ACROSS * per_dot;
+    let strong = theme.style(TextRole::Title);
+    plane.write(frame, (0.0, 0.0), "+", strong);
+    // Beside it, where nothing else is.
+    let to_the_east = here.or(stands).is_some_and(|(east_m, _)| east_m > 0.0);
+    let pad_x = if to_the_east { -4.0 * DOTS_ACROSS * per_dot } else { beside(0.0) };
+    plane.write(frame, (pad_x, 0.0), "pad", theme.style(TextRole::Label));
+    if let Some((east_m, north_m)) = rehearsed {
+        plane.write(frame, (east_m, north_m), "×", ink(Ink::Predicted));
+        plane.write(frame, (east_m, north_m - DOTS_UP * per_dot), "rehearsed", ink(Ink::Predicted));
+    }
+    if let Some(at) = down {
+        plane.write(frame, (at.east_m, at.north_m), "×", ink(Ink::Predicted));
+    }
+    if let Some(at) = lost {
+        plane.write(frame, (at.y_m, at.x_m), "+", ink(Ink::Predicted));
+        plane.write(frame, (beside(at.y_m), at.x_m), "PREDICTED", ink(Ink::Predicted));
+    } else if let Some(at) = here {
+        plane.write(frame, at, "●", strong);
+    }
+    if let Some((x, y)) = stands {
+        plane.write(frame, (x, y), "▲", theme.style(TextRole::Good));
+        let words = format!("{} m", fixed(libm::hypot(x, y), 0));
+        plane.write(frame, (beside(x / 2.0), y / 2.0), &words, strong);
+    }
+    words(model, (fence_m, per_dot), theme, frame, &plane);
+}
+
+/// What stands at the edges: north, the wind, the fence, the scale.
+fn words(
+    model: &Model,
+    (fence_m, per_dot): (Option<f64>, f64),
+    theme: Theme,
+    frame: &mut Frame,
+    plane: &Plane,
+) {
+    let label = theme.style(TextRole::Label);
+    let ([left, right], [bottom, top]) = (plane.x, plane.y);
+    plane.write(frame, (left, top), "N↑", label);
+    let (wind, arrow) = (wind(model), "wind ");
+    let wind = if plane.area.width < 24 { wind.trim_start_matches(arrow) } else { &wind };
+    plane.write(frame, (right, top), wind, label);
+    let column = DOTS_ACROSS * per_dot;
+    let length_m = widgets::tick_step((right - left) / 5.0, 1);
+    let cells = (length_m / column).round().max(2.0) as usize;
+    let scale = format!("├{}┤ {} m", "─".repeat(cells.saturating_sub(2)), shortest(length_m));
+    plane.write(frame, (left, bottom), &scale, label);
+    if let Some(fence_m) = fence_m {
+        let words = format!("fence {} m", shortest(fence_m));
+        let style = theme.ground().fg(theme.ink(Ink::Limit));
+        // Beside the scale, or above it.
+        let apart = scale.chars().count() + words.len() < usize::from(plane.area.width);
+        let y = if apart { bottom } else { bottom + 1.5 * DOTS_UP * per_dot };
+        plane.write(frame, (right, y), &words, style);
+    }
+}
+
+/// Where the wind blows to, as an arrow, and its speed.
+fn wind(model: &Model) -> String {
+    let known =
+        model.vehicle.descent().map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
+    let Some((north, east)) = known.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
+        return String::new();
+    };
+    let eighth = libm::round(libm::atan2(east, north).to_degrees() / 45.0).rem_euclid(8.0) as usize;
+    let arrow = ["↑", "↗", "→", "↘", "↓", "↙", "←", "↖"][eighth];
+    format!("wind {arrow} {} m/s", fixed(libm::hypot(north, east), 0))
+}
