@@ -17,7 +17,7 @@ const BREAKS: [(&str, &[Sign]); 17] = [
     ("barometer-step:-20@descent+1", &[Sign::HeightsDisagree]),
     ("lidar-out@descent", &[Sign::Lidar]),
     ("accelerometer-dead@descent", &[Sign::Accelerometer]),
-    ("fin-stuck:2@0", &[Sign::Surface(4)]),
+    ("fin-stuck:2@apogee", &[Sign::Surface(4)]),
     ("gimbal-stuck@powered+0.3", &[Sign::Surface(0), Sign::Surface(1)]),
     ("gimbal-jams:4@powered", &[Sign::Surface(0)]),
     ("gimbal-slow:0.2@ignition", &[Sign::Surface(0), Sign::Surface(1)]),

@@ -50,10 +50,10 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     }
     let frames = frames.0;
     let flown = phases(computer.clone(), frames.iter().copied());
-    assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::AeroDescent]), "{flown:?}");
+    assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::Deploy]), "{flown:?}");
     let Sensed::Measured(standing) = frames[0].sensed else { panic!("measured") };
     let standing = Measurements { gnss: None, ..standing };
     let stood = frames.iter().map(|frame| Input { sensed: Sensed::Measured(standing), ..*frame });
     let told = phases(computer, stood);
-    assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::AeroDescent), "{told:?}");
+    assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
 }

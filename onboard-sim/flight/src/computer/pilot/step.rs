@@ -285,7 +285,7 @@ impl Pilot {
             self.happen(table, hopeless, time_s);
         }
         match table.mode().phase {
-            Phase::Deploy if self.fins_there(&input.fins_rad) => {
+            Phase::Deploy if self.fins_are_out(&input.fins_rad) => {
                 self.happen(table, Event::FinsConfirmed, time_s);
             }
             Phase::AeroDescent => {
@@ -400,6 +400,13 @@ impl Pilot {
     pub(super) fn gate_shut_by(&self, found: &GateInput) -> Option<&'static str> {
         let checks = gate_checks(&self.model.mission.gate, found);
         checks.iter().find(|check| !check.passed).map(|check| check.name)
+    }
+
+    /// The fins have left their closed stop and stand where they are commanded to. In the frame that enters DEPLOY they still
+    /// stand where the ascent had them, and that says nothing.
+    fn fins_are_out(&self, fins_rad: &[f64; 4]) -> bool {
+        let least_rad = self.model.airframe().fins.control_min_rad() - FIN_THERE_RAD;
+        fins_rad.iter().all(|fin_rad| *fin_rad >= least_rad) && self.fins_there(fins_rad)
     }
 
     pub(super) fn fins_there(&self, fins_rad: &[f64; 4]) -> bool {
