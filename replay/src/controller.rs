@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use flight::computer::Output;
 use flight::computer::pilot::Pilot;
+use flight::computer::{Computer, Output};
 use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::{ControlLevel, LandingSolved};
 use flight::rules::phase::Phase;
@@ -113,6 +113,10 @@ impl LoggedComputer {
             }
             Ok(mission)
         })
+    }
+
+    pub(crate) fn computer(&self) -> &Computer {
+        self.computer.computer()
     }
 
     /// The pilot in the flight computer.

@@ -7,6 +7,7 @@
 //!   here. [`cli`] is what they have in common.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
+//! * [`findings`]: what went wrong in a flight, first in time.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
 //!   holds a regression suite of flights against a baseline, and proves the books of ground stations.
@@ -28,6 +29,7 @@ pub mod controller;
 mod digest;
 pub mod evaluate;
 pub mod export;
+pub mod findings;
 pub mod fit;
 pub mod info;
 pub mod log;

@@ -16,9 +16,10 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
+use crate::findings::{self, FindingFacts};
 use crate::log::{
-    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, SummaryFacts,
-    VerdictFacts, Verdicts, heard_message, summary_of,
+    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, Recording,
+    SummaryFacts, VerdictFacts, Verdicts, heard_message, summary_of,
 };
 use crate::print::{counted, print_json, shown};
 
@@ -30,6 +31,11 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut info = info_of(&mut log, || summary_of(path))?;
     info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    if info.grade.level == GradeLevel::BitExact
+        && let Ok(recording) = Recording::open(path)
+    {
+        info.findings = findings::of(&recording, info.verdict.as_ref());
+    }
     Ok(info)
 }
 
@@ -143,6 +149,7 @@ impl IndexTotals {
                 .collect(),
             ending: self.ending.words(verdict.as_ref()),
             verdict,
+            findings: None,
             clocks: self.clocks,
             unreadable: self.unreadable,
             completeness,
@@ -182,6 +189,8 @@ pub struct Info {
     pub verdict: Option<VerdictFacts>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,
+    /// What went wrong, first in time; `None` of a log whose flight cannot be run again.
+    pub findings: Option<Vec<FindingFacts>>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
     /// Why the first unreadable record could not be read.
@@ -355,6 +364,7 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
     writeln!(output, "{}{size}", shown(&info.file))?;
     print_verdict(info, output)?;
+    print_findings(info.findings.as_deref(), output)?;
     if let Some(timeline) = info.phases.first() {
         row(output, "phases", &phases(timeline))?;
     }
@@ -475,6 +485,18 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
             let text = format!("{whose}{name} {:.4} {unit} is OUTSIDE {minimum} to {maximum}", limit.value);
             row(output, "", &text)?;
         }
+    }
+    Ok(())
+}
+
+fn print_findings(findings: Option<&[FindingFacts]>, output: &mut impl Write) -> io::Result<()> {
+    let Some(findings) = findings else { return Ok(()) };
+    if findings.is_empty() {
+        return row(output, "findings", "none");
+    }
+    for (place, finding) in findings.iter().enumerate() {
+        let name = if place == 0 { "findings" } else { "" };
+        row(output, name, &format!("T+{:.2} s {}", finding.since_s, shown(&finding.words)))?;
     }
     Ok(())
 }

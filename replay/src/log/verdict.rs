@@ -52,6 +52,14 @@ pub struct VerdictLimit {
     pub passed: bool,
 }
 
+impl VerdictLimit {
+    /// The value's distance from the middle of its range, over that of the limit: above 1 it is outside.
+    pub fn share(&self) -> f64 {
+        let middle = 0.5 * (self.minimum + self.maximum);
+        ((self.value - middle) / (self.maximum - middle)).abs()
+    }
+}
+
 impl VerdictFacts {
     /// A recorded verdict.
     pub fn of(verdict: &v1::LandingVerdict) -> Self {

@@ -70,3 +70,24 @@ fn a_fault_that_cannot_be_is_refused_with_what_could() {
     );
     assert!(stdout.contains("the verdict CHANGES"), "{stdout}");
 }
+
+/// What broke is the first finding, in the description as text and as JSON; a landing with nothing broken has none.
+#[test]
+fn a_description_says_what_went_wrong_first_in_time() {
+    for (fault, words) in [
+        ("gnss-out@3", "GNSS lost for "),
+        ("gimbal-jams:4@powered", "gimbal pitch 10.8 deg from where its commands take it, at 3.7 deg"),
+        ("weak-motor:0.8@ignition", "landing motor's impulse 0.8"),
+    ] {
+        let broken = from_apogee::fly(&[fault]);
+        let found = replay::info::info(&broken.log).unwrap().findings.unwrap();
+        assert!(found[0].words.starts_with(words), "{found:?}");
+        let (_, stdout, _) = run(&mut replay("info", &broken.log));
+        assert!(stdout.contains(&format!("findings    T+{:.2} s {words}", found[0].since_s)), "{stdout}");
+        let (_, stdout, _) = run(replay("info", &broken.log).arg("--json"));
+        let json: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        assert_eq!(json["findings"][0]["words"], found[0].words);
+    }
+    let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
+    assert!(stdout.contains("\nfindings    none\n"), "{stdout}");
+}

@@ -1,0 +1,77 @@
+//! What went wrong in a flight: what its computer shows when it is run again on the log's frames, and the limits that the
+//! landing broke.
+
+use flight::computer::findings::Findings;
+use serde::Serialize;
+
+use crate::controller::LoggedComputer;
+use crate::log::{Recording, VerdictFacts, VerdictLimit};
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FindingFacts {
+    /// When it began, T+, s.
+    pub since_s: f64,
+    /// How long it lasted altogether, s.
+    pub lasted_s: f64,
+    /// A short sentence.
+    pub words: String,
+}
+
+/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again.
+pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Option<Vec<FindingFacts>> {
+    let (start, frames) = recording.replayable_frames().ok()?;
+    let toml = recording.profile_toml().ok()?;
+    let mut computer = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
+    let mut findings = Findings::default();
+    for frame in frames {
+        computer.run_again(frame).ok()?;
+        findings.note(computer.computer());
+    }
+    let mut facts: Vec<FindingFacts> = findings
+        .found()
+        .iter()
+        .map(|finding| FindingFacts {
+            since_s: finding.since_s,
+            lasted_s: finding.held_s,
+            words: finding.words(),
+        })
+        .collect();
+    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings)) {
+        let since_s = recording.contact_s().unwrap_or(f64::NAN);
+        facts.push(FindingFacts { since_s, lasted_s: 0.0, words });
+    }
+    Some(facts)
+}
+
+/// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
+fn broken(verdict: &VerdictFacts, findings: &Findings) -> Option<String> {
+    // A vehicle that comes down under its parachute is judged by nothing else.
+    let judged = verdict.limits.iter().all(|limit| limit.maximum > limit.minimum);
+    let mut broken: Vec<(&VerdictLimit, f64)> =
+        verdict.limits.iter().filter(|limit| !limit.passed).map(|limit| (limit, limit.share())).collect();
+    broken.retain(|_| judged);
+    broken.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let ((worst, share), others) = broken.split_first()?;
+    let mut words = format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share));
+    if !others.is_empty() {
+        let others: Vec<String> =
+            others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();
+        words += &format!("; also {}", others.join(", "));
+    } else if findings.found().is_empty() {
+        words += "; nothing else wrong";
+    }
+    if let Some(ratio) = findings.thrust_over_weight_at_contact() {
+        words += &format!("; the thrust was {ratio:.2} of the weight");
+    }
+    Some(words)
+}
+
+/// How far beyond its limit a value is.
+pub(crate) fn over(share: f64) -> String {
+    if share < 2.0 {
+        format!("{:.1} % over its limit", 100.0 * (share - 1.0))
+    } else {
+        format!("{share:.1} times its limit")
+    }
+}
