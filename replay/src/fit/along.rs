@@ -51,6 +51,7 @@ pub(super) const DELAY: usize = 5;
 pub(super) const SHAPE: usize = 6;
 pub(super) const BODY_LOSS: usize = SHAPE + SHAPE_TERMS;
 pub(super) const FIN_LOSS: usize = BODY_LOSS + 1;
+const RISE: usize = FIN_LOSS + 1;
 
 /// A frame of the fall or the burn.
 #[derive(Debug, Clone, Copy)]
@@ -79,8 +80,8 @@ pub(super) struct Along {
     pub(super) updraught_m_s: f64,
     /// When the igniter was fired, s.
     pub(super) commanded_s: Option<f64>,
-    /// How long the thrust was seen, s.
-    pub(super) burn_seen_s: f64,
+    /// How long the thrust was seen, s, or why nothing is known of it.
+    pub(super) burn_seen_s: Result<f64, String>,
     /// Standard deviation of the estimated speed over the speed, which counts twice in the drag.
     speed_share: f64,
 }
@@ -117,6 +118,7 @@ fn burn_of<'a>(trace: &'a Trace, values: &[f64]) -> Burn<'a> {
         impulse_scale: values[IMPULSE],
         // A trial of the iteration may be far off.
         burn_time_scale: values[BURN_TIME].max(0.2),
+        rise_s: values[RISE].max(0.0),
         shape: core::array::from_fn(|k| values[SHAPE + k]),
     }
 }
@@ -290,12 +292,16 @@ impl<'a> Series<'a> {
         let missed = self.samples.iter().map(|sample| {
             let to_s = sample.end_s - begins_s;
             let (mut thrust_n, mut mass_kg) = (0.0, self.loaded_kg);
-            if to_s > 0.0 {
+            // The part of the frame in which the motor burns: a whole frame's loss would be a step over the delay, and would
+            // hold the delay on the grid of the frames.
+            let burning = ((to_s + 0.5 * burn.rise_s) / FRAME_S).clamp(0.0, 1.0);
+            if burning > 0.0 {
                 thrust_n = burn.mean_n(to_s - FRAME_S, to_s);
                 mass_kg = self.mass_model.at(burn.burnt_kg(to_s - 0.5 * FRAME_S)).mass_kg;
             }
-            let (body, fins) =
-                if thrust_n > 0.0 { (1.0 - values[BODY_LOSS], 1.0 - values[FIN_LOSS]) } else { (1.0, 1.0) };
+            // After the burn-out there is no jet.
+            let jet = if thrust_n > 0.0 { burning } else { 0.0 };
+            let [body, fins] = [BODY_LOSS, FIN_LOSS].map(|place| 1.0 - jet * values[place]);
             let air_n = values[BODY] * body * sample.body_n + values[FINS] * fins * sample.fins_n;
             sample.felt_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
         });
@@ -315,19 +321,81 @@ impl<'a> Series<'a> {
         };
         libm::exp(lowest(libm::log(0.02), libm::log(4.0), 14, surprise))
     }
+
+    /// Fits the fall and the burn together; an error is the reason why the burn tells nothing.
+    fn burn(
+        &self,
+        commanded_s: f64,
+        mut priors: Vec<Prior>,
+        updraught_m_s: f64,
+    ) -> Result<(Solution, Vec<Prior>, f64), String> {
+        let mission = &self.trace.mission;
+        let lit_s = thrust_seen_s(&self.samples[self.fallen..], commanded_s, self.loaded_kg, mission)
+            .ok_or("no thrust was seen after the igniter was fired")?;
+        priors.extend([WIDE, WIDE, Prior { mean: mission.ignition.delay_s, sigma: 0.2 }]);
+        // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
+        let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
+        priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
+        // Nobody has data for a jet against the wind, and what a mission flies by is chosen to be safe: the body may lose
+        // anything between nothing and all, and the fins, which sit outside the jet, between -2 and 12 %.
+        priors.push(Prior { mean: 0.5, sigma: 0.3 });
+        priors.push(Prior { mean: 0.05, sigma: 0.05 });
+        // Composite propellant comes up within a tenth of a second.
+        priors.push(Prior { mean: 0.0, sigma: 0.05 });
+        let whitener = self.noises(self.samples.len(), updraught_m_s);
+        let residuals = |values: &[f64]| whitener.apply(&self.missed(values));
+        // The thrust's corner can hold the iteration on its wrong side: it begins before and behind it.
+        let solved = [0.0, 0.02].into_iter().filter_map(|earlier_s| {
+            let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
+            start[DELAY] = (lit_s - commanded_s - earlier_s).max(0.0);
+            // From no rise at all the burn changes with its square: the iteration would stay there.
+            start[RISE] = 0.02;
+            solve_from(&start, &priors, residuals)
+        });
+        let mut solution = solved.min_by(|one, other| one.cost.total_cmp(&other.cost)).ok_or(NOT_SOLVED)?;
+        inflate(&mut solution, &priors, residuals, BLOCK);
+        let seen_s =
+            self.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);
+        self.is_of_the_curve(&solution.values)?;
+        Ok((solution, priors, seen_s))
+    }
+
+    /// Whether the model's thrust is the one that was felt; an error says where it is not.
+    fn is_of_the_curve(&self, values: &[f64]) -> Result<(), String> {
+        /// A chuff, a motor that goes out, a nozzle that is lost: the thrust is off by a tenth of the curve's highest for a tenth
+        /// of a second. Shape, gusts and vibration together reach a third of that.
+        const FRAMES: usize = 20;
+        const SHARE: f64 = 0.1;
+        let missed = self.missed(values);
+        let means =
+            missed[self.fallen..].chunks_exact(FRAMES).map(|part| part.iter().sum::<f64>() / FRAMES as f64);
+        let Some((part, worst)) =
+            means.enumerate().max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
+        else {
+            return Ok(());
+        };
+        let highest_m_s2 = self.trace.mission.motor_curve.peak_thrust_n() / self.loaded_kg;
+        if worst.abs() < SHARE * highest_m_s2 {
+            return Ok(());
+        }
+        let after_s = (part * FRAMES) as f64 * FRAME_S;
+        Err(format!(
+            "the thrust is not its curve's, however that is scaled: {after_s:.1} s after the igniter was fired it is {:.1} \
+             m/s^2 off for a tenth of a second",
+            worst.abs(),
+        ))
+    }
 }
 
 /// Fits fall and burn; an error is the reason why the flight tells nothing.
 pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, &'static str> {
     let series = Series::new(trace, thrust_along)?;
-    let mission = &trace.mission;
     let at_ignition = &series.frames[series.fallen - 1].estimate;
     let bias = Prior {
         mean: at_ignition.accelerometer_bias_m_s2.x,
         sigma: at_ignition.sigmas.accelerometer_bias_m_s2.x.max(1e-4),
     };
-    let wide = Prior { mean: 1.0, sigma: 0.5 };
-    let mut priors = vec![wide, wide, bias];
+    let priors = vec![WIDE, WIDE, bias];
     let updraught_m_s = series.updraught_m_s(&priors);
     let sum = |value: fn(&Sample) -> f64| series.fall().iter().map(value).sum::<f64>();
     let (body_n, fins_n) = (sum(|sample| sample.body_n), sum(|sample| sample.fins_n));
@@ -344,38 +412,23 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         burn_seen_s,
         speed_share,
     };
-    let lit = commanded_s.and_then(|at_s| {
-        Some((at_s, thrust_seen_s(&series.samples[series.fallen..], at_s, series.loaded_kg, mission)?))
-    });
-    let Some((commanded_s, lit_s)) = lit else {
-        let whitener = series.noises(series.fallen, updraught_m_s);
-        let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
-        let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
-        inflate(&mut solution, &priors, residuals, BLOCK);
-        return Ok(found(solution, priors, 0.0));
+    let burnt = match commanded_s {
+        None => Err("the motor was not lit".to_owned()),
+        Some(at_s) => series.burn(at_s, priors.clone(), updraught_m_s),
     };
-    priors.extend([wide, wide, Prior { mean: mission.ignition.delay_s, sigma: 0.2 }]);
-    // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
-    let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
-    priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
-    // Nobody has data for a jet against the wind: the body may lose all or nothing; the fins sit outside the jet.
-    priors.push(Prior { mean: mission.exhaust.body_loss, sigma: 0.5 });
-    priors.push(Prior { mean: mission.exhaust.fin_loss, sigma: 0.05 });
-    let whitener = series.noises(series.samples.len(), updraught_m_s);
-    let residuals = |values: &[f64]| whitener.apply(&series.missed(values));
-    // The thrust's corner can hold the iteration on its wrong side: it begins before and behind it.
-    let solved = [0.0, 0.02].into_iter().filter_map(|earlier_s| {
-        let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
-        start[DELAY] = (lit_s - commanded_s - earlier_s).max(0.0);
-        solve_from(&start, &priors, residuals)
-    });
-    let mut solution = solved.min_by(|one, other| one.cost.total_cmp(&other.cost)).ok_or(NOT_SOLVED)?;
-    inflate(&mut solution, &priors, residuals, BLOCK);
-    let burn_seen_s =
-        series.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);
-    Ok(found(solution, priors, burn_seen_s))
+    match burnt {
+        Ok((solution, priors, seen_s)) => Ok(found(solution, priors, Ok(seen_s))),
+        Err(reason) => {
+            let whitener = series.noises(series.fallen, updraught_m_s);
+            let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
+            let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
+            inflate(&mut solution, &priors, residuals, BLOCK);
+            Ok(found(solution, priors, Err(reason)))
+        }
+    }
 }
-
+/// Nothing is known of a scale but its size.
+const WIDE: Prior = Prior { mean: 1.0, sigma: 0.5 };
 const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples";
 
 /// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over what was felt when the

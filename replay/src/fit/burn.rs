@@ -3,6 +3,10 @@
 //!
 //! The cosines have no mean over the impulse: a shape changes neither the impulse nor, by itself, the burn time. Any
 //! slow deviation from a curve is a sum of few of them.
+//!
+//! A thrust that rises slowly comes along its curve at a rate that grows from 0 to 1 within the rise: the whole burn is late
+//! by half of the rise, and no impulse is lost. The delay of an ignition is that of the impulse, which is what brakes:
+//! where the rise begins is half of the rise before it.
 
 use core::f64::consts::PI;
 
@@ -22,14 +26,22 @@ pub(super) struct Burn<'a> {
     pub(super) curve: &'a ThrustCurve,
     pub(super) impulse_scale: f64,
     pub(super) burn_time_scale: f64,
+    /// Time in which the thrust rises to the curve's, s.
+    pub(super) rise_s: f64,
     pub(super) shape: [f64; SHAPE_TERMS],
 }
 
 impl Burn<'_> {
-    /// Fraction of the impulse that is given until a time since the thrust began.
+    /// Fraction of the impulse that is given until a time since the burn began by its impulse.
     fn given(&self, burning_s: f64) -> f64 {
         let total_n_s = self.curve.total_impulse_n_s();
-        let share = self.curve.impulse_to_n_s(burning_s / self.burn_time_scale) / total_n_s;
+        let (half_s, since_s) = (0.5 * self.rise_s, burning_s + 0.5 * self.rise_s);
+        let on_curve_s = if since_s > 0.0 && burning_s < half_s {
+            0.5 * since_s * since_s / self.rise_s
+        } else {
+            burning_s
+        };
+        let share = self.curve.impulse_to_n_s(on_curve_s / self.burn_time_scale) / total_n_s;
         let (sin, cos) = libm::sincos(PI * share);
         let (mut sin_k, mut cos_k, mut more) = (sin, cos, 0.0);
         for (k, amplitude) in (1..).zip(self.shape) {
@@ -39,13 +51,13 @@ impl Burn<'_> {
         share + more
     }
 
-    /// Mean thrust between two times since the thrust began, N.
+    /// Mean thrust between two times since the burn began by its impulse, N.
     pub(super) fn mean_n(&self, from_s: f64, to_s: f64) -> f64 {
         let total_n_s = self.impulse_scale * self.curve.total_impulse_n_s();
         total_n_s * (self.given(to_s) - self.given(from_s)) / (to_s - from_s)
     }
 
-    /// Propellant burnt until a time since the thrust began, kg.
+    /// Propellant burnt until a time since the burn began by its impulse, kg.
     pub(super) fn burnt_kg(&self, burning_s: f64) -> f64 {
         self.curve.propellant_mass_kg() * self.given(burning_s)
     }
@@ -159,6 +171,7 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
             curve,
             impulse_scale: values[IMPULSE],
             burn_time_scale: values[BURN_TIME].max(0.2),
+            rise_s: 0.0,
             shape: core::array::from_fn(|k| values[SHAPE + k]),
         };
         let half_s = 0.5e-3;
@@ -197,6 +210,9 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
         },
         found: Vec::new(),
         not_found: Vec::new(),
+        body_share: None,
+        calibration: None,
+        not_calibrated: Vec::new(),
         damage: None,
         landed: None,
         content: None,
@@ -228,8 +244,13 @@ mod tests {
     fn val_hand_a_scaled_trapezium() {
         let curve =
             flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
-        let burn =
-            Burn { curve: &curve, impulse_scale: 1.1, burn_time_scale: 2.0, shape: [0.0; SHAPE_TERMS] };
+        let burn = Burn {
+            curve: &curve,
+            impulse_scale: 1.1,
+            burn_time_scale: 2.0,
+            rise_s: 0.0,
+            shape: [0.0; SHAPE_TERMS],
+        };
         // From 2 to 6 s it is level: 40 N of the file, 1.1 / 2 of it.
         assert!((burn.mean_n(3.0, 3.5) - 22.0).abs() < 1e-9);
         assert!((burn.mean_n(0.0, 8.0) - 1.1 * 120.0 / 8.0).abs() < 1e-9);

@@ -153,7 +153,12 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     if values[0].is_empty() {
         return Err(LearnError::NoBurn(fits.len()));
     }
-    let lots: Vec<Lot> = priors.iter().zip(&values).map(|(prior, values)| prior.with(values)).collect();
+    let common = PROPERTIES.map(|(name, _)| {
+        let systematic = fits.iter().filter_map(|fit| fit.get(name)?.systematic);
+        systematic.fold(0.0, f64::max)
+    });
+    let lots = priors.iter().zip(&values).zip(common);
+    let lots: Vec<Lot> = lots.map(|((prior, values), common)| Lot { common, ..prior.with(values) }).collect();
     let airframe: Vec<Pooled> = airframe(fits);
     let wind_m_s = wind(fits, &set);
     let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
@@ -192,12 +197,16 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
         pulled,
         limit: ask.limit,
         risk: ask.risk,
-        go: prediction.map(|found| {
-            let allowed = pulled.is_none_or(|pulled| pulled.rate >= ask.limit) && flown.allow(ask.limit);
-            found.risk <= ask.risk && allowed
-        }),
+        go: prediction.map(|found| is_go(&found, flown, ask.limit, ask.risk)),
         day,
     })
+}
+
+/// Whether the club flies: the risk that the rate is below its limit is one that it takes, and the flights so far do not speak
+/// against the limit.
+pub fn is_go(found: &Prediction, flown: Outcomes, limit: f64, risk: f64) -> bool {
+    let pulled = Pulled::of(found, flown);
+    found.risk <= risk && pulled.is_none_or(|pulled| pulled.rate >= limit) && flown.allow(limit)
 }
 
 /// How the flights so far ended.
@@ -613,6 +622,9 @@ mod tests {
             basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found,
             not_found: Vec::new(),
+            body_share: None,
+            calibration: None,
+            not_calibrated: Vec::new(),
             damage: None,
             landed: None,
             content: None,

@@ -3,7 +3,8 @@
 //!
 //! Normal values with an unknown mean and an unknown variance, with the conjugate normal-inverse-gamma prior; the next
 //! value has a Student t distribution (A. Gelman et al., Bayesian Data Analysis, 3rd edition, section 3.3). The errors of the
-//! fits count as scatter: they are a tenth of it and widen it by half a per cent.
+//! fits count as scatter: they are a tenth of it and widen it by half a per cent. What all fits of a vehicle may have in common
+//! is no scatter, and no number of burns makes it smaller: it widens the mean by itself.
 
 use core::f64::consts::TAU;
 
@@ -31,6 +32,8 @@ pub struct Lot {
     pub freedom: u32,
     /// Sum of squares that belongs to the degrees of freedom.
     pub squares: f64,
+    /// Standard deviation of what all values have in common.
+    pub common: f64,
 }
 
 impl Lot {
@@ -39,7 +42,7 @@ impl Lot {
         let alpha = f64::from(PRIOR_ALPHA);
         // The variance of the next value is squares / (2 alpha - 2) (1 + 1 / worth).
         let squares = 2.0 * sigma * sigma * (alpha - 1.0) / (1.0 + 1.0 / PRIOR_BURNS);
-        Self { mean, worth: PRIOR_BURNS, freedom: 2 * PRIOR_ALPHA, squares }
+        Self { mean, worth: PRIOR_BURNS, freedom: 2 * PRIOR_ALPHA, squares, common: 0.0 }
     }
 
     /// With some values more.
@@ -53,13 +56,14 @@ impl Lot {
                 worth,
                 freedom: lot.freedom + 1,
                 squares: lot.squares + missed * missed * lot.worth / worth,
+                ..lot
             }
         })
     }
 
     /// Standard deviation of the next value.
     pub fn next_sigma(&self) -> f64 {
-        libm::sqrt(self.squares / (f64::from(self.freedom) - 2.0) * (1.0 + 1.0 / self.worth))
+        libm::hypot(self.scatter(), self.mean_sigma())
     }
 
     /// Expected standard deviation within the lot (the root of the expected variance).
@@ -69,14 +73,14 @@ impl Lot {
 
     /// Standard deviation of the mean.
     pub fn mean_sigma(&self) -> f64 {
-        self.scatter() / libm::sqrt(self.worth)
+        libm::hypot(self.scatter() / libm::sqrt(self.worth), self.common)
     }
 
     /// A mean and a standard deviation that the lot may have.
     pub fn draw(&self, chance: &mut Chance) -> (f64, f64) {
         let chi_squared: f64 = (0..self.freedom).map(|_| libm::pow(chance.normal(), 2.0)).sum();
         let sigma = libm::sqrt(self.squares / chi_squared.max(1e-9));
-        (self.mean + sigma / libm::sqrt(self.worth) * chance.normal(), sigma)
+        (self.mean + libm::hypot(sigma / libm::sqrt(self.worth), self.common) * chance.normal(), sigma)
     }
 }
 
@@ -326,6 +330,14 @@ mod tests {
         assert_eq!(lot.freedom, 6);
         assert!((lot.squares - (0.0004 + 0.0004 / 2.0 + 0.0004 * 2.0 / 3.0)).abs() < 1e-12, "{lot:?}");
         assert!((lot.next_sigma() - libm::sqrt(lot.squares / 4.0 * 4.0 / 3.0)).abs() < 1e-15);
+    }
+
+    /// 0.03 in common with 0.04 of the mean by its values: the mean has 0.05.
+    #[test]
+    fn val_hand_what_all_burns_have_in_common_widens_the_mean() {
+        let lot = Lot::prior(1.0, 0.02);
+        let lot = Lot { squares: 0.0016 * 2.0, common: 0.03, ..lot };
+        assert!((lot.mean_sigma() - 0.05).abs() < 1e-12 && (lot.scatter() - 0.04).abs() < 1e-12, "{lot:?}");
     }
 
     /// Draws of a mean and a scatter, and then of a value, have the next value's variance.

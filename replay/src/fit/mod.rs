@@ -10,12 +10,14 @@
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its models.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`sensors`]: noises and biases.
+//! * [`calibration`]: by how much the intervals are wider than the noise says.
 //! * [`stand`]: a burn on a test stand.
 //! * [`pooled`](mod@pooled): several flights together. [`patch`]: the mission with what was found.
 //! * [`least_squares`] and [`whiten`]: most likely values, where the noise is a slow disturbance.
 
 mod along;
 mod burn;
+pub mod calibration;
 pub mod day;
 mod least_squares;
 pub mod lot;
@@ -38,6 +40,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
 pub use self::burn::{StandError, fit_stand, read_stand};
+use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::{Prior, Solution};
 pub use self::trace::{Frame, Trace, TraceError};
@@ -65,13 +68,25 @@ pub struct Parameter {
     /// Ends of the 95 % interval.
     pub low: f64,
     pub high: f64,
+    /// The part of `sigma` that the models lack, from flights with a known truth: a vehicle's flights have it in common.
+    /// `None`: not calibrated, the interval is that of the noise alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub systematic: Option<f64>,
 }
 
 impl Parameter {
     /// A parameter whose error is normal.
     pub fn normal(name: &str, unit: &str, value: f64, sigma: f64) -> Self {
         let (name, unit) = (name.to_owned(), unit.to_owned());
-        Self { name, unit, value, sigma, low: value - Z_95 * sigma, high: value + Z_95 * sigma }
+        let (low, high) = (value - Z_95 * sigma, value + Z_95 * sigma);
+        Self { name, unit, value, sigma, low, high, systematic: None }
+    }
+
+    /// Standard deviation without the systematic part.
+    fn noise(&self) -> f64 {
+        let systematic = self.systematic.unwrap_or(0.0);
+        // The two were added as squares; rounding must leave something to divide by.
+        libm::sqrt((self.sigma - systematic) * (self.sigma + systematic)).max(1e-3 * self.sigma)
     }
 }
 
@@ -120,6 +135,15 @@ pub struct Fit {
     pub basis: Basis,
     pub found: Vec<Parameter>,
     pub not_found: Vec<NotFound>,
+    /// Fraction of the air force in this fall that is the body's by the mission's data: `drag_scale` is that of the sum.
+    #[serde(default)]
+    pub body_share: Option<f64>,
+    /// What intervals were widened by; `None`: they are those of the noise alone.
+    #[serde(default)]
+    pub calibration: Option<Calibration>,
+    /// Parameters whose interval is that of the noise alone.
+    #[serde(default)]
+    pub not_calibrated: Vec<NotFound>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
@@ -146,8 +170,8 @@ impl Fit {
                 }
                 _ => continue,
             };
-            let Parameter { value, sigma, low, high, .. } = parameter;
-            for number in [value, sigma, low, high] {
+            let Parameter { value, sigma, low, high, systematic, .. } = parameter;
+            for number in [value, sigma, low, high].into_iter().chain(systematic) {
                 *number *= factor;
             }
         }
@@ -157,6 +181,18 @@ impl Fit {
     /// The parameter of a name.
     pub fn get(&self, name: &str) -> Option<&Parameter> {
         self.found.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// What the intervals rest on.
+    fn widened(&self) -> String {
+        let Some(Calibration { vehicles, flights, sets, own }) = &self.calibration else {
+            return "not calibrated: those of the noise alone".to_owned();
+        };
+        let by = format!("calibrated on {flights} simulated flights in {}", sets.join(" and "));
+        if *own {
+            return by;
+        }
+        format!("the widest of {}, {by}: not calibrated on this vehicle", vehicles.join(" and "))
     }
 
     fn lacks(&mut self, name: &str, reason: &str) {
@@ -185,6 +221,15 @@ struct Named<'a> {
 
 /// Fits everything that a flight tells.
 pub fn fit(trace: &Trace) -> Fit {
+    let fit = uncalibrated(trace);
+    match Table::built_in() {
+        Some(table) => table.applied(fit),
+        None => fit,
+    }
+}
+
+/// A fit whose intervals are those of the noise alone.
+pub fn uncalibrated(trace: &Trace) -> Fit {
     let mut fit = Fit {
         source: trace.name.clone(),
         mission: trace.mission.name.clone(),
@@ -192,12 +237,18 @@ pub fn fit(trace: &Trace) -> Fit {
         basis: Basis::of(&trace.mission),
         found: Vec::new(),
         not_found: Vec::new(),
+        body_share: None,
+        calibration: None,
+        not_calibrated: Vec::new(),
         damage: trace.damage.clone(),
         landed: trace.landed,
         content: trace.content.map(|content| format!("{content:016x}")),
     };
-    match along_and_turning(trace) {
+    let steady = wind::is_one_wind(trace);
+    let understood = steady.clone().and_then(|()| Ok(along_and_turning(trace)?));
+    match understood {
         Ok((along, turning)) => {
+            fit.body_share = Some(along.body_share);
             drag(&mut fit, &along);
             motor(&mut fit, &along);
             gimbal(&mut fit, turning);
@@ -209,18 +260,22 @@ pub fn fit(trace: &Trace) -> Fit {
         Err(reason) => {
             for name in ["drag_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
             {
-                fit.lacks(name, reason);
+                fit.lacks(name, &reason);
             }
         }
     }
-    fit.found.extend(sensors::sensors(trace));
+    fit.found.extend(sensors::noises(trace));
+    match steady {
+        Ok(()) => fit.found.extend(sensors::biases(trace)),
+        Err(reason) => fit.lacks("gyro_bias, accelerometer_bias", &reason),
+    }
     fit.lacks("mass", "the accelerometer cannot tell a lighter vehicle from more thrust and drag: weigh it");
     fit.lacks("gnss_wander, barometer_offset_walk", "the flight is shorter than they take to wander");
     fit
 }
 
 /// Both directions, each with what the other found: the thrust turns the vehicle, and the turned nozzle loses some of it.
-fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Turning, &'static str>), &'static str> {
+fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Turning, String>), &'static str> {
     let gimbal = &trace.mission.airframe.gimbal;
     let frames = &trace.frames;
     // The command that is obeyed at a time, late by the servo's delay.
@@ -246,12 +301,7 @@ fn drag(fit: &mut Fit, along: &Along) {
 }
 
 fn motor(fit: &mut Fit, along: &Along) {
-    if along.burn_seen_s <= 0.0 {
-        let reason = if along.commanded_s.is_none() {
-            "the motor was not lit"
-        } else {
-            "no thrust was seen after the igniter was fired"
-        };
+    if let Err(reason) = &along.burn_seen_s {
         for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
         {
             fit.lacks(name, reason);
@@ -282,34 +332,31 @@ fn motor(fit: &mut Fit, along: &Along) {
     }
 }
 
-fn gimbal(fit: &mut Fit, turning: Result<Turning, &'static str>) {
+fn gimbal(fit: &mut Fit, turning: Result<Turning, String>) {
+    const PLAY: &str = "gimbal_play";
     let names = [
         (turning::DELAY, "gimbal_delay", "s", 1.0),
         (turning::RATE, "gimbal_rate", "deg/s", 1.0_f64.to_degrees()),
         (turning::GAIN, "gimbal_gain", "", 1.0),
         (turning::PITCH, "gimbal_pitch_offset", "deg", 1.0_f64.to_degrees()),
         (turning::YAW, "gimbal_yaw_offset", "deg", 1.0_f64.to_degrees()),
-        (turning::PLAY, "gimbal_play", "deg", 1.0_f64.to_degrees()),
     ];
-    match turning {
-        Ok(Turning { solution, priors, reported }) => {
-            for (place, name, unit, scale) in names {
-                if place == turning::RATE && !reported {
-                    // Of 150 `field` flights 81 % of the intervals held it.
-                    let reason = "the log has no feedback of the gimbal, and in the rotation a servo that is slow for a few \
-                                  milliseconds looks like a late one";
-                    fit.lacks(name, reason);
-                    continue;
-                }
-                let reason = if reported {
-                    "its commands changed too little"
-                } else {
-                    "the log has no feedback of the gimbal, and its commands changed too little to show it in the rotation"
-                };
-                fit.take(&solution, &priors, place, &Named { name, unit, scale, reason });
-            }
+    let turning = match turning {
+        Ok(turning) => turning,
+        Err(reason) => {
+            names.iter().map(|one| one.1).chain([PLAY]).for_each(|name| fit.lacks(name, &reason));
+            return;
         }
-        Err(reason) => names.iter().for_each(|(_, name, ..)| fit.lacks(name, reason)),
+    };
+    let reason = "its commands changed too little";
+    for (place, name, unit, scale) in names {
+        fit.take(&turning.solution, &turning.priors, place, &Named { name, unit, scale, reason });
+    }
+    let (play_rad, sigma_rad) = turning.play_rad();
+    if sigma_rad < FOUND * turning::LINK_RAD {
+        fit.found.push(Parameter::normal(PLAY, "deg", play_rad.to_degrees(), sigma_rad.to_degrees()));
+    } else {
+        fit.lacks(PLAY, reason);
     }
 }
 
@@ -396,8 +443,12 @@ fn pool(values: &[&Parameter]) -> Option<Pooled> {
     if values.len() < 2 || values.iter().any(|value| value.sigma.is_nan() || value.sigma <= 0.0) {
         return None;
     }
+    // What the models lack is the same in every flight of a vehicle, as far as anybody knows: it neither scatters from one to
+    // the next nor averages out.
+    let common = values.iter().filter_map(|value| value.systematic).reduce(f64::max);
+    let noise: Vec<f64> = values.iter().map(|value| value.noise()).collect();
     let weighted = |variance: f64| {
-        let weights: Vec<f64> = values.iter().map(|one| 1.0 / (one.sigma * one.sigma + variance)).collect();
+        let weights: Vec<f64> = noise.iter().map(|noise| 1.0 / (noise * noise + variance)).collect();
         let sum: f64 = weights.iter().sum();
         let mean = values.iter().zip(&weights).map(|(one, weight)| one.value * weight).sum::<f64>() / sum;
         let spread: f64 =
@@ -410,10 +461,13 @@ fn pool(values: &[&Parameter]) -> Option<Pooled> {
     let (mean, sum, _, spread) = weighted(variance);
     let sigma = libm::sqrt((spread / (count - 1.0)).max(1.0) / sum);
     let reach = StudentsT::new(0.0, 1.0, count - 1.0).ok()?.inverse_cdf(0.975) * sigma;
+    let wider = common.unwrap_or(0.0);
+    let reach = libm::hypot(reach, Z_95 * wider);
     let mean = Parameter {
         low: mean - reach,
         high: mean + reach,
-        ..Parameter::normal(&first.name, &first.unit, mean, sigma)
+        systematic: common,
+        ..Parameter::normal(&first.name, &first.unit, mean, libm::hypot(sigma, wider))
     };
     Some(Pooled { mean, flights: values.len(), scatter: libm::sqrt(variance) })
 }
@@ -462,27 +516,27 @@ pub fn print_fit(report: &FitReport, output: &mut impl Write) -> io::Result<()> 
 
 fn print_one(fit: &Fit, output: &mut impl Write) -> io::Result<()> {
     let mission = if fit.mission.is_empty() { "a test stand" } else { &fit.mission };
-    writeln!(
-        output,
-        "{}: {} with {}, 95 % intervals",
-        shown(&fit.source),
-        shown(mission),
-        shown(&fit.motor)
-    )?;
+    writeln!(output, "{}: {} with {}", shown(&fit.source), shown(mission), shown(&fit.motor))?;
+    writeln!(output, "95 % intervals, {}", fit.widened())?;
     for parameter in &fit.found {
         writeln!(output, "  {}", line(parameter))?;
     }
-    if !fit.not_found.is_empty() {
-        writeln!(output, "not found")?;
-    }
-    for lack in &fit.not_found {
-        writeln!(output, "  {}: {}", shown(&lack.name), shown(&lack.reason))?;
+    for (title, lacks) in [
+        ("not calibrated: the interval is that of the noise alone", &fit.not_calibrated),
+        ("not found", &fit.not_found),
+    ] {
+        if !lacks.is_empty() {
+            writeln!(output, "{title}")?;
+        }
+        for lack in lacks {
+            writeln!(output, "  {}: {}", shown(&lack.name), shown(&lack.reason))?;
+        }
     }
     Ok(())
 }
 
 fn line(parameter: &Parameter) -> String {
-    let Parameter { name, unit, value, sigma, low, high } = parameter;
+    let Parameter { name, unit, value, sigma, low, high, .. } = parameter;
     let number = |value: f64| digits(value, *sigma);
     let text = format!(
         "{:<28} {:>10}   {:>10} to {:<10} {}",
@@ -648,6 +702,9 @@ mod tests {
             basis,
             found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
             not_found: Vec::new(),
+            body_share: None,
+            calibration: None,
+            not_calibrated: Vec::new(),
             damage: None,
             landed: None,
             content: None,
@@ -667,6 +724,9 @@ mod tests {
             basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
             not_found: Vec::new(),
+            body_share: None,
+            calibration: None,
+            not_calibrated: Vec::new(),
             damage: None,
             landed: None,
             content: None,
@@ -693,6 +753,20 @@ mod tests {
         assert!(
             found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12
         );
+    }
+
+    /// Two equal values with a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the root of 2, and the
+    /// systematic part stays, however many flights there are.
+    #[test]
+    fn val_hand_what_all_flights_have_in_common_does_not_average_out() {
+        let mut fits = fits(&[(1.0, 0.1), (1.0, 0.1)]);
+        for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
+            parameter.sigma = libm::hypot(0.1, 0.3);
+            parameter.systematic = Some(0.3);
+        }
+        let found = pooled(&fits);
+        assert!((found[0].mean.sigma - libm::hypot(0.1 / libm::sqrt(2.0), 0.3)).abs() < 1e-12, "{found:?}");
+        assert!(found[0].scatter.abs() < 1e-12 && found[0].mean.systematic == Some(0.3), "{found:?}");
     }
 
     #[test]

@@ -12,31 +12,35 @@ use super::trace::{Frame, Trace};
 /// Fewer differences than this leave a noise uncertain by a third.
 const FEWEST: usize = 20;
 
-/// Sum of squares of differences of some order, and how many there are.
-#[derive(Debug, Clone, Copy, Default)]
-struct Differences {
-    sum: f64,
-    count: usize,
-}
+/// Squares of differences of some order.
+#[derive(Debug, Clone, Default)]
+struct Differences(Vec<f64>);
 
 impl Differences {
     /// Adds the third differences of a series without gaps. Each has 20 times the variance of a sample.
     fn thirds(&mut self, values: &[f64]) {
-        for four in values.windows(4) {
-            let third = four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0];
-            self.sum += third * third;
-            self.count += 1;
-        }
+        let thirds = values.windows(4).map(|four| four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]);
+        self.0.extend(thirds.map(|third| third * third));
     }
 
     /// Standard deviation of a sample, and that of this estimate. Neighbouring third differences are correlated by -15/20,
     /// 6/20 and -1/20, so that `n` of them are worth `n / (1 + 2 (0.5625 + 0.09 + 0.0025)) = n / 2.31`.
     fn sigma(&self) -> Option<(f64, f64)> {
-        if self.count < FEWEST {
+        /// Squares of more than five deviations are outliers: reflections, grass, dust. Noise has one in two million.
+        const MOST: f64 = 25.0;
+        let mut squares = self.0.clone();
+        squares.sort_by(f64::total_cmp);
+        // The median of the squares of normal numbers is 0.4549 of their mean.
+        let median = squares.get(squares.len() / 2).copied()?;
+        if median > 0.0 {
+            squares.retain(|square| *square < MOST / 0.454_936 * median);
+        }
+        if squares.len() < FEWEST {
             return None;
         }
-        let sigma = libm::sqrt(self.sum / (20.0 * self.count as f64));
-        let freedom = self.count as f64 / 2.31;
+        let count = squares.len() as f64;
+        let sigma = libm::sqrt(squares.iter().sum::<f64>() / (20.0 * count));
+        let freedom = count / 2.31;
         (sigma > 0.0).then(|| (sigma, sigma / libm::sqrt(2.0 * freedom)))
     }
 }
@@ -46,8 +50,8 @@ fn unbroken(frames: &[Frame]) -> impl Iterator<Item = &[Frame]> {
     frames.chunk_by(follows)
 }
 
-/// The noises and biases of a flight's sensors.
-pub(super) fn sensors(trace: &Trace) -> Vec<Parameter> {
+/// The noises of a flight's sensors.
+pub(super) fn noises(trace: &Trace) -> Vec<Parameter> {
     let frames = falling(trace);
     let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
     let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
@@ -70,9 +74,20 @@ pub(super) fn sensors(trace: &Trace) -> Vec<Parameter> {
                 differences.thirds(&part.iter().map(|frame| of(frame)[axis]).collect::<Vec<_>>());
             }
         }
-        found.extend(noise(name, unit, scale, differences));
+        found.extend(noise(name, unit, scale, &differences));
     }
     found.extend(of_slow_sensors(frames));
+    found
+}
+
+/// The biases, as the flight computer has them when the motor is lit.
+pub(super) fn biases(trace: &Trace) -> Vec<Parameter> {
+    let frames = falling(trace);
+    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
+    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
+    let to_deg = 1.0_f64.to_degrees();
+    let milli_g = 1e-3 * GRAVITY_M_S2;
+    let mut found = Vec::new();
     let last = fall.last().or(frames.last());
     if let Some(Frame { estimate, .. }) = last {
         let axes = ["x", "y", "z"];
@@ -95,7 +110,7 @@ pub(super) fn sensors(trace: &Trace) -> Vec<Parameter> {
 /// position wanders between its fixes (1.5 m in 200 s is 0.07 m in a fifth of a second, which adds 1.7 % to 0.2 m).
 const NO_NOISE_SHARE: f64 = 0.01;
 
-fn noise(name: &str, unit: &'static str, scale: f64, differences: Differences) -> Option<Parameter> {
+fn noise(name: &str, unit: &'static str, scale: f64, differences: &Differences) -> Option<Parameter> {
     let (sigma, uncertain) = differences.sigma()?;
     let uncertain = libm::hypot(uncertain, NO_NOISE_SHARE * sigma);
     Some(Parameter::normal(name, unit, scale * sigma, scale * uncertain))
@@ -103,7 +118,7 @@ fn noise(name: &str, unit: &'static str, scale: f64, differences: Differences) -
 
 /// Barometer, satellite receiver and lidar against the motion that the inertial unit integrates between their samples.
 fn of_slow_sensors(frames: &[Frame]) -> Vec<Parameter> {
-    let [mut barometer, mut speed, mut level, mut height, mut lidar] = [Differences::default(); 5];
+    let [mut barometer, mut speed, mut level, mut height, mut lidar] = <[Differences; 5]>::default();
     for part in unbroken(frames) {
         let path = integrated(part);
         let mut series: [Vec<f64>; 8] = Default::default();
@@ -146,7 +161,7 @@ fn of_slow_sensors(frames: &[Frame]) -> Vec<Parameter> {
         ("lidar_noise", "m", lidar),
     ]
     .into_iter()
-    .filter_map(|(name, unit, differences)| noise(name, unit, 1.0, differences))
+    .filter_map(|(name, unit, differences)| noise(name, unit, 1.0, &differences))
     .collect()
 }
 
@@ -181,7 +196,7 @@ mod tests {
     fn val_hand_third_differences() {
         let mut differences = Differences::default();
         differences.thirds(&(0..40).map(|k| f64::from(k * k) * 0.3 - 2.0).collect::<Vec<_>>());
-        assert!(differences.sum < 1e-20 && differences.count == 37);
+        assert!(differences.0.iter().sum::<f64>() < 1e-20 && differences.0.len() == 37);
         let mut series = vec![0.0; 43];
         series[20] = 1.0;
         let mut differences = Differences::default();

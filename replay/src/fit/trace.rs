@@ -25,8 +25,8 @@ pub struct Frame {
     pub measured: Measurements,
     /// Fin openings as the feedback tells them at the end of the frame, rad.
     pub fins_rad: [f64; 4],
-    /// The gimbal's angles as its feedback tells them at the end of the frame, if the log has them, rad.
-    pub gimbal_reported_rad: Option<[f64; 2]>,
+    /// The gimbal's angles as its feedback tells them at the end of the frame, rad.
+    pub gimbal_reported_rad: [f64; 2],
     /// The gimbal's command that is given at the end of the frame, rad.
     pub gimbal_rad: [f64; 2],
     /// The igniter of the landing motor is fired from the end of the frame on.
@@ -102,14 +102,19 @@ impl Trace {
         commands: &Commands,
         phase: Phase,
         estimate: &Estimate,
-        gimbal_reported_rad: Option<[f64; 2]>,
+        gimbal_reported_rad: [f64; 2],
     ) {
         let Sensed::Measured(measured) = input.sensed else { return };
         let numbers = [&measured.imu.gyro_rad_s, &measured.imu.specific_force_m_s2];
         let sound = estimate.state.is_finite()
             && estimate.wind_m_s.iter().all(|wind| wind.is_finite())
             && numbers.iter().all(|vector| vector.iter().all(|value| value.is_finite()))
-            && input.fins_rad.iter().chain(&commands.gimbal_rad).all(|angle| angle.is_finite())
+            && input
+                .fins_rad
+                .iter()
+                .chain(&commands.gimbal_rad)
+                .chain(&gimbal_reported_rad)
+                .all(|angle| angle.is_finite())
             && input.time_s.is_finite()
             && measured.gnss.is_none_or(|fix| {
                 fix.position_m.iter().chain(fix.velocity_m_s.iter()).all(|value| value.is_finite())
@@ -183,7 +188,7 @@ impl Trace {
                         trace = Some(Self::new(&name, mission, &text));
                     }
                     if let Some(trace) = &mut trace {
-                        trace.push(&input, &commands, phase, &estimate, Some(read.gimbal_rad));
+                        trace.push(&input, &commands, phase, &estimate, read.gimbal_rad);
                         if trace.frames.len() > FRAMES_MAX {
                             let kind = "frames of the flight computer";
                             return Err(RecordingError::TooLong { name: name.clone(), kind }.into());

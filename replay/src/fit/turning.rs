@@ -27,6 +27,8 @@ pub(super) const GAIN: usize = 2;
 pub(super) const PITCH: usize = 3;
 pub(super) const YAW: usize = 4;
 pub(super) const PLAY: usize = 5;
+/// Play behind the servo, which its feedback does not see.
+const LINK: usize = 6;
 
 /// Noise of a feedback potentiometer, rad: a tenth of a degree.
 const FEEDBACK_RAD: f64 = 0.001_745;
@@ -39,6 +41,11 @@ const LEAD_FRAMES: usize = 60;
 /// Statistical Association 79, 1984). By how much was measured: without these factors the 95 % intervals hold the truth in 92,
 /// 91 and 88 % of 600 `field` flights of seed 5, with them in 95 %.
 const LACKING: [(usize, f64); 4] = [(DELAY, 1.12), (GAIN, 1.23), (PITCH, 1.45), (YAW, 1.45)];
+/// Printed linkages have half a degree to a degree of play behind the servo.
+pub(super) const LINK_RAD: f64 = 0.017_453;
+/// A servo's feedback that is further off its model (rms), rad, is of a servo that does not follow: half a degree, five times
+/// the noise of a potentiometer.
+const FOLLOWS_RAD: f64 = 0.008_727;
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
 /// What was found across the nose.
@@ -46,8 +53,15 @@ const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 pub(super) struct Turning {
     pub(super) solution: Solution,
     pub(super) priors: Vec<Prior>,
-    /// The log has the gimbal's own feedback.
-    pub(super) reported: bool,
+}
+
+impl Turning {
+    /// Play of servo and linkage together, and its standard deviation, rad.
+    pub(super) fn play_rad(&self) -> (f64, f64) {
+        let Solution { values, covariance, .. } = &self.solution;
+        let variance = covariance[(PLAY, PLAY)] + covariance[(LINK, LINK)] + 2.0 * covariance[(PLAY, LINK)];
+        (values[PLAY].max(0.0) + values[LINK].max(0.0), libm::sqrt(variance))
+    }
 }
 
 /// A frame of the burn.
@@ -62,25 +76,25 @@ struct Sample {
 }
 
 /// Fits the gimbal over the burn; an error is the reason why it cannot be.
-pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'static str> {
-    let Some(begins_s) = along.begins_s().filter(|_| along.burn_seen_s > 0.0) else {
-        return Err("no burn was seen, and without thrust the gimbal turns nothing");
-    };
+pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, String> {
+    along.burn_seen_s.clone()?;
+    let begins_s = along.begins_s().ok_or("the motor was not lit")?;
     let frames = falling(trace);
     let lit = frames.partition_point(|frame| frame.time_s < begins_s);
     let first = lit.saturating_sub(LEAD_FRAMES).max(1);
     if frames.len() < lit + FEWEST_FRAMES {
-        return Err("less than half a second of burn was recorded");
+        return Err("less than half a second of burn was recorded".to_owned());
     }
     if !frames[first - 1..].windows(2).all(|pair| follows(&pair[0], &pair[1])) {
-        return Err("frames of the burn are lost, and with them the commands that the gimbal followed");
+        return Err(
+            "frames of the burn are lost, and with them the commands that the gimbal followed".to_owned()
+        );
     }
     let samples = samples(trace, along, first, begins_s);
     let frames = &frames[first..];
     let commands_rad: [Vec<f64>; 2] =
         [0, 1].map(|axis: usize| frames.iter().map(|frame| frame.gimbal_rad[axis]).collect());
-    let reported_rad: Vec<Option<[f64; 2]>> = frames.iter().map(|frame| frame.gimbal_reported_rad).collect();
-    let reported = reported_rad.iter().any(Option::is_some);
+    let reported_rad: Vec<[f64; 2]> = frames.iter().map(|frame| frame.gimbal_reported_rad).collect();
     let gimbal = &trace.mission.airframe.gimbal;
     let servo = &gimbal.servo;
     let priors = [
@@ -92,6 +106,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
         Prior { mean: 0.0, sigma: 0.1 },
         // Printed linkages have half a degree to a degree.
         Prior { mean: servo.slop_rad(), sigma: 0.5_f64.to_radians() },
+        Prior { mean: 0.5 * LINK_RAD, sigma: LINK_RAD },
     ];
     let model = Model { samples: &samples, commands_rad: &commands_rad, limit_rad: gimbal.limit_rad() };
     let felt = |axis: usize| samples.iter().map(|sample| sample.felt_rad_s[axis]).collect::<Vec<_>>();
@@ -116,6 +131,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
         rest = rest.most_likely(&samples, white, &model.missed(&values));
     }
     let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
+    model.is_a_servo(&solution.values, &reported_rad)?;
     inflate(&mut solution, &priors, whitened(rest), BLOCK);
     for (place, wider) in LACKING {
         solution.covariance.row_mut(place).scale_mut(wider);
@@ -125,7 +141,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, &'sta
     let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
         / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
     solution.covariance[(GAIN, GAIN)] += of_thrust * solution.values[GAIN] * solution.values[GAIN];
-    Ok(Turning { solution, priors: priors.to_vec(), reported })
+    Ok(Turning { solution, priors: priors.to_vec() })
 }
 
 /// The process of the rotation that the model does not explain.
@@ -204,14 +220,17 @@ impl Model<'_> {
         [0, 1].map(|axis| {
             let offset_rad = values[[PITCH, YAW][axis]];
             let part_s = FRAME_S / PARTS as f64;
-            let mut rate_rad_s = 0.0;
+            let half_rad = 0.5 * values[LINK].max(0.0);
+            let (mut rate_rad_s, mut nozzle_rad) = (0.0, 0.0_f64);
             let missed = self.samples.iter().enumerate().map(|(place, sample)| {
                 // The thrust turns about the pitch axis inside what the yaw axis leaves.
                 let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
                 let mut mean_rad_s = 0.0;
                 for angle_rad in both[axis][place].0 {
+                    let driven_rad = values[GAIN] * angle_rad;
+                    nozzle_rad = nozzle_rad.clamp(driven_rad - half_rad, driven_rad + half_rad);
                     let turn = if sample.burning {
-                        -sample.by_gimbal_rad_s2 * left * libm::sin(values[GAIN] * angle_rad + offset_rad)
+                        -sample.by_gimbal_rad_s2 * left * libm::sin(nozzle_rad + offset_rad)
                     } else {
                         0.0
                     };
@@ -227,20 +246,28 @@ impl Model<'_> {
     }
 
     /// The servos' own feedback less the model's, whitened.
-    fn feedback(&self, values: &[f64], reported_rad: &[Option<[f64; 2]>]) -> Vec<f64> {
-        if reported_rad.iter().all(Option::is_none) {
-            return Vec::new();
-        }
+    fn feedback(&self, values: &[f64], reported_rad: &[[f64; 2]]) -> Vec<f64> {
         let of_axis = |axis: usize| {
-            let ends = self.angles_rad(values, axis);
-            let missed = reported_rad.iter().zip(ends).map(move |(reported_rad, (_, end_rad))| {
-                reported_rad.map_or(0.0, |angles_rad| (angles_rad[axis] - end_rad) / FEEDBACK_RAD)
-            });
-            missed.collect::<Vec<f64>>()
+            let ends = self.angles_rad(values, axis).into_iter();
+            let missed = reported_rad.iter().zip(ends);
+            missed.map(move |(reported_rad, (_, end_rad))| (reported_rad[axis] - end_rad) / FEEDBACK_RAD)
         };
-        let mut all = of_axis(0);
-        all.extend(of_axis(1));
-        all
+        of_axis(0).chain(of_axis(1)).collect()
+    }
+
+    /// Whether the feedback is that of a servo that follows these commands; an error says by how much it is not.
+    fn is_a_servo(&self, values: &[f64], reported_rad: &[[f64; 2]]) -> Result<(), String> {
+        let missed = self.feedback(values, reported_rad);
+        let squares = missed.iter().map(|whitened| whitened * whitened).sum::<f64>();
+        let rms_rad = FEEDBACK_RAD * libm::sqrt(squares / missed.len() as f64);
+        if rms_rad < FOLLOWS_RAD {
+            return Ok(());
+        }
+        Err(format!(
+            "the gimbal is not its model: with any delay, rate and play its feedback stays {:.1} deg (rms) off what its \
+             commands would give",
+            rms_rad.to_degrees()
+        ))
     }
 }
 
@@ -256,7 +283,7 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
     let samples = pairs.map(|(place, pair)| {
         let (before, frame) = (&pair[0], &pair[1]);
         let to_s = frame.time_s - begins_s;
-        let burning = to_s > 0.0;
+        let burning = to_s > -0.5 * burn.rise_s;
         let thrust_n = if burning { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
         let mass = mass_model.at(if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 });
         let in_body = |frame: &super::trace::Frame| {

@@ -64,11 +64,70 @@ fn a_motor_that_did_not_light_is_told_as_that() {
     assert!(fit.get("drag_scale").is_some() && fit.get("gimbal_delay").is_none());
 }
 
-/// The vehicle's own log has the gimbal's feedback, which shows its rate.
+/// The servo stays at 3.7 degrees, whatever is commanded: that is no servo that was asked too little.
+#[test]
+fn a_jammed_gimbal_is_told_as_no_servo_with_what_is_left() {
+    let jammed = crate::from_apogee::fly(&["gimbal-jams:3.7@0"]);
+    let fit = fit(&Trace::open(&jammed.log).unwrap());
+    for name in ["gimbal_delay", "gimbal_gain", "gimbal_play"] {
+        let lack = fit.not_found.iter().find(|lack| lack.name == name).unwrap();
+        assert!(
+            lack.reason.contains("the gimbal is not its model") && lack.reason.contains("deg (rms)"),
+            "{lack:?}"
+        );
+    }
+    assert!(fit.get("thrust_scale").is_some(), "the motor is sound: {:?}", fit.not_found);
+}
+
+/// A motor that goes out after two seconds has no curve's thrust, and nothing of its burn is given as if it had.
+#[test]
+fn a_motor_that_goes_out_is_told_as_no_curve_with_what_is_left() {
+    let out = crate::from_apogee::fly(&["early-burnout:2@0"]);
+    let fit = fit(&Trace::open(&out.log).unwrap());
+    let lack = fit.not_found.iter().find(|lack| lack.name == "thrust_scale").unwrap();
+    assert!(
+        lack.reason.contains("the thrust is not its curve's") && lack.reason.contains("m/s^2 off"),
+        "{lack:?}"
+    );
+    assert!(fit.get("drag_scale").is_some());
+}
+
+/// The frames are 5 ms apart, and nothing that is found lies on them.
+#[test]
+fn no_delay_lies_on_the_grid_of_the_frames() {
+    let fit = fit(&TRACE);
+    let found = fit.get("ignition_delay").unwrap();
+    for end_s in [found.value, found.low, found.high] {
+        let frames = end_s / 0.005;
+        assert!((frames - frames.round()).abs() > 1e-3, "{found:?}");
+    }
+}
+
+#[test]
+fn intervals_say_on_how_many_flights_they_were_calibrated() {
+    let (code, stdout, stderr) = asked(&[LANDED.log.to_str().unwrap()]);
+    assert!(code == 0 && stdout.contains("\n95 % intervals, calibrated on "), "{stdout}{stderr}");
+    let (found, answer) = fits(&[LANDED.log.to_str().unwrap()]);
+    let calibration = found[0].calibration.as_ref().unwrap();
+    assert!(
+        calibration.own && calibration.vehicles == ["mk2"] && calibration.flights >= 100,
+        "{calibration:?}"
+    );
+    assert!(found[0].get("thrust_scale").unwrap().systematic.is_some(), "{answer}");
+    // The same flight of a vehicle that nobody has flown: the widest of the others', and it says so.
+    let mission = flight::vehicle::mission::Mission { name: "ours".to_owned(), ..TRACE.mission.clone() };
+    let ours = fit(&Trace { mission, ..TRACE.clone() });
+    assert!(!ours.calibration.as_ref().unwrap().own);
+    for name in ["thrust_scale", "drag_scale", "wind_x"] {
+        let [own, other] = [&found[0], &ours].map(|fit| fit.get(name).unwrap().sigma);
+        assert!(other >= own, "{name}: {other} {own}");
+    }
+}
+
+/// The gimbal's feedback shows its rate.
 #[test]
 fn val_simulation_the_gimbals_feedback_shows_its_delay_and_rate() {
     let trace = Trace::open(&MK2.log).unwrap();
-    assert!(trace.frames.iter().all(|frame| frame.gimbal_reported_rad.is_some()));
     let fit = fit(&trace);
     close(&fit, "gimbal_delay", 0.020, 0.001);
     close(&fit, "gimbal_rate", 250.0, 10.0);

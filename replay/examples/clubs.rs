@@ -1,0 +1,138 @@
+//! How often GO of `replay fit --flights` means at least the landing rate that was asked for.
+//!
+//! `cargo run --release -p replay --example clubs -- MISSION FLIGHTS SEED`
+//!
+//! Each simulated club has a motor lot as the prior has them and five burns behind it, knows its motors as well as fits do, and
+//! simulates its next day in `real`. Its own world is `real`, or `wild`. FLIGHTS flights of each world, whose motors scatter
+//! more than any lot's, tell how a motor lands there: as the 40 flights with the nearest motors did.
+
+use std::io::Write as _;
+
+use anyhow::Context as _;
+use campaign::run::in_parallel;
+use flight::guidance::baseline::{Controller, Law};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha12Rng;
+use replay::fit::day::{Outcomes, is_go};
+use replay::fit::lot::{Chance, Lot, Trial, draw_next, predict};
+use sim::draw::{Draw, draw};
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use sim::world::truth::Truth;
+
+/// Impulse and burn time over those of the curve, and delay, s.
+type Motor = [f64; 3];
+
+/// Scatter of the flown motors: half as much again as the widest lot's.
+const FLOWN: Motor = [0.045, 0.065, 0.075];
+/// Scatter of the prior's motors: that of `real`.
+const PRIOR: Motor = [0.027, 0.04, 0.05];
+/// What fits miss these by (rms, `fit_coverage`), in all burns of a club alike.
+const MISSED: Motor = [0.0055, 0.0075, 0.0025];
+const NEAREST: usize = 40;
+const CLUBS: u64 = 500;
+const BURNS: usize = 5;
+/// Simulated flights of a club's day, and flights that its true rate is taken over.
+const DAY: usize = 1000;
+/// The risk that `replay fit` takes unless it is told another.
+const RISK: f64 = 0.1;
+const LIMITS: [f64; 5] = [0.6, 0.7, 0.8, 0.9, 0.95];
+
+fn nominal() -> Motor {
+    [1.0, 1.0, Truth::default().ignition_delay_s]
+}
+
+/// How motors land in a world.
+struct World(Vec<(Motor, bool)>);
+
+impl World {
+    fn flown(mission: &str, set: &str, flights: u64, seed: u64) -> anyhow::Result<Self> {
+        let recipe = Recipe { seed, ..Recipe::built_in(mission, set)? };
+        let law = Law::of(Controller::Nmpc, &recipe.mission);
+        let mut chance = Chance(ChaCha12Rng::seed_from_u64(seed));
+        let mut motor = || [0, 1, 2].map(|i: usize| nominal()[i] + FLOWN[i] * chance.normal());
+        let motors: Vec<(u64, Motor)> = (0..flights).map(|number| (number, motor())).collect();
+        let one = |(number, motor): &(u64, Motor)| -> anyhow::Result<bool> {
+            let drawn = draw(&recipe.mission, &recipe.dispersion, seed, *number);
+            let [impulse_scale, burn_time_scale, delay_s] = *motor;
+            let ignition_delay_s = delay_s.max(0.02);
+            let truth = Truth { impulse_scale, burn_time_scale, ignition_delay_s, ..drawn.truth };
+            let draw = Draw { truth, ..drawn };
+            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw, law.clone())?.run().legs)
+        };
+        let landed = in_parallel(&motors, one, &|_| {});
+        let flights = motors.into_iter().zip(landed).map(|((_, motor), landed)| Ok((motor, landed?)));
+        Ok(Self(flights.collect::<anyhow::Result<_>>()?))
+    }
+
+    fn chance_to_land(&self, motor: &Motor) -> f64 {
+        let apart = |(flown, landed): &(Motor, bool)| {
+            let squares = (0..3).map(|i| ((flown[i] - motor[i]) / FLOWN[i]).powi(2));
+            (squares.sum::<f64>(), *landed)
+        };
+        let mut nearest: Vec<(f64, bool)> = self.0.iter().map(apart).collect();
+        let count = NEAREST.min(nearest.len() - 1);
+        nearest.select_nth_unstable_by(count, |one, other| one.0.total_cmp(&other.0));
+        nearest[..count].iter().filter(|flight| flight.1).count() as f64 / count as f64
+    }
+}
+
+/// A club's true rate of the next day, and for each limit whether it has a GO.
+fn club(number: u64, simulated: &World, own: &World) -> anyhow::Result<(f64, [bool; LIMITS.len()])> {
+    let mut chance = Chance(ChaCha12Rng::seed_from_u64(9_000_000 + number));
+    let priors = [0, 1, 2].map(|i: usize| Lot::prior(nominal()[i], PRIOR[i]));
+    let lot = priors.map(|prior| prior.draw(&mut chance));
+    let burn = |chance: &mut Chance| lot.map(|(mean, sigma)| mean + sigma * chance.normal());
+    let missed = MISSED.map(|sigma| sigma * chance.normal());
+    let burns: [Motor; BURNS] = std::array::from_fn(|_| burn(&mut chance));
+    let landed = burns.iter().filter(|motor| chance.unit() < own.chance_to_land(motor)).count();
+    let lots = [0, 1, 2].map(|i: usize| {
+        let values: Vec<f64> = burns.iter().map(|burn| burn[i] + missed[i]).collect();
+        Lot { common: MISSED[i], ..priors[i].with(&values) }
+    });
+    // The day's mission expects what was learnt.
+    let expected = |motor: &[f64]| {
+        [motor[0] / lots[0].mean, motor[1] / lots[1].mean, motor[2] - lots[2].mean + nominal()[2]]
+    };
+    let mut trial = || {
+        let drawn = draw_next(&lots, &mut chance);
+        let landed = chance.unit() < simulated.chance_to_land(&expected(&drawn));
+        Trial { drawn, landed }
+    };
+    let trials: Vec<Trial> = (0..DAY).map(|_| trial()).collect();
+    let rate = (0..DAY).map(|_| own.chance_to_land(&expected(&burn(&mut chance)))).sum::<f64>() / DAY as f64;
+    let mut go = [false; LIMITS.len()];
+    for (go, limit) in go.iter_mut().zip(LIMITS) {
+        let found = predict(&lots, &trials, limit, number).context("no flight was simulated")?;
+        *go = is_go(&found, Outcomes { landed, of: BURNS }, limit, RISK);
+    }
+    Ok((rate, go))
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let at = |place: usize, default: &str| arguments.get(place).map_or(default, String::as_str).to_owned();
+    let (mission, flights, seed) = (at(0, "mk3"), at(1, "2000").parse()?, at(2, "1").parse()?);
+    let real = World::flown(&mission, "real", flights, seed)?;
+    let wild = World::flown(&mission, "wild", flights, seed)?;
+    let mut stdout = std::io::stdout().lock();
+    for (set, own) in [("real", &real), ("wild", &wild)] {
+        let numbers: Vec<u64> = (0..CLUBS).collect();
+        let clubs = in_parallel(&numbers, |number| club(*number, &real, own), &|_| {});
+        let clubs = clubs.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+        let mean = clubs.iter().map(|(rate, _)| rate).sum::<f64>() / CLUBS as f64;
+        writeln!(stdout, "{CLUBS} clubs in {set}: landing rate {:.1} % on average", 100.0 * mean)?;
+        for (place, limit) in LIMITS.into_iter().enumerate() {
+            let rates: Vec<f64> = clubs.iter().filter(|(_, go)| go[place]).map(|(rate, _)| *rate).collect();
+            let right = rates.iter().filter(|rate| **rate >= limit).count();
+            let could = clubs.iter().filter(|(rate, _)| *rate >= limit).count();
+            writeln!(
+                stdout,
+                "  limit {:.0} %: {} have GO, {right} of them land at least that; {could} of all clubs do",
+                100.0 * limit,
+                rates.len()
+            )?;
+        }
+    }
+    Ok(())
+}
