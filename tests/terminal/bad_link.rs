@@ -78,12 +78,12 @@ fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_re
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
-    rig.terminal.wait_for(" POWERED");
+    rig.terminal.wait_for(" Landing ");
     rig.proxy.impair(Impairment { drops_all: true, ..Impairment::default() });
-    rig.terminal.wait_for("~POWERED");
+    rig.terminal.wait_for("~Landing");
     rig.terminal.wait_for("~ARMED");
     rig.terminal.wait_for("LINK LOST");
-    rig.terminal.wait_for("PREDICTED, not heard");
+    rig.terminal.wait_for(" PREDICTED ");
     rig.terminal.wait_for("last heard ");
     rig.terminal.wait_for("MAY NOT ARRIVE");
     rig.abort();

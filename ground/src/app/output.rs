@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::log::record::EventLevel;
 use protocol::log::recorder::RecorderError;
 
 use super::programs::VoiceEnded;
 use super::screen::Screen;
 use crate::config::Config;
-use crate::model::{Ending, Model, Verdict};
+use crate::model::{Ending, Event, Model, Speaker, Verdict};
 use crate::update::{Action, Msg};
 use crate::view::headline;
 use crate::view::panels::limit_rows;
@@ -111,7 +112,8 @@ impl Lines {
             return;
         }
         let mut text = String::new();
-        for event in model.events.since(self.seen) {
+        let shown = |event: &&Event| !model.settings.demonstration || is_of_the_flight(event);
+        for event in model.events.since(self.seen).filter(shown) {
             let (time_s, speaker, mark) = (event.at.as_secs_f64(), event.speaker.name(), event.mark());
             // Writing into a String cannot fail.
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
@@ -119,6 +121,15 @@ impl Lines {
         self.seen = model.events.total();
         self.closed = print(text.as_bytes()).is_err();
     }
+}
+
+/// Whether an event is about the flight rather than about how it was commanded: a demonstration without a screen is read by somebody
+/// who wants to see what flies. The log has every event.
+fn is_of_the_flight(event: &Event) -> bool {
+    let told = ["demonstration", "phase ", Ending::Landed.word()];
+    let by_ground = event.speaker == Speaker::Ground && event.level == EventLevel::Info;
+    let of_the_solver = event.text.starts_with("controller level");
+    (!by_ground || told.iter().any(|words| event.text.starts_with(words))) && !of_the_solver
 }
 
 /// Prints the closing lines: the verdict limit by limit, and where the log is.

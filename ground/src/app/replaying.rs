@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::dialect::TdPhase;
 use protocol::identity::Address;
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -157,6 +158,9 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
 // The flight just flown, again on the screen of a running station. The link, the log and the alarms go on; an alarm, the
 // abort key, or a vehicle that is armed end the replay at once.
 
+/// The flight just flown is shown again from this long before its landing motor was lit; `g` goes to its begin.
+const BEFORE_IGNITION: Duration = Duration::from_secs(2);
+
 /// The replay of a screen.
 #[derive(Default)]
 pub(super) struct Again {
@@ -214,7 +218,11 @@ impl Again {
         let Ok(loaded) = told.try_recv() else { return Ok(false) };
         let settings = settings(name, &model.settings.keys);
         self.loading = None;
-        self.playing = Some(Box::new(Player::new(loaded?, settings)));
+        let mut player = Player::new(loaded?, settings);
+        if let Some(lit) = player.recording().begin_of(TdPhase::TD_PHASE_IGNITION) {
+            player.seek(lit.saturating_sub(BEFORE_IGNITION));
+        }
+        self.playing = Some(Box::new(player));
         Ok(true)
     }
 

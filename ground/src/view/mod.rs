@@ -1,13 +1,14 @@
 //! Draws the screen: one pure function from the model and the time to a frame.
 //!
 //! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an abort would do in the
-//! colour of the danger), the page, and [`status_lines`] (the flight along its time, the keys). [`pages`] has the pages; [`panels`], [`pictures`],
+//! colour of the danger), the page, and [`footer`] (the flight along its time, the keys). [`pages`] has the pages; [`panels`], [`pictures`],
 //! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
 //! there are plain lines, the most important first. For terminals without Unicode, [`theme`] converts the result.
 
 pub mod band;
 pub mod bars;
 pub mod dialog;
+pub mod footer;
 pub mod headline;
 pub mod lists;
 pub mod pages;
@@ -94,7 +95,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let past = model.past();
     let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
     let banner = headline::banner(model, now);
-    let messages = status_lines::message_rows(model, theme, (now, shown_at), area.width);
+    let messages = footer::message_rows(model, theme, (now, shown_at), area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
     let [identity, state, words, past_mark, pinned, body, message, keys] = stacked(
         area,
@@ -127,7 +128,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     pages::draw(shown, theme, shown_at, frame, body);
     draw_lines(frame, message, &messages);
-    status_lines::draw_keys(model, theme, now, frame, keys);
+    footer::draw_keys(model, theme, now, frame, keys);
     dialog::draw_palette(model, theme, now, frame, body);
     dialog::draw_dialog(model, theme, now, frame, body);
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{
     TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus,
 };
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
 use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
 use crate::model::{
@@ -110,11 +110,6 @@ fn status_role(status: TdSolverStatus) -> TextRole {
 
 // The panels of fins and gimbal: commanded and measured angles.
 
-/// The scale of the gimbal bar until the vehicle has reported the limit of its gimbal.
-const DEFAULT_SCALE_DEG: f64 = 20.0;
-/// Columns of the bar; odd, so that zero has a column.
-const BAR_COLUMNS: usize = 21;
-
 /// One row for each of the four fins.
 pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let fins = model.vehicle.fins();
@@ -140,60 +135,28 @@ pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         .collect()
 }
 
-/// The rows of the gimbal's two planes: command and measured angle, and a bar with both.
+/// A row for each of the gimbal's two planes, with its stop.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let gimbal = model.vehicle.gimbal();
     let limit = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
-    let plane = |name, pick: fn(&Gimbal) -> Deflection| {
-        plane_rows(name, gimbal.map(|gimbal| gimbal.map(pick)), limit, theme, now)
-    };
-    [plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)].concat()
-}
-
-fn plane_rows(
-    name: &str,
-    angles: Option<Sample<Deflection>>,
-    limit_deg: Option<f64>,
-    theme: Theme,
-    now: Duration,
-) -> Vec<Line<'static>> {
-    let (mark, role) = angles.map_or((" ", TextRole::Label), |angles| age_mark(&angles, now));
-    let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
-    let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
-    let text = |value: Option<f64>| value.map_or_else(|| "--".to_owned(), |value| fixed(value, 1));
-    let stop =
-        limit_deg.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
-    vec![
+    let stop = limit.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
+    let (mark, role) = gimbal.map_or((" ", TextRole::Label), |gimbal| age_mark(&gimbal, now));
+    let plane = |name: &str, pick: fn(&Gimbal) -> Deflection| {
+        let degrees = |pick_angle: fn(&Deflection) -> f64| {
+            gimbal.map_or_else(
+                || "--".to_owned(),
+                |gimbal| fixed(pick_angle(&pick(&gimbal.value)).to_degrees(), 1),
+            )
+        };
+        let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
         Line::from(vec![
             theme.label(format!(" {name:<5}")),
-            theme.span(format!("{mark}o{:>6} #{:>6}", text(commanded), text(measured)), role),
-            theme.label(" deg"),
-        ]),
-        Line::from(vec![
-            theme.span(
-                format!(" {}", gimbal_bar(commanded, measured, limit_deg.unwrap_or(DEFAULT_SCALE_DEG))),
-                role,
-            ),
-            theme.label(stop),
-        ]),
-    ]
-}
-
-/// A mark beyond the scale is drawn at its end.
-fn gimbal_bar(commanded_deg: Option<f64>, measured_deg: Option<f64>, scale_deg: f64) -> String {
-    let mut cells = ['-'; BAR_COLUMNS];
-    cells[BAR_COLUMNS / 2] = '|';
-    let cell = |deg: f64| {
-        let share = (deg.clamp(-scale_deg, scale_deg) + scale_deg) / (2.0 * scale_deg);
-        ((share * (BAR_COLUMNS - 1) as f64).round() as usize).min(BAR_COLUMNS - 1)
+            theme.span(format!("{mark}{commanded:>6} | {measured:>5}"), role),
+            theme.label(format!("{stop}°")),
+        ])
     };
-    for (angle, mark) in [(commanded_deg, 'o'), (measured_deg, '#')] {
-        if let Some(deg) = angle.filter(|deg| deg.is_finite()) {
-            cells[cell(deg)] = mark;
-        }
-    }
-    cells.iter().collect()
+    vec![plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)]
 }
 
 // The panel of the touchdown, predicted or reached, with its limits.
@@ -223,31 +186,6 @@ pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static 
         Some(names) => theme.line(format!("OUTSIDE {names}"), TextRole::Alarm),
     });
     ("Touchdown predicted", rows)
-}
-
-/// The same with a bar for each limit that says how much of it is used, where there is room beside the rows.
-pub fn touchdown_panel_with_bars(
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-    columns: usize,
-) -> (&'static str, Vec<Line<'static>>) {
-    let (title, mut rows) = touchdown_panel(model, theme, now);
-    let vehicle = &model.vehicle;
-    let judged = vehicle.verdict().map(|verdict| verdict.value.touchdown);
-    let touchdown = judged.or_else(|| vehicle.prediction.map(|prediction| prediction.value.touchdown));
-    let (Some(touchdown), Some(limits)) = (touchdown, vehicle.limits()) else { return (title, rows) };
-    let limits = limit_rows(&touchdown, Some(&limits));
-    let widest = rows.iter().take(limits.len()).map(Line::width).max().unwrap_or(0);
-    let room = columns.saturating_sub(widest);
-    if room >= LIMIT_BAR_COLUMNS_MIN {
-        for (row, LimitRow { used, .. }) in rows.iter_mut().zip(limits) {
-            let gap = widest - row.width();
-            row.spans.push(Span::raw(" ".repeat(gap)));
-            row.spans.push(limit_bar(used, room, theme));
-        }
-    }
-    (title, rows)
 }
 
 /// How the flight ended.
@@ -340,35 +278,6 @@ pub(super) fn decimals(value: f64) -> usize {
     }
 }
 
-// A bar for each limit of a touchdown: how much of the limit is used.
-
-/// The least columns of a bar with its brackets.
-pub const LIMIT_BAR_COLUMNS_MIN: usize = 6;
-/// A cell filled from the left, in eighths.
-const EIGHTHS: [char; 8] = [' ', '▏', '▎', '▍', '▌', '▋', '▊', '▉'];
-/// The most columns: a longer one says no more.
-const LIMIT_BAR_COLUMNS_MAX: usize = 24;
-
-/// A bar of this many columns; beyond the limit it ends in `>`. It has one colour and blanks: six of them with more are
-/// too much for a slow line when the page changes.
-pub fn limit_bar(used: f64, columns: usize, theme: Theme) -> Span<'static> {
-    let cells = columns.min(LIMIT_BAR_COLUMNS_MAX).saturating_sub(3);
-    // Not finite: the vehicle has sent no such limit.
-    let (share, end, role) = match used {
-        used if !used.is_finite() => (0.0, "?", TextRole::Label),
-        used if used > 1.0 => (1.0, ">", TextRole::Alarm),
-        used => (used, "]", TextRole::Plain),
-    };
-    // A short bar still shows eighths of a cell, where the terminal has them.
-    let steps = if theme.ascii { 1 } else { EIGHTHS.len() };
-    let filled = ((share * (cells * steps) as f64).round() as usize).min(cells * steps);
-    let mut text = "█".repeat(filled / steps);
-    if !filled.is_multiple_of(steps) {
-        text.push(EIGHTHS[filled % steps]);
-    }
-    theme.span(format!(" [{text:<cells$}{end}"), role)
-}
-
 // The panel of the predicted position after the link is lost in flight.
 
 pub const LOST_TITLE: &str = "PREDICTED, not heard";
@@ -415,19 +324,6 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
 }
 
 #[cfg(test)]
-mod actuators_tests {
-    use super::*;
-
-    #[test]
-    fn the_bar_marks_command_and_measurement() {
-        assert_eq!(gimbal_bar(None, None, 20.0), "----------|----------");
-        assert_eq!(gimbal_bar(Some(-20.0), Some(0.0), 20.0), "o---------#----------");
-        assert_eq!(gimbal_bar(Some(90.0), Some(f64::NAN), 20.0), "----------|---------o");
-        assert_eq!(gimbal_bar(Some(-5.0), Some(2.5), 5.0), "o---------|----#-----");
-    }
-}
-
-#[cfg(test)]
 mod limit_rows_tests {
     use super::*;
     use std::f64::consts::FRAC_PI_2;
@@ -459,33 +355,6 @@ mod limit_rows_tests {
             gimbal_limit_rad: 0.1,
         };
         assert_eq!(limit_words(Some(&limits)), ["±3", "-0.1..0.25", "±7.5", "±1.5", "±0.6", "±12"]);
-    }
-}
-
-#[cfg(test)]
-mod limit_bar_tests {
-    use super::*;
-    use crate::view::theme::Palette;
-
-    fn text(used: f64, columns: usize) -> String {
-        let theme = Theme { palette: Palette::None, ascii: false };
-        limit_bar(used, columns, theme).content.into_owned()
-    }
-
-    #[test]
-    fn a_bar_is_full_at_the_limit_and_pointed_beyond_it() {
-        assert_eq!(text(0.0, 13), " [          ]");
-        assert_eq!(text(0.5, 13), " [█████     ]");
-        assert_eq!(text(0.5, 6), " [█▌ ]");
-        assert_eq!(text(0.04, 6), " [▏  ]");
-        assert_eq!(text(1.0, 13), " [██████████]");
-        assert_eq!(text(1.01, 13), " [██████████>");
-        assert_eq!(text(f64::NAN, 8), " [     ?");
-        for columns in 0..40 {
-            for used in [0.0, 0.3, 7.0, f64::INFINITY] {
-                assert!(text(used, columns).chars().count() <= columns.max(3), "{columns}");
-            }
-        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use ratatui::text::{Line, Span};
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, Approach, CommandKind, Ending, Foreign, LinkState, Model, Page, Role, Standing,
+    Acknowledgement, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role, Standing,
     TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself,
     is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, words,
 };
@@ -100,27 +100,36 @@ pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_abort(model, theme, now, frame, if area.height > 1 { below } else { abort_area });
 }
 
-/// An alarm that was seen, or what comes next.
+/// For so long the newest event stands in the row of the state on the Pad page.
+const SAID_SHOWN: Duration = Duration::from_secs(10);
+
+/// An alarm that was seen, what comes next, or what has just been said.
 fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let seen = status_lines::alarm_text(model, theme, now, columns);
     let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
     let next = || status_lines::next_event_beside(model, now);
-    // The Pad page says it itself.
-    let ready =
-        || readiness(model, now).filter(|_| model.page() != Page::Pad).map(|(words, _)| format!(" {words}"));
-    let words = seen.or_else(next).or_else(ready)?;
+    // The Pad page says it itself; there it is what has just been said.
+    let is_pad = model.page() == Page::Pad;
+    let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
+    let said = || {
+        let fresh = |event: &&Event| now.saturating_sub(event.at) < SAID_SHOWN;
+        let event = model.events.newest(1).next().filter(fresh)?;
+        Some(format!(" {}{}", event.mark().trim_start(), event.text))
+    };
+    let words = seen.or_else(next).or_else(ready).or_else(said)?;
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, and its key at the right end; a begun or sent abort in their place.
+/// What an abort would do, and its key at the right end; a begun or sent abort in their place, which needs the whole row.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let line = abort(model, theme, now);
+    let sent = model.link.abort_unsent || model.commands.of(CommandKind::Abort).is_some();
+    if sent || model.abort_chord.is_begun(now) {
+        return draw_line(frame, area, line);
+    }
     let key = format!(" {} ", abort_key(model));
     let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
-    let line = abort(model, theme, now);
-    let acts = model.abort_chord.is_begun(now)
-        || model.link.abort_unsent
-        || model.commands.of(CommandKind::Abort).is_some();
-    draw_line(frame, words, if acts { line } else { Line::from(line.to_string()) });
+    draw_line(frame, words, Line::from(line.to_string()));
     draw_line(frame, key_area, Line::from(key));
 }
 

@@ -136,11 +136,11 @@ fn the_picture_of_a_landing_begins_with_its_burn() {
 fn both_planes_of_a_gimbal_in_space_are_shown() {
     let mut rig = burning_in_space();
     let small = rig.screen(40, 24);
-    assert!(small.contains("yaw   o   4.2 #   3.9 deg"), "{small}");
+    assert!(small.contains("yaw      4.2 |   3.9 ±7°"), "{small}");
     rig.key(Key::Char('v'));
     let screen = rig.screen(80, 24);
     assert!(
-        screen.contains("pitch o  -3.1 #  -2.5 deg") && screen.contains("yaw   o   4.2 #   3.9 deg"),
+        screen.contains("pitch   -3.1 |  -2.5 ±7°") && screen.contains("yaw      4.2 |   3.9 ±7°"),
         "{screen}"
     );
 }

@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 
 use super::flight::{LOST_COLUMNS, both_sides_or_lost, map, side_or_lost};
 use super::{Room, Side, columns, events, framed, rows, table};
-use crate::model::{BodySpeed, Model, RED_AFTER, Sample, words};
+use crate::model::{Act, BodySpeed, Model, RED_AFTER, Sample, words};
 use crate::view::band::draw_band;
 use crate::view::pictures::height::{draw_height, draw_sink};
 use crate::view::{
@@ -83,9 +83,7 @@ pub fn landing_lines(
     verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(styled));
     lines.push(verdict);
     lines.extend(panels::controller_rows(model, theme, now).into_iter().take(2));
-    // The numbers of each plane, without its bar.
-    let gimbal = panels::gimbal_rows(model, theme, now).into_iter();
-    lines.extend(gimbal.step_by(2));
+    lines.extend(panels::gimbal_rows(model, theme, now));
     lines.extend(panels::fin_rows(model, theme, now));
     lines.push(status_lines::link_line(model, theme, now, columns));
     let room = rows.saturating_sub(lines.len());
@@ -128,10 +126,6 @@ fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
 
 // The review page after a flight: verdict, limits, greatest values and timeline.
 
-/// Columns of the predicted touchdown beside the greatest values.
-const PLAN_COLUMNS: usize = 37;
-/// Columns of the greatest values.
-const MAXIMA_COLUMNS: usize = 34;
 /// Columns of a phase with its time.
 const TIMELINE_COLUMNS: usize = 24;
 
@@ -143,7 +137,13 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         None => ("no verdict received yet".to_owned(), TextRole::Caution),
     };
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
-    let sentence = theme.line(format!(" {words}{silent}"), role);
+    let keys = &model.settings.keys;
+    let again = Act::ReplayFlight.works(model, now).then(|| {
+        let [again, report] = [Act::ReplayFlight, Act::Report].map(|act| keys.name(act));
+        theme.label(format!("  {again} shows it again, {report} writes the report"))
+    });
+    let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));
+    sentence.extend(again);
     let area = if headline::verdict_beside(model, now, frame.area().width).is_some() {
         let [line, below] = stacked(area, [Length(1), Fill(1)]);
         draw_line(frame, line, sentence);
@@ -182,7 +182,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 
 /// The verdict, then limits and greatest values, then the timeline.
 pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let (title, mut limits) = panels::touchdown_panel_with_bars(model, theme, now, PLAN_COLUMNS);
+    let (title, mut limits) = panels::touchdown_panel(model, theme, now);
     if model.vehicle.verdict().is_some() {
         // In the first line it has more room.
         limits.pop();
@@ -191,38 +191,15 @@ pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
         Some((ending, role)) => (ending.sentence(&model.vehicle), role),
         None => ("no verdict received yet".to_owned(), TextRole::Caution),
     };
-    let head = theme.line(format!(" {words}"), role);
-    limits.insert(0, theme.line(title, TextRole::Title));
-    let limit_columns = PLAN_COLUMNS;
-    let mut lines = vec![head];
-    let (title, mut maxima) = maxima(model, theme, now);
-    maxima.insert(0, theme.line(format!(" {title}"), TextRole::Title));
-    maxima.extend(unheard(model, now).map(|words| theme.line(format!(" {words}"), TextRole::Caution)));
-    if columns > limit_columns + MAXIMA_COLUMNS {
-        lines.extend(beside(limits, limit_columns + 1, maxima));
-    } else {
-        lines.extend(limits);
-        lines.extend(maxima);
-    }
+    let mut lines = vec![theme.line(format!(" {words}"), role), theme.line(title, TextRole::Title)];
+    lines.extend(limits);
+    let (title, maxima) = maxima(model, theme, now);
+    lines.push(theme.line(format!(" {title}"), TextRole::Title));
+    lines.extend(unheard(model, now).map(|words| theme.line(format!(" {words}"), TextRole::Caution)));
+    lines.extend(maxima);
     lines.push(theme.line(" Timeline", TextRole::Title));
     lines.extend(timeline(model, theme, columns));
     lines
-}
-
-fn beside(left: Vec<Line<'static>>, columns: usize, right: Vec<Line<'static>>) -> Vec<Line<'static>> {
-    let rows = left.len().max(right.len());
-    let (mut left, mut right) = (left.into_iter(), right.into_iter());
-    (0..rows)
-        .map(|_| {
-            let line = left.next().unwrap_or_default();
-            let gap = columns.saturating_sub(line.width() + 1);
-            let mut spans = vec![Span::raw(" ")];
-            spans.extend(styled(line));
-            spans.push(Span::raw(" ".repeat(gap)));
-            spans.extend(styled(right.next().unwrap_or_default()));
-            Line::from(spans)
-        })
-        .collect()
 }
 
 /// For how long nothing was heard of a flight, if it was long enough to count.

@@ -84,8 +84,8 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
     let next = [(Act::Arm, "ARM"), (Act::Start, "START")].into_iter().find(|(act, _)| act.works(model, now));
     let good = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
+    let next = next.filter(|_| good && !counts);
     let others: Vec<Item> = next
-        .filter(|_| good && !counts)
         .map(|(act, typed)| {
             let text = format!("{} {typed}", keys.name(act));
             word("next: press, then type, Enter", &text, text.len() as u16, TextRole::Title)
@@ -96,6 +96,10 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
         (_, TextRole::Good) => (format!(" every arming check passes{}", counted(model)), TextRole::Good),
         (words, role) => (format!(" {words}"), role),
     };
+    let told = next.filter(|_| model.settings.demonstration).map(|(act, typed)| {
+        format!(" A demonstration, simulated here: press {}, type {typed}, press Enter", keys.name(act))
+    });
+    let (words, role) = told.map_or((words, role), |told| (told, TextRole::Plain));
     let (words, role) = if counts { (hold(model, now), TextRole::Plain) } else { (words, role) };
     draw_band(model, (&headline::pad(model, now), theme.line(words, role), &others), theme, now, frame, area)
 }

@@ -9,7 +9,7 @@ use ratatui::widgets::canvas::Line;
 
 use super::{Ink, TextRole, Theme, scales, seconds_since};
 use crate::model::{Model, dead_reckoning::course, is_burning, is_on_pad, quantity::Quantity};
-use crate::view::status_lines::{LENGTHS_S, flight_began};
+use crate::view::footer::{LENGTHS_S, flight_began};
 use crate::view::{fixed, widgets};
 
 /// The least height and time that the picture shows.
