@@ -120,16 +120,18 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, and its key at the right end; a begun or sent abort in their place, which needs the whole row.
+/// What an abort would do, and its key at the right end. A begun or sent abort in their place needs most of the row: then the key
+/// stands where it fits.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let line = abort(model, theme, now);
     let sent = model.link.abort_unsent || model.commands.of(CommandKind::Abort).is_some();
-    if sent || model.abort_chord.is_begun(now) {
+    let acts = sent || model.abort_chord.is_begun(now);
+    let key = format!(" {} ", abort_key(model));
+    if acts && line.width() + key.len() > usize::from(area.width) {
         return draw_line(frame, area, line);
     }
-    let key = format!(" {} ", abort_key(model));
     let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
-    draw_line(frame, words, Line::from(line.to_string()));
+    draw_line(frame, words, if acts { line } else { Line::from(line.to_string()) });
     draw_line(frame, key_area, Line::from(key));
 }
 

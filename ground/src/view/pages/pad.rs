@@ -372,7 +372,10 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     }
     let watches = model.settings.role.why_not_command();
     let only_stops = why_not_here(model).map(|_| "only HOLD and ABORT here");
-    lines.extend(watches.or(only_stops).map(|why| theme.line(format!(" {why}"), TextRole::Label)));
+    let why = watches.or(only_stops).unwrap_or_default();
+    let wrapped =
+        lists::wrap(why, usize::from(STEP_COLUMNS[0]) - 3).into_iter().filter(|words| !words.is_empty());
+    lines.extend(wrapped.map(|words| theme.line(format!(" {words}"), TextRole::Label)));
     lines
 }
 
