@@ -1,7 +1,7 @@
 //! What went wrong in a flight: what its computer shows when it is run again on the log's frames, and the limits that the
 //! landing broke.
 
-use flight::computer::findings::Findings;
+use flight::computer::findings::{Findings, Sign};
 use serde::Serialize;
 
 use crate::controller::LoggedComputer;
@@ -16,6 +16,9 @@ pub struct FindingFacts {
     pub lasted_s: f64,
     /// A short sentence.
     pub words: String,
+    /// Where a report shows more of it.
+    #[serde(skip)]
+    pub(crate) section: &'static str,
 }
 
 /// The findings of a recorded flight, first in time; `None` if its computer cannot be run again.
@@ -35,13 +38,32 @@ pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Optio
             since_s: finding.since_s,
             lasted_s: finding.held_s,
             words: finding.words(),
+            section: section(finding.sign),
         })
         .collect();
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        facts.push(FindingFacts { since_s, lasted_s: 0.0, words });
+        facts.push(FindingFacts { since_s, lasted_s: 0.0, words, section: "findings" });
     }
     Some(facts)
+}
+
+fn section(sign: Sign) -> &'static str {
+    match sign {
+        Sign::Gnss
+        | Sign::Barometer
+        | Sign::Lidar
+        | Sign::Accelerometer
+        | Sign::HeightsDisagree
+        | Sign::Estimate => "sensors",
+        Sign::Battery => "battery",
+        Sign::Surface(0 | 1) | Sign::Tumbles => "burn",
+        Sign::LateLight | Sign::Impulse | Sign::BurntOutEarly => "thrust",
+        Sign::Surface(_) => "descent",
+        Sign::NoPlan => "solver",
+        Sign::AscentMotor | Sign::Separation | Sign::Parachute => "whole",
+        Sign::Restart | Sign::Gate | Sign::Latched => "events",
+    }
 }
 
 /// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
@@ -53,18 +75,17 @@ fn broken(verdict: &VerdictFacts, findings: &Findings) -> Option<String> {
     broken.retain(|_| judged);
     broken.sort_by(|a, b| b.1.total_cmp(&a.1));
     let ((worst, share), others) = broken.split_first()?;
-    let mut words = format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share));
-    if !others.is_empty() {
-        let others: Vec<String> =
-            others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();
-        words += &format!("; also {}", others.join(", "));
+    let also: Vec<String> =
+        others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();
+    let mut words = vec![format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share))];
+    if !also.is_empty() {
+        words.push(format!("also {}", also.join(", ")));
     } else if findings.found().is_empty() {
-        words += "; nothing else wrong";
+        words.push("nothing else wrong".to_owned());
     }
-    if let Some(ratio) = findings.thrust_over_weight_at_contact() {
-        words += &format!("; the thrust was {ratio:.2} of the weight");
-    }
-    Some(words)
+    let ratio = findings.thrust_over_weight_at_contact();
+    words.extend(ratio.map(|ratio| format!("the thrust was {ratio:.2} of the weight")));
+    Some(words.join("; "))
 }
 
 /// How far beyond its limit a value is.

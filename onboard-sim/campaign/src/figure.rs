@@ -10,7 +10,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
 use plotters::element::{Circle, Cross, EmptyElement, PathElement, Rectangle, Text};
 use plotters::series::{DashedLineSeries, LineSeries};
-use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
+use plotters::style::{BLACK, Color as _, IntoFont as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
 
 /// A figure cannot be drawn: its axes are not finite, or too small for their labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -30,6 +30,8 @@ const COLOURS: [RGBColor; 6] = [
     FAINT,
 ];
 const FAINT: RGBColor = RGBColor(130, 130, 130);
+/// Grounds of spans under thrust, and of spans that fall.
+const SHADES: [RGBColor; 2] = [RGBColor(253, 235, 208), RGBColor(232, 236, 245)];
 /// Of a limit.
 const RED: RGBColor = RGBColor(179, 38, 30);
 
@@ -176,6 +178,16 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
+/// A span of `x` with its name, behind the curves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    pub from: f64,
+    pub to: f64,
+    pub name: String,
+    /// Its ground: 0 warm, 1 cool; `None` has none.
+    pub shade: Option<usize>,
+}
+
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
@@ -188,10 +200,18 @@ pub struct Panel {
     pub limits: Vec<f64>,
     /// Values of `x`, with their names.
     pub marks: Vec<(f64, String)>,
+    /// Values of `x` where something went wrong, with their numbers.
+    pub signs: Vec<(f64, String)>,
+    pub spans: Vec<Span>,
     /// Points with their names.
     pub places: Vec<(f64, f64, String)>,
     /// Both axes have one scale.
     pub equal_scales: bool,
+}
+
+/// The plotted area of a lone panel of a size, px: left, top, right, bottom.
+pub fn plotted_px((width_px, height_px): (u32, u32)) -> [u32; 4] {
+    [12 + 62, TITLE_PX + 12, width_px.saturating_sub(12), TITLE_PX + height_px.saturating_sub(12 + 42)]
 }
 
 /// Panels in rows of `columns`, below a title. `cross_name` says what the crosses are.
@@ -238,20 +258,36 @@ pub fn sized_lines_svg(
     })
 }
 
-fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
+/// The ends of a panel's axes; `None` without a finite point.
+pub fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
     let points = || {
         let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
         of_lines.chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
     };
-    let x = extent(points().map(|point| point.0)).ok_or("no finite point")?;
-    let y = extent(points().map(|point| point.1).chain(panel.limits.iter().copied()));
-    let mut ends = [x, y.ok_or("no finite point")?];
+    let x = extent(points().map(|point| point.0))?;
+    let mut ends = [x, extent(points().map(|point| point.1).chain(panel.limits.iter().copied()))?];
     if panel.equal_scales {
-        let (width_px, height_px) = area.dim_in_pixel();
         equalise(&mut ends, [width_px.saturating_sub(ROOM_PX.0), height_px.saturating_sub(ROOM_PX.1)]);
     }
-    let mut chart = axes(area, ends, [&panel.x_label, &panel.y_label])?;
-    let [x, y] = ends;
+    Some(ends)
+}
+
+fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
+    let [x, y] = ends(panel, area.dim_in_pixel()).ok_or("no finite point")?;
+    let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
+    let width_px = f64::from(area.dim_in_pixel().0.saturating_sub(ROOM_PX.0));
+    for span in &panel.spans {
+        let (from, to) = (span.from.clamp(x.0, x.1), span.to.clamp(x.0, x.1));
+        if let Some(shade) = span.shade {
+            let ground = SHADES[shade % SHADES.len()].mix(0.6).filled();
+            chart.draw_series([Rectangle::new([(from, y.0), (to, y.1)], ground)])?;
+        }
+        let letters = (to - from) / (x.1 - x.0) * width_px / f64::from(LETTER_PX + 1);
+        if letters > span.name.chars().count() as f64 {
+            let name = Text::new(span.name.clone(), (4, -16), FONT);
+            chart.draw_series([EmptyElement::at((from, y.0)) + name])?;
+        }
+    }
     let across = panel.limits.iter().map(|limit| PathElement::new([(x.0, *limit), (x.1, *limit)], RED));
     chart.draw_series(across)?;
     let marks = || panel.marks.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
@@ -259,6 +295,12 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     chart.draw_series(
         marks().map(|(at, name)| EmptyElement::at((*at, y.1)) + Text::new(name.clone(), (3, 2), FONT)),
     )?;
+    let signs = || panel.signs.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
+    chart.draw_series(signs().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], RED)))?;
+    chart.draw_series(signs().map(|(at, number)| {
+        let label = Text::new(number.clone(), (3, 16), FONT.into_font().color(&RED));
+        EmptyElement::at((*at, y.1)) + label
+    }))?;
     chart.draw_series(panel.places.iter().map(|(x, y, name)| {
         let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
         named + Text::new(name.clone(), (6, -14), FONT)

@@ -32,6 +32,9 @@ pub struct Clocks {
     pub boot_zero_s: Option<f64>,
     /// What a ground station calls 0 in its telemetry records.
     pub telemetry_zero_s: Option<f64>,
+    /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from where no frames are.
+    #[serde(skip)]
+    heard_release_s: Option<f64>,
 }
 
 /// A time on one of the clocks, as in `T+12.9`, `boot:19.8` or `log:19.7`.
@@ -89,11 +92,15 @@ impl Clocks {
             Entry::Telemetry(telemetry) => {
                 self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);
             }
-            Entry::RawFrame if self.flight_zero_s.is_none() => {
+            Entry::RawFrame if self.flight_zero_s.is_none() || self.heard_release_s.is_some() => {
                 if let Some(boot_s) = message.and_then(boot_time_s) {
                     // The message that was delayed least says best when the vehicle was powered up.
                     let zero_s = since_s - boot_s;
-                    self.boot_zero_s = Some(self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s)));
+                    let zero_s = self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s));
+                    self.boot_zero_s = Some(zero_s);
+                    // Later ones stand still after the touchdown.
+                    self.heard_release_s = self.heard_release_s.or_else(|| release_s(message?));
+                    self.flight_zero_s = self.heard_release_s.map(|release_s| zero_s + release_s);
                 }
             }
             _ => {}
@@ -124,6 +131,13 @@ impl Clocks {
     }
 }
 
+/// When the vehicle was released, s since power-up, if it was.
+fn release_s(message: &MavMessage) -> Option<f64> {
+    let MavMessage::TD_FLIGHT_STATUS(status) = message else { return None };
+    let release_ms = i64::from(status.time_boot_ms) + i64::from(status.countdown_ms);
+    (status.countdown_ms < 0).then_some(release_ms as f64 / 1e3)
+}
+
 /// The time since power-up in a message of the vehicle, s, for the messages that are sent most often.
 fn boot_time_s(message: &MavMessage) -> Option<f64> {
     use MavMessage as M;
@@ -142,7 +156,7 @@ mod tests {
 
     #[test]
     fn a_time_is_read_with_its_clock_and_converted() {
-        let clocks = Clocks { flight_zero_s: Some(6.9), boot_zero_s: Some(-0.1), telemetry_zero_s: None };
+        let clocks = Clocks { flight_zero_s: Some(6.9), boot_zero_s: Some(-0.1), ..Clocks::default() };
         for (given, flight_s) in [("T+12", 12.0), ("12", 12.0), ("boot:19", 12.0), ("log:18.9", 12.0)] {
             let time: ClockTime = given.parse().unwrap();
             let found = clocks.convert(time, Clock::Flight).unwrap();

@@ -53,10 +53,14 @@ pub struct VerdictLimit {
 }
 
 impl VerdictLimit {
-    /// The value's distance from the middle of its range, over that of the limit: above 1 it is outside.
+    /// The value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value
+    /// counts over the width of the range.
     pub fn share(&self) -> f64 {
-        let middle = 0.5 * (self.minimum + self.maximum);
-        ((self.value - middle) / (self.maximum - middle)).abs()
+        let limit = if self.value < 0.0 { self.minimum } else { self.maximum };
+        if limit == 0.0 && self.value != 0.0 {
+            return 1.0 + (self.value / (self.maximum - self.minimum)).abs();
+        }
+        if self.value == 0.0 { 0.0 } else { (self.value / limit).abs() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A line chart as SVG, in the colours of the page.
 
-use campaign::figure::{self, Panel, sized_lines_svg};
+use campaign::figure::{self, Panel, Span, ends, plotted_px, sized_lines_svg};
 
 use super::html::escaped;
 
@@ -18,13 +18,16 @@ const NOTHING: f64 = 1e-9;
 /// The classes of lines, in the order of the figure's colours.
 const CLASSES: [&str; 6] = ["a", "b", "c", "d", "", "thin"];
 /// What the figure writes, and what the page has in its place: its style gives colours in light and in dark.
-const THEME: [(&str, &str); 11] = [
+const THEME: [(&str, &str); 14] = [
     ("stroke=\"#0072B2\"", "class=\"l a\""),
     ("stroke=\"#D55E00\"", "class=\"l b\""),
     ("stroke=\"#009E73\"", "class=\"l c\""),
     ("stroke=\"#CC79A7\"", "class=\"l d\""),
     ("stroke=\"#828282\"", "class=\"thin\""),
     ("stroke=\"#B3261E\"", "class=\"limit\""),
+    ("fill=\"#B3261E\"", "class=\"sign\""),
+    ("fill=\"#FDEBD0\"", "class=\"hot\""),
+    ("fill=\"#E8ECF5\"", "class=\"cool\""),
     ("stroke=\"#DEDEDE\"", "class=\"grid\""),
     ("stroke=\"#000000\"", "class=\"frame\""),
     ("fill=\"#000000\"", "class=\"text\""),
@@ -53,6 +56,9 @@ pub(super) struct Chart {
     pub(super) places: Vec<(f64, f64, &'static str)>,
     /// Vertical marks and their labels.
     pub(super) marks: Vec<(f64, &'static str)>,
+    /// Where each finding began.
+    pub(super) signs: Vec<f64>,
+    pub(super) spans: Vec<Span>,
     /// Whether the x axis is no time: a path may turn back on it.
     pub(super) own_x: bool,
     /// Whether both axes have the same scale.
@@ -90,16 +96,28 @@ impl Chart {
             lines: self.lines.iter().flat_map(|line| self.pieces(line)).collect(),
             limits: self.limits.clone(),
             marks: self.marks.iter().map(|(at, name)| (*at, (*name).to_owned())).collect(),
+            signs: self.signs.iter().zip(1..).map(|(at, number)| (*at, format!("{number}"))).collect(),
+            spans: self.spans.clone(),
             places: self.places.iter().map(|(x, y, name)| (*x, *y, (*name).to_owned())).collect(),
             equal_scales: self.equal_scales,
             ..Panel::default()
         };
+        let measured = ends(&panel, size_px);
         let Ok(svg) = sized_lines_svg(&self.title, &[panel], 1, None, size_px) else {
             return String::new();
         };
         let svg = THEME.into_iter().fold(svg, |svg, (written, shown)| svg.replace(written, shown));
+        // What the reader's pointer needs to tell times and values from pixels.
+        let over_time = if self.own_x || self.equal_scales { None } else { measured };
+        let scales = over_time.map_or_else(String::new, |[x, y]| {
+            let [left, top, right, bottom] = plotted_px(size_px);
+            format!(
+                " data-x=\"{:.4} {:.4}\" data-y=\"{:.6} {:.6}\" data-px=\"{left} {top} {right} {bottom}\"",
+                x.0, x.1, y.0, y.1
+            )
+        });
         format!(
-            "<figure class=\"{class}\" role=\"img\" aria-label=\"{}\">{svg}</figure>\n",
+            "<figure class=\"{class}\" role=\"img\" aria-label=\"{}\"{scales}>{svg}</figure>\n",
             escaped(&self.title)
         )
     }

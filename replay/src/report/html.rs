@@ -69,12 +69,13 @@ pub(super) fn charts(pictures: &[String]) -> String {
 /// Readable in light and in dark, on paper and on a narrow screen; colours that colour-blind people tell apart.
 const STYLE: &str = "
 :root { color-scheme: light dark; --bg: #ffffff; --fg: #16202a; --muted: #55626f; --grid: #e2e7ec; --line: #c3ccd5;
-  --card: #f6f8fa; --a: #0b62b8; --b: #c05a00; --c: #14784a; --d: #8a3fa8; --good: #14784a; --bad: #b3261e; }
+  --card: #f6f8fa; --a: #0b62b8; --b: #c05a00; --c: #14784a; --d: #8a3fa8; --good: #14784a; --bad: #b3261e;
+  --hot: #fdebd0; --cool: #e8ecf5; }
 @media (prefers-color-scheme: dark) { :root { --bg: #12171d; --fg: #e6ebf0; --muted: #9aa7b4; --grid: #27303a;
   --line: #3d4955; --card: #1a2129; --a: #62b0ff; --b: #ffa24d; --c: #4cc38a; --d: #cf9bf0; --good: #4cc38a;
-  --bad: #ff7b72; } }
+  --bad: #ff7b72; --hot: #3a2c17; --cool: #1c2738; } }
 body { margin: 0; background: var(--bg); color: var(--fg); font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 1080px; margin: 0 auto; padding: 24px 16px 64px; }
+main { max-width: 1280px; margin: 0 auto; padding: 24px 16px 64px; }
 h1 { font-size: 22px; margin: 0 0 4px; overflow-wrap: anywhere; }
 h2 { font-size: 17px; margin: 36px 0 8px; padding-top: 12px; border-top: 1px solid var(--line); }
 p, ul { margin: 6px 0; max-width: 80ch; }
@@ -101,6 +102,14 @@ svg circle.text { fill: var(--fg); }
 svg .a { stroke: var(--a); } svg .b { stroke: var(--b); stroke-dasharray: 7 3; } svg .c { stroke: var(--c); }
 svg .d { stroke: var(--d); stroke-dasharray: 2 2; } svg .thin { stroke: var(--muted); stroke-width: 0.7; fill: none; }
 svg .fa { fill: var(--a); } svg .fb { fill: var(--b); } svg .fc { fill: var(--c); } svg .fd { fill: var(--d); }
+svg .sign { fill: var(--bad); } svg .hot { fill: var(--hot); } svg .cool { fill: var(--cool); } svg .mark { fill: var(--fg); }
+.first { display: grid; grid-template-columns: minmax(0, 5fr) minmax(0, 6fr); gap: 20px; align-items: start; }
+@media (max-width: 980px) { .first { grid-template-columns: minmax(0, 1fr); } }
+.first .charts { grid-template-columns: minmax(0, 1fr); } .first figure.square { max-width: 440px; }
+h3 { font-size: 15px; margin: 12px 0 4px; } nav { font-size: 13px; margin: 4px 0; } a { color: var(--a); }
+ol.findings { margin: 4px 0; padding-left: 26px; } ol.findings li { margin: 4px 0; } ol.findings li::marker { color: var(--bad); font-weight: 700; }
+.pointer { stroke: var(--fg); stroke-width: 1; pointer-events: none; } .chosen { fill: var(--a); opacity: 0.15; }
+.zoomed .tick { display: none; } svg text.at { fill: var(--fg); }
 svg .bar { fill: var(--a); } svg .barbad { fill: var(--bad); } svg .room { fill: var(--grid); }
 @media (max-width: 980px) { figure.tall, figure.square { grid-row: auto; } }
 @media (max-width: 640px) { .limits th:nth-child(6), .limits td:nth-child(6) { display: none; }
@@ -108,6 +117,9 @@ svg .bar { fill: var(--a); } svg .barbad { fill: var(--bad); } svg .room { fill:
   figure.full svg { min-width: 0; } td { white-space: normal; } td.n { white-space: nowrap; } th, td { padding-right: 8px; } }
 @media print { main { max-width: none; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 ";
+
+/// A pointer's time and values in every picture over time, and one part of the time in all of them. Without it the page is whole.
+const SCRIPT: &str = include_str!("zoom.js");
 
 /// The whole page.
 pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String {
@@ -123,16 +135,20 @@ pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String
             escaped(&[span, run.join(", "), format!("written by {}", info.library)].join("; "))
         ),
     );
+    let named = sections.iter().filter(|section| !section.title.is_empty());
+    let links: Vec<String> =
+        named.map(|section| format!("<a href=\"#{}\">{}</a>", section.id, escaped(section.title))).collect();
+    put(&mut body, format_args!("<nav>{}</nav>\n", links.join(" \u{b7} ")));
     for section in sections {
         if !section.title.is_empty() {
-            put(&mut body, format_args!("<h2>{}</h2>\n", escaped(section.title)));
+            put(&mut body, format_args!("<h2 id=\"{}\">{}</h2>\n", section.id, escaped(section.title)));
         }
         body.push_str(&section.html);
     }
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+         <style>{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n<script>//<![CDATA[\n{SCRIPT}//]]></script>\n</body>\n</html>\n",
         escaped(&title)
     )
 }

@@ -48,7 +48,7 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
     let ((flight, info), (other, others)) = (told(path)?, told(with)?);
     let mut sections = section::all(&flight, &info);
     let both = section::overlay::html([(&flight, &info), (&other, &others)]);
-    sections.insert(1, section::Section { title: "Two flights", html: both });
+    sections.insert(1, section::Section { id: "both", title: "Two flights", html: both });
     let html = html::page(&flight, &info, &sections);
     Ok(Report { name: info.file, html, completeness: info.completeness })
 }
@@ -57,7 +57,7 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let info: Info = info(path)?;
-    let flight = Flight::of(recording);
+    let flight = Flight::of(recording).with(&info);
     Ok((flight, info))
 }
 

@@ -3,8 +3,9 @@
 //! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them. Plans are
 //! made in the frame of the moving air; here they are converted to the ground.
 
+use campaign::figure::Span;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::estimation::estimator::Estimate;
+use flight::estimation::estimator::{AidStatus, Aids, Estimate};
 use flight::guidance::powered::ControlLevel;
 use flight::guidance::powered::{Plane, PoweredReport};
 use flight::rules::phase::Phase;
@@ -17,7 +18,9 @@ use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::{flight_v1, v1};
 
+use super::chart::{Chart, Line};
 use crate::controller::{LoggedComputer, NewPlans};
+use crate::info::{Info, PhaseSpan};
 use crate::log::Recording;
 
 /// Prediction times at which predictions are compared with the flight, s.
@@ -135,6 +138,14 @@ pub(super) struct InSpace {
     pub(super) across_m: Vec<(f64, f64)>,
     /// Estimate less truth, from the release to contact.
     pub(super) errors: Vec<EstimateError>,
+    /// Test ratios of barometer, satellite velocity and position, and lidar: vehicle time, s, and ratio.
+    pub(super) test_ratios: TestRatios,
+    /// Of each aid its name, and how many of its measurements were used and refused.
+    pub(super) aids: Vec<(&'static str, u32, u32)>,
+    /// Standard deviations of height, place, m, and velocity, m/s, at each planning frame.
+    pub(super) sigmas: Vec<(f64, [f64; 3])>,
+    /// The estimated bias of the gyro at each planning frame, body, rad/s.
+    pub(super) gyro_bias_rad_s: Vec<(f64, [f64; 3])>,
     /// The estimated wind at each planning frame: vehicle time, s, then towards north and east, m/s.
     pub(super) wind_m_s: Vec<(f64, [f64; 2])>,
 }
@@ -171,6 +182,11 @@ pub(super) struct Flight {
     pub(super) ignition_s: Option<f64>,
     /// Contact, vehicle time, s.
     pub(super) touchdown_s: Option<f64>,
+    /// T+0 on the clock of the track, s; `None` if the log does not connect the two.
+    pub(super) zero_s: Option<f64>,
+    /// Where the findings begin, T+, s.
+    pub(super) signs: Vec<f64>,
+    pub(super) spans: Vec<Span>,
 }
 
 /// What the flight computer, run again, makes of a planning frame.
@@ -190,7 +206,7 @@ impl Flight {
     pub(super) fn of(recording: Recording) -> Self {
         match run_again(&recording) {
             None => Self::heard(recording),
-            Some((mission, again, pilot)) => Self::told(recording, &mission, &again, &pilot),
+            Some((mission, again, pilot, ratios)) => Self::told(recording, &mission, &again, &pilot, ratios),
         }
     }
 
@@ -219,13 +235,22 @@ impl Flight {
             teller: if track.is_empty() { Teller::Nobody } else { Teller::Telemetry },
             ignition_s: track.iter().find(burning).map(|sample| sample.time_s),
             touchdown_s: recording.contact_s(),
+            zero_s: None,
+            signs: Vec::new(),
+            spans: Vec::new(),
             track,
             recording,
         }
     }
 
     /// A flight whose computer was run again.
-    fn told(recording: Recording, mission: &Mission, again: &[Again], pilot: &Pilot) -> Self {
+    fn told(
+        recording: Recording,
+        mission: &Mission,
+        again: &[Again],
+        pilot: &Pilot,
+        test_ratios: TestRatios,
+    ) -> Self {
         let nil = Vector3::zeros();
         let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));
         let world = &recording.world;
@@ -246,7 +271,7 @@ impl Flight {
         });
         Self {
             vehicle: Some(Vehicle::of(mission)),
-            in_space: Some(in_space(&recording, mission, again, pilot, &plane)),
+            in_space: Some(in_space(&recording, mission, again, pilot, &plane, test_ratios)),
             gimbal: [("Gimbal pitch", 0), ("Gimbal yaw", 1)]
                 .map(|(name, axis)| gimbal(name, axis, world))
                 .into(),
@@ -258,6 +283,9 @@ impl Flight {
             plans: plans(again, &plane),
             ignition_s: pilot.ignited_at_s(),
             touchdown_s: recording.contact_s(),
+            zero_s: Some(0.0),
+            signs: Vec::new(),
+            spans: Vec::new(),
             plant,
             thoughts,
             contact,
@@ -267,14 +295,50 @@ impl Flight {
         }
     }
 
-    /// Time on the report's axes, s: since ignition, or vehicle time without one.
+    /// Time on the report's axes, s.
     pub(super) fn axis_s(&self, time_s: f64) -> f64 {
-        time_s - self.ignition_s.unwrap_or(0.0)
+        time_s - self.zero_s.unwrap_or(0.0)
     }
 
     /// The name of the time axis.
     pub(super) fn axis_name(&self) -> &'static str {
-        if self.ignition_s.is_some() { "s since ignition" } else { "s of vehicle time" }
+        if self.zero_s.is_some() { "T+, s" } else { "s of the station's clock" }
+    }
+
+    /// Lines over time, with what happened and what went wrong.
+    pub(super) fn over_time(&self, title: &str, lines: Vec<Line>) -> Chart {
+        Chart {
+            title: title.to_owned(),
+            x_label: self.axis_name(),
+            lines,
+            marks: self.marks(),
+            signs: self.signs.clone(),
+            ..Chart::default()
+        }
+    }
+
+    /// What the description of the log adds: the phases behind the pictures, and where the findings begin.
+    pub(super) fn with(mut self, info: &Info) -> Self {
+        let clocks = &self.recording.clocks;
+        if self.teller == Teller::Telemetry {
+            self.zero_s = clocks.flight_zero_s.zip(clocks.telemetry_zero_s).map(|(flight, own)| flight - own);
+        }
+        let findings = info.findings.iter().flatten();
+        self.signs = findings.map(|finding| finding.since_s).filter(|since_s| since_s.is_finite()).collect();
+        let spans = info.phases.first().map_or(&[][..], |timeline| &timeline.spans);
+        let until_s = |place: usize| spans.get(place + 1).map(|next| next.from_s);
+        let span = |(place, span): (usize, &PhaseSpan)| Span {
+            from: self.axis_s(span.from_s),
+            to: self.axis_s(until_s(place).unwrap_or(span.until_s)),
+            name: span.phase.clone(),
+            shade: match Phase::ALL.into_iter().find(|phase| phase.name() == span.phase) {
+                Some(Phase::Boost | Phase::Ignition | Phase::Powered) => Some(0),
+                Some(Phase::Deploy | Phase::AeroDescent | Phase::Chute) => Some(1),
+                _ => None,
+            },
+        };
+        self.spans = spans.iter().enumerate().map(span).collect();
+        self
     }
 
     /// Whether a time is shown in the pictures: from a second before the landing to a second after its end.
@@ -325,6 +389,7 @@ fn in_space(
     again: &[Again],
     pilot: &Pilot,
     plane: &Plane,
+    test_ratios: TestRatios,
 ) -> InSpace {
     let world = &recording.world;
     let impulse_n_s: f64 = world
@@ -333,6 +398,7 @@ fn in_space(
         .sum();
     let burnt_out = world.last().is_some_and(|last| last.thrust_n <= 0.0);
     let certified_n_s = mission.motor_curve.total_impulse_n_s();
+    let known = || again.iter().filter_map(|frame| Some((frame.time_s, frame.estimate?)));
     let in_air = |time_s: f64| recording.verdict.as_ref().is_none_or(|verdict| time_s <= verdict.time_s);
     InSpace {
         plane: plane_in_words(pilot.plane()),
@@ -344,6 +410,17 @@ fn in_space(
             .iter()
             .filter(|frame| in_air(frame.time_s))
             .filter_map(|frame| error(frame.estimate.as_ref()?, frame.time_s, world))
+            .collect(),
+        test_ratios,
+        aids: named_aids(pilot.estimator().aids()).map(|(name, aid)| (name, aid.used, aid.refused)).into(),
+        sigmas: known()
+            .map(|(time_s, estimate)| {
+                let (place, velocity) = (&estimate.sigmas.position_m, &estimate.sigmas.velocity_m_s);
+                (time_s, [place.z, place.xy().norm(), velocity.norm()])
+            })
+            .collect(),
+        gyro_bias_rad_s: known()
+            .map(|(time_s, estimate)| (time_s, estimate.gyro_bias_rad_s.into()))
             .collect(),
         // On the way up nothing estimates the wind.
         wind_m_s: again
@@ -389,17 +466,34 @@ fn error(estimate: &Estimate, time_s: f64, world: &[flight_v1::TruthSample]) -> 
     })
 }
 
-/// Runs the flight computer again and returns its estimate and plan at every tenth frame; `None` if the log lacks
-/// records.
-fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot)> {
+/// Of barometer, satellite velocity and position, and lidar: vehicle time, s, and ratio.
+type TestRatios = [Vec<(f64, f64)>; 4];
+
+fn named_aids(aids: &Aids) -> [(&'static str, AidStatus); 4] {
+    [
+        ("barometer", aids.barometer),
+        ("GNSS velocity", aids.gnss_velocity),
+        ("GNSS position", aids.gnss_position),
+        ("lidar", aids.lidar),
+    ]
+}
+
+/// Runs the flight computer again and returns its estimate and plan at every tenth frame, and the test ratios; `None` if the
+/// log lacks records.
+fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot, TestRatios)> {
     let (start, frames) = recording.replayable_frames().ok()?;
     let toml = recording.profile_toml().ok()?;
     let mut controller = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
     let mission = controller.pilot().mission().clone();
     let curve: ThrustCurve = mission.motor_curve.clone();
     let (mut again, mut plans) = (Vec::new(), NewPlans::default());
+    let mut test_ratios = TestRatios::default();
     for recorded in frames {
         let frame = controller.run_again(recorded).ok()?;
+        let aids = named_aids(controller.pilot().estimator().aids());
+        for ((_, aid), ratios) in aids.iter().zip(&mut test_ratios).filter(|((_, aid), _)| aid.fresh) {
+            ratios.push((recorded.input.time_s, aid.test_ratio));
+        }
         if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
             continue;
         }
@@ -415,7 +509,7 @@ fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot)> {
             plan: plan.map(|(states, step_s)| (*pilot.report(), states.to_vec(), step_s)),
         });
     }
-    Some((mission, again, controller.pilot().clone()))
+    Some((mission, again, controller.pilot().clone(), test_ratios))
 }
 
 /// The state in the plane, relative to the ground; altitude is the height of the feet.

@@ -59,17 +59,12 @@ pub(super) fn tracking(flight: &Flight) -> String {
     let mut all = vec!["phase", "predicted ahead", "#ticks"];
     all.extend(heads.iter().map(String::as_str));
     let [near, far] = distance;
-    let chart = Chart {
-        title: "Distance between the planned and the actual position, m".to_owned(),
-        x_label: flight.axis_name(),
-        lines: vec![
-            Line { name: "0.5 s ahead", class: "b", points: far },
-            Line { name: "0.1 s ahead", class: "a", points: near },
-        ],
-        marks: flight.marks(),
-        full: true,
-        ..Chart::default()
-    };
+    let lines = vec![
+        Line { name: "0.5 s ahead", class: "b", points: far },
+        Line { name: "0.1 s ahead", class: "a", points: near },
+    ];
+    let title = "Distance between the planned and the actual position, m";
+    let chart = Chart { full: true, ..flight.over_time(title, lines) };
     paragraph("Actual state minus the state planned at each tick, root mean square / largest.")
         + &across(flight)
         + &table(&all, &rows)
@@ -126,7 +121,7 @@ pub(super) fn prediction(flight: &Flight) -> String {
                 points: vec![(first.0, actual), (last.0, actual)],
             });
         }
-        Chart { title, x_label: flight.axis_name(), lines, marks: flight.marks(), ..Chart::default() }.svg()
+        flight.over_time(&title, lines).svg()
     };
     let over = |value: &dyn Fn(f64, f64, &[f64; 6]) -> f64| -> Vec<(f64, f64)> {
         let point =
@@ -243,12 +238,8 @@ pub(super) fn solver(flight: &Flight, info: &Info) -> String {
     let most = plans.iter().map(|plan| plan.iterations).max().unwrap_or(0);
     rows.push(vec!["most iterations of a plan".to_owned(), most.to_string()]);
     let chart = |title: &str, points: Vec<(f64, f64)>, limits: Vec<f64>| Chart {
-        title: title.to_owned(),
-        x_label: flight.axis_name(),
-        lines: vec![Line { name: "", class: "a", points }],
-        marks: flight.marks(),
         limits,
-        ..Chart::default()
+        ..flight.over_time(title, vec![Line { name: "", class: "a", points }])
     };
     let point = |plan: &&Decision| (flight.axis_s(plan.sample.time_s), plan.iterations as f64);
     let points = plans.iter().map(point).collect();
@@ -317,19 +308,12 @@ pub(super) fn thrust(flight: &Flight) -> String {
     let expected = times.map(|time_s| (axis(time_s), expected_n(time_s))).collect();
     let inferred = inferred.into_iter().map(|(time_s, thrust_n)| (axis(time_s), thrust_n)).collect();
     let rows = flight.in_space.as_ref().map(scales).unwrap_or_default();
-    let chart = Chart {
-        title: "Thrust, N".to_owned(),
-        x_label: flight.axis_name(),
-        lines: vec![
-            Line { name: "actual", class: "c", points: actual },
-            Line { name: "expected", class: "b", points: expected },
-            Line { name: "inferred", class: "a", points: inferred },
-        ],
-        limits: vec![vehicle.weight_n],
-        marks: flight.marks(),
-        full: true,
-        ..Chart::default()
-    };
+    let lines = vec![
+        Line { name: "actual", class: "c", points: actual },
+        Line { name: "expected", class: "b", points: expected },
+        Line { name: "inferred", class: "a", points: inferred },
+    ];
+    let chart = Chart { limits: vec![vehicle.weight_n], full: true, ..flight.over_time("Thrust, N", lines) };
     table(&["", "#"], &rows)
         + &charts(&[chart.svg()])
         + &paragraph("The dashed level is the vehicle's weight.")

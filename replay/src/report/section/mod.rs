@@ -1,44 +1,51 @@
 //! The sections of a report, in the order they are read.
 
 mod control;
+mod first;
 mod motion;
 mod outcome;
 pub(super) mod overlay;
+mod sensors;
 
 use super::track::Flight;
 use crate::info::Info;
 
-/// A section: its heading and its HTML.
+/// A section: its name in links, its heading and its HTML.
 pub(super) struct Section {
+    pub(super) id: &'static str,
     pub(super) title: &'static str,
     pub(super) html: String,
 }
 
 /// Every section.
 pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
-    let section = |title, html| Section { title, html };
-    let in_space = flight.in_space.is_some();
+    let section = |id, title, html| Section { id, title, html };
     let mut all = vec![
-        section("", outcome::verdict(flight, info)),
-        section("Phases", outcome::phases(flight, info)),
-        section("Events", outcome::events(flight)),
+        section("first", "", first::html(flight, info)),
+        section("burn", "Path, states and input", motion::motion(flight)),
+        section("thrust", "Thrust expected against inferred", control::thrust(flight)),
+        section("touchdown", "Predicted against actual touchdown", control::prediction(flight)),
     ];
-    if in_space {
-        all.push(section("The whole flight", motion::whole_flight(flight)));
-    }
-    all.push(section("Path, states and input", motion::motion(flight)));
-    if in_space {
-        all.push(section("Wind, fins, roll and sensors", motion::descent(flight)));
+    if flight.in_space.is_some() {
+        all.push(section("descent", "Wind, fins, roll and sensors", motion::descent(flight)));
     }
     all.extend([
-        section("Tracking error by phase", control::tracking(flight)),
-        section("Gimbal and fin saturation", control::saturation(flight)),
-        section("Solver", control::solver(flight, info)),
-        section("Predicted against actual touchdown", control::prediction(flight)),
-        section("Thrust expected against inferred", control::thrust(flight)),
-        section("Estimator error", control::estimator(flight)),
-        section("Link", outcome::link(flight)),
-        section("Log", outcome::described(info)),
+        section("sensors", "Sensors and estimator", sensors::sensors(flight)),
+        section("estimator", "Estimator error", control::estimator(flight)),
+        section("battery", "Battery and vibration", sensors::battery_and_vibration(flight)),
+        section("tracking", "Tracking error by phase", control::tracking(flight)),
+        section("saturation", "Gimbal and fin saturation", control::saturation(flight)),
+        section("solver", "Solver", control::solver(flight, info)),
+    ]);
+    if flight.in_space.is_some() {
+        all.push(section("whole", "The whole flight", motion::whole_flight(flight)));
+    }
+    all.extend([
+        section("phases", "Phases", outcome::phases(flight, info)),
+        section("events", "Events", outcome::events(flight)),
+        section("mission", "Mission against the built-in one", sensors::mission(flight, info)),
+        section("link", "Link", outcome::link(flight)),
+        section("log", "Log", outcome::described(info)),
     ]);
     all
 }

@@ -81,14 +81,7 @@ fn state(flight: &Flight, component: usize) -> String {
     if flight.teller == Teller::Plant {
         lines.push(Line { name: "estimate", class: "b", points: estimate });
     }
-    Chart {
-        title: format!("{name}, {unit}"),
-        x_label: flight.axis_name(),
-        lines,
-        marks: flight.marks(),
-        ..Chart::default()
-    }
-    .svg()
+    flight.over_time(&format!("{name}, {unit}"), lines).svg()
 }
 
 fn input(flight: &Flight, axis: &GimbalAxis) -> String {
@@ -101,15 +94,9 @@ fn input(flight: &Flight, axis: &GimbalAxis) -> String {
         }
     };
     let limit = flight.vehicle.as_ref().map(|vehicle| vehicle.gimbal_limit_deg);
-    Chart {
-        title: format!("{}, deg", axis.name),
-        x_label: flight.axis_name(),
-        lines: vec![line("actual", "a", &axis.actual), line("commanded", "b", &axis.commanded)],
-        limits: limit.into_iter().flat_map(|limit| [-limit, limit]).collect(),
-        marks: flight.marks(),
-        ..Chart::default()
-    }
-    .svg()
+    let lines = vec![line("actual", "a", &axis.actual), line("commanded", "b", &axis.commanded)];
+    let limits = limit.into_iter().flat_map(|limit| [-limit, limit]).collect();
+    Chart { limits, ..flight.over_time(&format!("{}, deg", axis.name), lines) }.svg()
 }
 
 /// A part of the flight: its name, its class, and whether a phase belongs to it.
@@ -122,48 +109,69 @@ const PARTS: [Part; 4] = [
     ("parachute", "d", |phase| phase == Phase::Chute),
 ];
 
+/// A view of the flown path: its title, its axes, what it shows of a sample, and whether it is a map.
+type View = (&'static str, [&'static str; 2], fn(&TruthSample) -> (f64, f64), bool);
+
+// East is against y.
+const FROM_ABOVE: View = (
+    "Seen from above: ground track",
+    ["east, m", "north, m"],
+    |sample| (-sample.state.position_m.y, sample.state.position_m.x),
+    true,
+);
+const FROM_WEST: View = (
+    "Seen from the west: north and height",
+    ["north, m", "height of the feet, m"],
+    |sample| (sample.state.position_m.x, sample.height_m),
+    false,
+);
+const FROM_SOUTH: View = (
+    "Seen from the south: east and height",
+    ["east, m", "height of the feet, m"],
+    |sample| (-sample.state.position_m.y, sample.height_m),
+    false,
+);
+
+fn view(flight: &Flight, flown: &[&TruthSample], (title, [x_label, y_label], see, map): View) -> String {
+    let lines = PARTS.iter().map(|(name, class, belongs)| Line {
+        name,
+        class,
+        points: flown
+            .iter()
+            .map(|sample| if phase_at(flight, sample).is_some_and(belongs) { see(sample) } else { GAP })
+            .collect(),
+    });
+    let lines: Vec<Line> = lines.filter(|line| line.points.iter().any(|point| point.0.is_finite())).collect();
+    let moments = moments(flight, flown);
+    Chart {
+        title: title.to_owned(),
+        x_label,
+        y_label,
+        lines,
+        places: moments.iter().map(|(name, sample)| (see(sample).0, see(sample).1, *name)).collect(),
+        own_x: true,
+        equal_scales: map,
+        ..Chart::default()
+    }
+    .svg()
+}
+
+fn in_the_air(flight: &Flight) -> Vec<&TruthSample> {
+    flight.recording.world.iter().filter(|sample| flight.is_before_contact(sample.time_s)).collect()
+}
+
+/// The ground track.
+pub(super) fn from_above(flight: &Flight) -> String {
+    view(flight, &in_the_air(flight), FROM_ABOVE)
+}
+
 pub(super) fn whole_flight(flight: &Flight) -> String {
-    let flown: Vec<&TruthSample> =
-        flight.recording.world.iter().filter(|sample| flight.is_before_contact(sample.time_s)).collect();
+    let flown = in_the_air(flight);
     if flown.is_empty() {
         return paragraph("The log has no simulated truth to draw the flight from.");
     }
     let moments = moments(flight, &flown);
-    // East is against y.
-    let view = |title: &str,
-                labels: (&'static str, &'static str),
-                see: fn(&TruthSample) -> (f64, f64),
-                map: bool| {
-        let lines = PARTS.iter().map(|(name, class, belongs)| Line {
-            name,
-            class,
-            points: flown
-                .iter()
-                .map(|sample| if phase_at(flight, sample).is_some_and(belongs) { see(sample) } else { GAP })
-                .collect(),
-        });
-        let lines: Vec<Line> =
-            lines.filter(|line| line.points.iter().any(|point| point.0.is_finite())).collect();
-        Chart {
-            title: title.to_owned(),
-            x_label: labels.0,
-            y_label: labels.1,
-            lines,
-            places: moments.iter().map(|(name, sample)| (see(sample).0, see(sample).1, *name)).collect(),
-            own_x: true,
-            equal_scales: map,
-            ..Chart::default()
-        }
-        .svg()
-    };
-    let north = |sample: &TruthSample| (sample.state.position_m.x, sample.height_m);
-    let east = |sample: &TruthSample| (-sample.state.position_m.y, sample.height_m);
-    let above = |sample: &TruthSample| (-sample.state.position_m.y, sample.state.position_m.x);
-    let pictures = [
-        view("Seen from above: ground track", ("east, m", "north, m"), above, true),
-        view("Seen from the west: north and height", ("north, m", "height of the feet, m"), north, false),
-        view("Seen from the south: east and height", ("east, m", "height of the feet, m"), east, false),
-    ];
+    let pictures = [FROM_WEST, FROM_SOUTH].map(|seen| view(flight, &flown, seen));
     let rows: Vec<Vec<String>> = moments
         .iter()
         .map(|(name, sample)| {
@@ -178,9 +186,8 @@ pub(super) fn whole_flight(flight: &Flight) -> String {
             ]
         })
         .collect();
-    paragraph(
-        "From the simulated truth, up to contact. The pictures with a height have their own scale on each axis.",
-    ) + &table(&["moment", "#T+, s", "#height, m", "#north, m", "#east, m", "#up, m/s"], &rows)
+    paragraph("From the simulated truth, up to contact. Each axis has its own scale.")
+        + &table(&["moment", "#T+, s", "#height, m", "#north, m", "#east, m", "#up, m/s"], &rows)
         + &charts(&pictures)
 }
 
@@ -233,10 +240,7 @@ pub(super) fn descent(flight: &Flight) -> String {
     let over = |value: &dyn Fn(&TruthSample) -> f64| -> Vec<(f64, f64)> {
         world.iter().map(|sample| (flight.axis_s(sample.time_s), value(sample))).collect()
     };
-    let chart = |title: &str, lines: Vec<Line>| {
-        let title = title.to_owned();
-        Chart { title, x_label: flight.axis_name(), lines, marks: flight.marks(), ..Chart::default() }.svg()
-    };
+    let chart = |title: &str, lines: Vec<Line>| flight.over_time(title, lines).svg();
     let estimated = |place: usize| -> Vec<(f64, f64)> {
         let all = in_space.wind_m_s.iter().filter(|(time_s, _)| flight.is_before_contact(*time_s));
         all.map(|(time_s, wind_m_s)| (flight.axis_s(*time_s), wind_m_s[place])).collect()
