@@ -21,14 +21,18 @@ pub struct FindingFacts {
     pub(crate) section: &'static str,
 }
 
-/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again.
+/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
+/// did: what it would have commanded says nothing of surfaces that followed other commands.
 pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Option<Vec<FindingFacts>> {
     let (start, frames) = recording.replayable_frames().ok()?;
     let toml = recording.profile_toml().ok()?;
     let mut computer = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
     let mut findings = Findings::default();
     for frame in frames {
-        computer.run_again(frame).ok()?;
+        let again = computer.run_again(frame).ok()?;
+        if again.output != frame.output {
+            return None;
+        }
         findings.note(computer.computer());
     }
     let mut facts: Vec<FindingFacts> = findings

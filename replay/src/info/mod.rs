@@ -189,7 +189,7 @@ pub struct Info {
     pub verdict: Option<VerdictFacts>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,
-    /// What went wrong, first in time; `None` of a log whose flight cannot be run again.
+    /// What went wrong, first in time; `None` of a log whose flight this build does not run again as it was.
     pub findings: Option<Vec<FindingFacts>>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
@@ -364,7 +364,9 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
     writeln!(output, "{}{size}", shown(&info.file))?;
     print_verdict(info, output)?;
-    print_findings(info.findings.as_deref(), output)?;
+    if info.grade.level == GradeLevel::BitExact {
+        print_findings(info.findings.as_deref(), output)?;
+    }
     if let Some(timeline) = info.phases.first() {
         row(output, "phases", &phases(timeline))?;
     }
@@ -490,7 +492,13 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
 }
 
 fn print_findings(findings: Option<&[FindingFacts]>, output: &mut impl Write) -> io::Result<()> {
-    let Some(findings) = findings else { return Ok(()) };
+    let Some(findings) = findings else {
+        return row(
+            output,
+            "findings",
+            "not looked for: this build does not make the recorded decisions again",
+        );
+    };
     if findings.is_empty() {
         return row(output, "findings", "none");
     }

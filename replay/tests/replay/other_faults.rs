@@ -91,3 +91,19 @@ fn a_description_says_what_went_wrong_first_in_time() {
     let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
     assert!(stdout.contains("\nfindings    none\n"), "{stdout}");
 }
+
+/// A log whose decisions this build does not make has no findings, because they would be about other commands.
+#[test]
+fn findings_are_not_looked_for_where_the_decisions_are_not_made_again() {
+    let path = LANDED.beside("otherwise.mcap");
+    let mut held = crate::tampered::Held::read(&LANDED.log);
+    let tick = held.messages.iter_mut().rfind(|message| message.is_tick()).unwrap();
+    let mut frame =
+        <protocol::log::computer_v1::ComputerFrame as prost::Message>::decode(tick.data.as_slice()).unwrap();
+    frame.output.fins_rad[0] += 0.1;
+    tick.data = prost::Message::encode_to_vec(&frame);
+    held.write(&path);
+    assert_eq!(replay::info::info(&path).unwrap().findings, None);
+    let (_, stdout, _) = run(&mut replay("info", &path));
+    assert!(stdout.contains("findings    not looked for: this build does not make"), "{stdout}");
+}

@@ -70,7 +70,10 @@ fn verdict(info: &Info) -> String {
 fn findings(flight: &Flight, info: &Info) -> String {
     let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
-        return html + &paragraph("The log has no frames that can be run again, so nothing was looked for.");
+        return html
+            + &paragraph(
+                "Nothing was looked for: the log has no frames, or this build does not make their decisions again.",
+            );
     };
     if findings.is_empty() {
         html += &paragraph("None.");
