@@ -42,7 +42,7 @@ fn ground_without_arguments_beside_a_station_is_the_demonstration_and_reports_th
     demonstration.wait_for("a station runs: pid ");
     // On a narrower list the words "shows it" are on the next line.
     demonstration.wait_for("`ground attach`");
-    demonstration.wait_for("every arming check passes");
+    demonstration.wait_for("press A, type ARM");
     demonstration.type_until(b"AARM\r", " ARMED ");
     demonstration.type_until(b"SSTART\r", "START  commanded");
     demonstration.wait_for("Falling");

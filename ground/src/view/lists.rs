@@ -265,14 +265,15 @@ mod tests {
         model.events.push(at, Speaker::Vehicle, EventLevel::Warning, text);
         let theme = Theme { palette: Palette::None, ascii: false };
         let shown = |rows| -> Vec<String> {
-            events(&model, theme, BEFORE_TEXT + 20, rows).iter().map(Line::to_string).collect()
+            events(&model, theme, TIME_COLUMNS + 3 + 20, rows).iter().map(Line::to_string).collect()
         };
-        let gap = " ".repeat(BEFORE_TEXT);
-        let whole = ["    7.0 vehicle ! arming refused: pin:", &format!("{gap}found in the vehicle")];
+        // In a panel this narrow the speaker is left out.
+        let gap = " ".repeat(TIME_COLUMNS + 3);
+        let whole = ["    7.0 ! arming refused: pin:", &format!("{gap}found in the vehicle")];
         assert_eq!(shown(0), [""; 0]);
-        assert_eq!(shown(1), ["    7.0 vehicle ! arming refused: pin…"]);
+        assert_eq!(shown(1), ["    7.0 ! arming refused: pin…"]);
         assert_eq!(shown(2), whole);
-        assert_eq!(shown(3), ["    7.0 vehicle   SAFED", whole[0], whole[1]]);
+        assert_eq!(shown(3), ["    7.0   SAFED", whole[0], whole[1]]);
     }
 
     #[test]
