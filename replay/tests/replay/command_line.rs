@@ -69,7 +69,7 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
     assert_eq!(code, 1, "{stdout}");
     for part in [
         "1 of 8 frames differ, in 1 field",
-        "first at frame 7 (T+0.035 s, AERO_DESCENT), 1 field:",
+        "first at frame 7 (T+0.035 s, DEPLOY), 1 field:",
         "output.fins_rad[2]",
         &format!("{recorded_rad:?}"),
         &format!("{recomputed_rad:?}"),
