@@ -427,8 +427,10 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         }
     }
 }
+
 /// Nothing is known of a scale but its size.
 const WIDE: Prior = Prior { mean: 1.0, sigma: 0.5 };
+
 const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples";
 
 /// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over what was felt when the

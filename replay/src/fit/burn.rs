@@ -198,25 +198,13 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
     let mut solution = solve_from(&start, &priors, residuals).ok_or_else(unsolved)?;
     inflate(&mut solution, &priors, residuals, rows.len().div_ceil(BLOCKS));
     solution.covariance[(IMPULSE, IMPULSE)] += libm::pow(CALIBRATION_SIGMA * solution.values[IMPULSE], 2.0);
-    let mut fit = Fit {
-        source: source.to_owned(),
-        mission: String::new(),
-        motor: curve.name().to_owned(),
-        basis: Basis {
-            impulse_n_s: curve.total_impulse_n_s(),
-            burn_time_s: curve.burn_time_s(),
-            drag_area_m2: 0.0,
-            loaded_kg: 0.0,
-        },
-        found: Vec::new(),
-        not_found: Vec::new(),
-        body_share: None,
-        calibration: None,
-        not_calibrated: Vec::new(),
-        damage: None,
-        landed: None,
-        content: None,
+    let basis = Basis {
+        impulse_n_s: curve.total_impulse_n_s(),
+        burn_time_s: curve.burn_time_s(),
+        drag_area_m2: 0.0,
+        loaded_kg: 0.0,
     };
+    let mut fit = Fit::of(source, "", curve.name(), basis);
     let reason = "the table does not show it";
     for (place, name, unit) in [
         (IMPULSE, "thrust_scale", ""),

@@ -101,21 +101,12 @@ mod tests {
     use crate::fit::{Basis, Parameter};
 
     fn fit(mission: &str) -> Fit {
+        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
         Fit {
-            source: String::new(),
-            mission: mission.to_owned(),
-            motor: String::new(),
-            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found: ["thrust_scale", "lidar_noise", "updraught_rms"]
                 .map(|name| Parameter::normal(name, "", 1.0, 0.03))
                 .to_vec(),
-            not_found: Vec::new(),
-            body_share: None,
-            calibration: None,
-            not_calibrated: Vec::new(),
-            damage: None,
-            landed: None,
-            content: None,
+            ..Fit::of("", mission, "", basis)
         }
     }
 

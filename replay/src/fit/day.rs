@@ -614,21 +614,8 @@ mod tests {
     use crate::fit::Parameter;
 
     fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
-        let text = |text: &str| text.to_owned();
-        Fit {
-            source: text(source),
-            mission: text(mission),
-            motor: text(motor),
-            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
-            found,
-            not_found: Vec::new(),
-            body_share: None,
-            calibration: None,
-            not_calibrated: Vec::new(),
-            damage: None,
-            landed: None,
-            content: None,
-        }
+        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
+        Fit { found, ..Fit::of(source, mission, motor, basis) }
     }
 
     #[test]

@@ -155,6 +155,24 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// A fit that has found nothing yet.
+    fn of(source: &str, mission: &str, motor: &str, basis: Basis) -> Self {
+        Self {
+            source: source.to_owned(),
+            mission: mission.to_owned(),
+            motor: motor.to_owned(),
+            basis,
+            found: Vec::new(),
+            not_found: Vec::new(),
+            body_share: None,
+            calibration: None,
+            not_calibrated: Vec::new(),
+            damage: None,
+            landed: None,
+            content: None,
+        }
+    }
+
     /// The same fit over other data: every scale times what the data differ by.
     #[must_use]
     pub fn over(&self, other: &Basis) -> Self {
@@ -230,19 +248,12 @@ pub fn fit(trace: &Trace) -> Fit {
 
 /// A fit whose intervals are those of the noise alone.
 pub fn uncalibrated(trace: &Trace) -> Fit {
+    let mission = &trace.mission;
     let mut fit = Fit {
-        source: trace.name.clone(),
-        mission: trace.mission.name.clone(),
-        motor: trace.mission.motor_curve.name().to_owned(),
-        basis: Basis::of(&trace.mission),
-        found: Vec::new(),
-        not_found: Vec::new(),
-        body_share: None,
-        calibration: None,
-        not_calibrated: Vec::new(),
         damage: trace.damage.clone(),
         landed: trace.landed,
         content: trace.content.map(|content| format!("{content:016x}")),
+        ..Fit::of(&trace.name, &mission.name, mission.motor_curve.name(), Basis::of(mission))
     };
     let steady = wind::is_one_wind(trace);
     let understood = steady.clone().and_then(|()| Ok(along_and_turning(trace)?));
@@ -696,18 +707,8 @@ mod tests {
     fn val_hand_a_scale_over_other_data() {
         let basis = Basis { impulse_n_s: 100.0, burn_time_s: 5.0, drag_area_m2: 0.03, loaded_kg: 3.0 };
         let fit = Fit {
-            source: String::new(),
-            mission: String::new(),
-            motor: String::new(),
-            basis,
             found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
-            not_found: Vec::new(),
-            body_share: None,
-            calibration: None,
-            not_calibrated: Vec::new(),
-            damage: None,
-            landed: None,
-            content: None,
+            ..Fit::of("", "", "", basis)
         };
         let other = Basis { impulse_n_s: 110.0, loaded_kg: 3.3, ..basis };
         let found = &fit.over(&other).found[0];
@@ -717,19 +718,10 @@ mod tests {
     }
 
     fn fits(values: &[(f64, f64)]) -> Vec<Fit> {
+        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
         let fit = |(value, sigma): &(f64, f64)| Fit {
-            source: String::new(),
-            mission: String::new(),
-            motor: String::new(),
-            basis: Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 },
             found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
-            not_found: Vec::new(),
-            body_share: None,
-            calibration: None,
-            not_calibrated: Vec::new(),
-            damage: None,
-            landed: None,
-            content: None,
+            ..Fit::of("", "", "", basis)
         };
         values.iter().map(fit).collect()
     }

@@ -28,14 +28,20 @@ use crate::print::{counted, print_json, shown};
 /// # Errors
 /// The file is not a flight log or cannot be read. Damage is part of the description, not an error.
 pub fn info(path: &Path) -> Result<Info, LogError> {
-    let mut log = FlightLog::open(path)?;
-    let mut info = info_of(&mut log, || summary_of(path))?;
-    info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    let mut info = described(path)?;
     if info.grade.level == GradeLevel::BitExact
         && let Ok(recording) = Recording::open(path)
     {
         info.findings = findings::of(&recording, info.verdict.as_ref());
     }
+    Ok(info)
+}
+
+/// The same without the findings, for who holds the recording to look for them.
+pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
+    let mut log = FlightLog::open(path)?;
+    let mut info = info_of(&mut log, || summary_of(path))?;
+    info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
     Ok(info)
 }
 
@@ -561,7 +567,7 @@ fn short(value: &str) -> String {
 }
 
 /// Rounds away the error of converting degrees to radians and back.
-fn rounded(limit: f64) -> f64 {
+pub(crate) fn rounded(limit: f64) -> f64 {
     (limit * 1e6).round() / 1e6
 }
 

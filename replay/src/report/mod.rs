@@ -15,7 +15,8 @@ use anyhow::{Result, bail};
 use track::Flight;
 
 use crate::cli::{Outcome, answer};
-use crate::info::{Completeness, Info, info};
+use crate::findings;
+use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
 use crate::output::{Destination, Overwrite, same_file, write_whole};
 
@@ -56,7 +57,8 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
 /// A flight and the description of its log.
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
-    let info: Info = info(path)?;
+    let mut info = described(path)?;
+    info.findings = findings::of(&recording, info.verdict.as_ref());
     let flight = Flight::of(recording).with(&info);
     Ok((flight, info))
 }

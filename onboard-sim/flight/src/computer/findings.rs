@@ -16,7 +16,7 @@ use crate::estimation::motor_estimate::MotorStage;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Line;
 use crate::rules::phase::{Latch, Phase};
-use crate::vehicle::airframe::{Airframe, MassModel, Servo};
+use crate::vehicle::airframe::{Airframe, Servo};
 
 /// Something that no flight shows as long as its vehicle does what it should.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -186,7 +186,8 @@ impl Findings {
         let watcher = self.watcher.get_or_insert_with(|| Watcher::new(computer, &flown));
         watcher.take(computer, &flown, estimate);
         if flown.contact && computer.pilot().ignited_at_s().is_some() && self.thrust_over_weight.is_none() {
-            self.thrust_over_weight = Some(thrust_over_weight(computer, flown.time_s));
+            let (thrust_n, weight_n) = computer.pilot().thrust_and_weight_n(flown.time_s);
+            self.thrust_over_weight = Some(thrust_n / weight_n);
         }
         for ((sign, lasts_s), watch) in RULES.into_iter().zip(&mut self.watches) {
             let Some(seen) = watcher.seen(sign, computer, &flown, estimate) else {
@@ -225,16 +226,6 @@ impl Findings {
         found.sort_by(|a, b| a.since_s.total_cmp(&b.since_s).then(a.sign.cmp(&b.sign)));
         found
     }
-}
-
-/// Thrust over weight now.
-fn thrust_over_weight(computer: &Computer, time_s: f64) -> f64 {
-    let pilot = computer.pilot();
-    let (mission, burn) = (pilot.mission(), pilot.motor().burn(pilot.curve()));
-    let burning_s = pilot.burning_s(time_s);
-    let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
-    let mass = MassModel::new(&mission.airframe.mass, pilot.curve().propellant_mass_kg()).at(burnt_kg);
-    burning_s.map_or(0.0, |burning_s| burn.thrust_n(burning_s)) / (mass.mass_kg * mission.gravity_m_s2)
 }
 
 /// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a second and drops one sample

@@ -1,9 +1,7 @@
 //! The first screen: how the flight ended, what went wrong, the whole flight, its place and its limits.
 
-use campaign::figure::Span;
-
 use crate::findings::over;
-use crate::info::Info;
+use crate::info::{Info, rounded};
 use crate::log::VerdictLimit;
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::chart::{Chart, Line};
@@ -130,18 +128,13 @@ fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
         vec![
             escaped(&limit.name),
             format!("{:.2} {}", limit.value + 0.0, escaped(&limit.unit)),
-            format!("{} to {}", short(limit.minimum), short(limit.maximum)),
+            format!("{} to {}", rounded(limit.minimum) + 0.0, rounded(limit.maximum) + 0.0),
             bar(limit, share),
             format!("<span class=\"{class}\">{word}</span>"),
         ]
     };
     let rows: Vec<Vec<String>> = worst_first(limits).into_iter().map(row).collect();
     table_of_limits(&[title, "#value", "#limit", "share; the mark is the limit", ""], &rows)
-}
-
-/// Rounds away the error of converting degrees to radians and back.
-fn short(limit: f64) -> String {
-    format!("{}", (1e6 * limit).round() / 1e6 + 0.0)
 }
 
 /// A value's share of its limit, up to half more than it.
@@ -173,6 +166,10 @@ fn height(flight: &Flight) -> String {
         Line { name: "barometer", class: "thin", points: frames.collect() },
         Line { name: "feet", class: "a", points: track.collect() },
     ];
-    let spans: Vec<Span> = flight.spans.clone();
-    Chart { spans, marks: Vec::new(), ..flight.over_time("Height over the whole flight, m", lines) }.svg()
+    Chart {
+        spans: flight.spans.clone(),
+        marks: Vec::new(),
+        ..flight.over_time("Height over the whole flight, m", lines)
+    }
+    .svg()
 }

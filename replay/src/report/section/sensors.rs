@@ -7,7 +7,7 @@ use super::DEGREES;
 use crate::info::Info;
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, escaped, paragraph, table};
-use crate::report::track::Flight;
+use crate::report::track::{Flight, InSpace};
 
 /// The test ratio above which a measurement is refused.
 const REFUSED: f64 = 1.0;
@@ -26,7 +26,6 @@ pub(super) fn sensors(flight: &Flight) -> String {
     let ratios = Chart {
         limits: vec![REFUSED],
         full: true,
-        own_x: false,
         ..flight.over_time("Test ratio of each measurement; above 1 it was refused", lines.collect())
     };
     let sigma = |name, class, place: usize| Line {
@@ -47,13 +46,12 @@ pub(super) fn sensors(flight: &Flight) -> String {
         + &charts(&[
             ratios.svg(),
             flight.over_time("Standard deviations of the estimate", sigmas).svg(),
-            bias(flight),
+            bias(flight, in_space),
         ])
 }
 
 /// The gyro's bias as the flight computer estimates it.
-fn bias(flight: &Flight) -> String {
-    let Some(in_space) = &flight.in_space else { return String::new() };
+fn bias(flight: &Flight, in_space: &InSpace) -> String {
     let axis = |name, class, place: usize| Line {
         name,
         class,

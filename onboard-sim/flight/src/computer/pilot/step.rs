@@ -311,15 +311,20 @@ impl Pilot {
             _ => {}
         }
         if input.contact && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed) {
-            let burning_s = self.model.burning_s(time_s);
-            let mass = self.model.mass_now(burning_s);
-            let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
-            let thrust_below_weight = thrust_n < mass.mass_kg * self.model.mission.gravity_m_s2;
+            let (thrust_n, weight_n) = self.thrust_and_weight_n(time_s);
+            let thrust_below_weight = thrust_n < weight_n;
             self.happen(table, Event::Contact { thrust_below_weight }, time_s);
         }
         if table.mode().motor == Motor::Burning && self.model.burn_is_over(time_s) {
             self.happen(table, Event::Burnout, time_s);
         }
+    }
+
+    /// The motor's thrust as estimated, and the weight, N.
+    pub(in crate::computer) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
+        let burning_s = self.model.burning_s(time_s);
+        let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
+        (thrust_n, self.model.mass_now(burning_s).mass_kg * self.model.mission.gravity_m_s2)
     }
 
     fn consider_ignition(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
