@@ -206,6 +206,13 @@ pub struct Info {
     pub attachments: Vec<AttachmentFacts>,
 }
 
+impl Info {
+    /// That nothing was found, as far as the log goes.
+    pub(crate) fn no_findings(&self) -> &'static str {
+        if self.completeness.cut.is_some() { "none up to where the record ends" } else { "none" }
+    }
+}
+
 /// The version of a log's schema, if it says so, and of this build's.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SchemaFacts {
@@ -371,7 +378,7 @@ pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
     writeln!(output, "{}{size}", shown(&info.file))?;
     print_verdict(info, output)?;
     if info.grade.level == GradeLevel::BitExact {
-        print_findings(info.findings.as_deref(), output)?;
+        print_findings(info, output)?;
     }
     if let Some(timeline) = info.phases.first() {
         row(output, "phases", &phases(timeline))?;
@@ -497,8 +504,8 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn print_findings(findings: Option<&[FindingFacts]>, output: &mut impl Write) -> io::Result<()> {
-    let Some(findings) = findings else {
+fn print_findings(info: &Info, output: &mut impl Write) -> io::Result<()> {
+    let Some(findings) = &info.findings else {
         return row(
             output,
             "findings",
@@ -506,7 +513,7 @@ fn print_findings(findings: Option<&[FindingFacts]>, output: &mut impl Write) ->
         );
     };
     if findings.is_empty() {
-        return row(output, "findings", "none");
+        return row(output, "findings", info.no_findings());
     }
     for (place, finding) in findings.iter().enumerate() {
         let name = if place == 0 { "findings" } else { "" };

@@ -90,6 +90,11 @@ fn a_description_says_what_went_wrong_first_in_time() {
     }
     let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
     assert!(stdout.contains("\nfindings    none\n"), "{stdout}");
+    let cut = LANDED.beside("cut.mcap");
+    let whole = std::fs::read(&LANDED.log).unwrap();
+    std::fs::write(&cut, &whole[..whole.len() / 2]).unwrap();
+    let (_, stdout, _) = run(&mut replay("info", &cut));
+    assert!(stdout.contains("\nfindings    none up to where the record ends\n"), "{stdout}");
 }
 
 /// A log whose decisions this build does not make has no findings, because they would be about other commands.

@@ -74,7 +74,7 @@ fn findings(flight: &Flight, info: &Info) -> String {
             );
     };
     if findings.is_empty() {
-        html += &paragraph("None.");
+        html += &paragraph(info.no_findings());
     }
     html += "<ol class=\"findings\">\n";
     for finding in findings {
