@@ -60,6 +60,8 @@ struct Optimality {
     defect: f64,
     /// Limits and conditions broken, multipliers out of range, slacks times multipliers.
     complementarity: f64,
+    /// Sum of the slacks times multipliers.
+    gap: f64,
     /// Number of inputs at a limit.
     at_limit: usize,
     /// Number of inequalities that hold as equations.
@@ -100,6 +102,7 @@ impl Optimality {
                 worse(&mut found.gradient, input_gradient[i] - lower + upper);
                 for (slack, multiplier) in [(below, lower), (above, upper)] {
                     worse(&mut found.complementarity, slack * multiplier);
+                    found.gap += (slack * multiplier).abs();
                     worse(&mut found.complementarity, slack.min(0.0));
                     worse(&mut found.complementarity, multiplier.min(0.0));
                     found.at_limit += usize::from(slack < NEAR);
@@ -113,6 +116,7 @@ impl Optimality {
             let least = if condition.equality { -model.penalty } else { 0.0 };
             worse(&mut found.complementarity, over * (multiplier - least));
             worse(&mut found.complementarity, under * (model.penalty - multiplier));
+            found.gap += (over * (multiplier - least)).abs() + (under * (model.penalty - multiplier)).abs();
             worse(&mut found.complementarity, (multiplier - least).min(0.0));
             worse(&mut found.complementarity, (model.penalty - multiplier).min(0.0));
             found.held += usize::from(!condition.equality && value.abs() < NEAR);
