@@ -1,7 +1,7 @@
 //! Every page at three sizes and in every theme: nothing is cut, every letter can be read, colour says nothing alone.
 //!
 //! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground --test ground pictures`
-//! also writes those that README.md and CREW.md show, to `ground/pictures`, from the flight that is recorded there:
+//! also writes those that README.md and CREW.md show, the moving one included, to `ground/pictures`, from the flight that is recorded there:
 //! `onboard-sim fly --profile mk2 --start pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and
 //! `ground --auto --connect udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
 
@@ -21,7 +21,7 @@ use protocol::dialect::{
 use ratatui::buffer::Buffer;
 use ratatui::style::Modifier;
 
-use crate::rig::svg::{colours, picture, rgb};
+use crate::rig::svg::{colours, moving_picture, picture, rgb};
 use crate::rig::{Rig, settings};
 use crate::screens::{armed, counting, on_the_pad};
 
@@ -323,8 +323,8 @@ struct Moment {
     height_m: f64,
 }
 
-/// Plays the flight until this holds; `None` plays it to its end.
-fn recorded(until: Option<fn(&Moment) -> bool>) -> Moment {
+/// Plays the flight and shows every moment, until this says that it has seen enough.
+fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/flight.tlog");
     let recording = Recording::load(&path, None, &mut |_| {}).expect("the recorded flight");
     let mut reader = recording.reader().expect("the recorded flight");
@@ -353,44 +353,123 @@ fn recorded(until: Option<fn(&Moment) -> bool>) -> Moment {
                 moment.rig.msg(Msg::Frame(frame));
             }
         }
-        if until.is_some_and(|holds| holds(&moment)) {
+        if enough(&moment) {
             break;
         }
     }
     moment
 }
 
+/// On the pad, with every check passed.
+fn is_ready(moment: &Moment) -> bool {
+    let phase = moment.phase == TdPhase::TD_PHASE_PAD_IDLE;
+    phase && moment.status.checks_failed.is_empty() && moment.rig.model.link.uplink.is_proven(moment.rig.now)
+}
+
 /// The pictures of README.md and CREW.md: on the pad, in the descent, and after the landing.
 fn moments() -> [(&'static str, Palette, Moment); 3] {
-    let ready = |moment: &Moment| {
-        let phase = moment.phase == TdPhase::TD_PHASE_PAD_IDLE;
-        phase
-            && moment.status.checks_failed.is_empty()
-            && moment.rig.model.link.uplink.is_proven(moment.rig.now)
-    };
     let falls = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_AERO_DESCENT && moment.height_m < 220.0;
     [
-        ("pad-light", Palette::Light, recorded(Some(ready))),
-        ("descent-dark", Palette::Dark, recorded(Some(falls))),
-        ("landed-contrast", Palette::Contrast, recorded(None)),
+        ("pad-light", Palette::Light, recorded(is_ready)),
+        ("descent-dark", Palette::Dark, recorded(falls)),
+        ("landed-contrast", Palette::Contrast, recorded(|_| false)),
     ]
+}
+
+/// A picture of the pages is what the screen shows now; `UPDATE_PICTURES` makes it so.
+fn regress(name: &str, svg: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures").join(name);
+    if std::env::var_os("UPDATE_PICTURES").is_some() {
+        fs::write(&path, svg).expect("the folder of the pictures");
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
 }
 
 /// The pictures on the pages are what the screen shows at three moments of one recorded flight.
 #[test]
 fn regress_the_pictures_of_the_pages() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures");
     for (name, palette, moment) in moments() {
-        let (path, svg) =
-            (folder.join(format!("{name}.svg")), picture(&drawn(&moment.rig, SIZES[0], palette)));
-        if std::env::var_os("UPDATE_PICTURES").is_some() {
-            fs::create_dir_all(&folder).unwrap();
-            fs::write(&path, &svg).unwrap();
-        }
-        let kept = fs::read_to_string(&path).unwrap_or_default();
-        assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
+        let svg = picture(&drawn(&moment.rig, SIZES[0], palette));
+        regress(&format!("{name}.svg"), &svg);
         assert!(svg.len() < 30_000, "{name}: {} bytes", svg.len());
     }
+}
+
+/// A screen of the moving picture: how long it is shown, in s, and what the vehicle had sent by then.
+struct Shot {
+    screen: Buffer,
+    shown_s: f64,
+    phase: TdPhase,
+}
+
+/// The phases between the pad and the burn.
+const FLOWN: [TdPhase; 5] = [
+    TdPhase::TD_PHASE_BOOST,
+    TdPhase::TD_PHASE_COAST,
+    TdPhase::TD_PHASE_AERO_DESCENT,
+    TdPhase::TD_PHASE_LAND_ARMED,
+    TdPhase::TD_PHASE_IGNITION,
+];
+
+/// The whole flight: pad and verdict stay long enough to be read, the burn is as slow as it is, the rest twice as fast.
+fn shots() -> Vec<Shot> {
+    let mut shots = Vec::new();
+    let (mut next_at, mut phase_before) = (Duration::ZERO, TdPhase::TD_PHASE_SAFE);
+    let shot = |moment: &Moment, shown_s: f64| Shot {
+        screen: drawn(&moment.rig, SIZES[0], Palette::Dark),
+        shown_s,
+        phase: moment.phase,
+    };
+    let end = recorded(|moment| {
+        let (step_s, shown_s) = match moment.phase {
+            TdPhase::TD_PHASE_PAD_IDLE if is_ready(moment) => (f64::INFINITY, 1.5),
+            TdPhase::TD_PHASE_PAD_ARMED if moment.status.countdown_ms < 2_000 => (1.0, 0.5),
+            TdPhase::TD_PHASE_POWERED => (0.5, 0.5),
+            phase if !FLOWN.contains(&phase) => return false,
+            _ => (1.0, 0.5),
+        };
+        let now = moment.rig.now;
+        if moment.phase != phase_before || now >= next_at {
+            phase_before = moment.phase;
+            next_at = now.saturating_add(Duration::try_from_secs_f64(step_s).unwrap_or(Duration::MAX));
+            shots.push(shot(moment, shown_s));
+        }
+        false
+    });
+    shots.push(shot(&end, 3.0));
+    shots
+}
+
+/// The moving picture of README.md is the whole recorded flight.
+#[test]
+fn regress_the_moving_picture() {
+    let screens: Vec<_> = shots().into_iter().map(|shot| (shot.screen, shot.shown_s)).collect();
+    let svg = moving_picture(&screens);
+    let all_s: f64 = screens.iter().map(|(_, shown_s)| shown_s).sum();
+    regress("flight.svg", &svg);
+    assert!(svg.len() <= 400_000 && !svg.contains("<script"), "{} bytes", svg.len());
+    assert!((12.0..=20.0).contains(&all_s), "{all_s} s");
+}
+
+/// It goes through the phases in order, and every screen of it says what the vehicle had sent.
+#[test]
+fn the_moving_picture_says_what_the_vehicle_sent() {
+    let shots = shots();
+    for shot in &shots {
+        let screen = rows(&shot.screen).join("\n");
+        let phase = match shot.phase {
+            TdPhase::TD_PHASE_PAD_ARMED => "Countdown",
+            phase => ground::model::words::doing(phase),
+        };
+        assert!(screen.contains(&format!(" {phase} ")), "{phase}\n{screen}");
+    }
+    let phases: Vec<_> = shots.iter().map(|shot| shot.phase as u32).collect();
+    assert!(phases.is_sorted(), "{phases:?}");
+    let missing: Vec<_> = FLOWN.iter().filter(|phase| !phases.contains(&(**phase as u32))).collect();
+    assert!(missing.is_empty(), "{missing:?} in {phases:?}");
+    let last = rows(&shots.last().expect("a shot").screen).join("\n");
+    assert!(last.contains("LANDED inside every limit"), "{last}");
 }
 
 /// What the pictures say of phase, abort and height is what the vehicle sent at that moment.

@@ -1,13 +1,19 @@
-//! Draws a screen of a terminal in memory as an SVG picture.
+//! Draws a screen of a terminal in memory as an SVG picture, and several as one that moves.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 /// Pixels of a cell, and where the letters stand in it.
 const CELL: (u16, u16) = (9, 18);
 const BASELINE: u16 = 14;
+
+const UPPER: u8 = 1;
+const LOWER: u8 = 2;
+const BOTH: u8 = UPPER | LOWER;
 
 /// The sixteen colours of a usual terminal.
 const SIXTEEN: [[u8; 3]; 16] = [
@@ -55,81 +61,79 @@ pub(crate) fn colours(cell: &Cell) -> ([u8; 3], [u8; 3]) {
     if cell.modifier.contains(Modifier::REVERSED) { (back, fore) } else { (fore, back) }
 }
 
-/// The quarters of a cell that a block covers, as parts of its width and height; `None` for other characters.
-fn quarters(symbol: &str) -> Option<&'static [(f32, f32, f32, f32)]> {
+/// The quarters that a block covers: of its left and of its right half. `None` for other characters.
+fn quarters(symbol: &str) -> Option<[u8; 2]> {
     Some(match symbol {
-        "█" => &[(0.0, 0.0, 1.0, 1.0)],
-        "▀" => &[(0.0, 0.0, 1.0, 0.5)],
-        "▄" => &[(0.0, 0.5, 1.0, 0.5)],
-        "▌" => &[(0.0, 0.0, 0.5, 1.0)],
-        "▐" => &[(0.5, 0.0, 0.5, 1.0)],
-        "▘" => &[(0.0, 0.0, 0.5, 0.5)],
-        "▝" => &[(0.5, 0.0, 0.5, 0.5)],
-        "▖" => &[(0.0, 0.5, 0.5, 0.5)],
-        "▗" => &[(0.5, 0.5, 0.5, 0.5)],
-        "▚" => &[(0.0, 0.0, 0.5, 0.5), (0.5, 0.5, 0.5, 0.5)],
-        "▞" => &[(0.5, 0.0, 0.5, 0.5), (0.0, 0.5, 0.5, 0.5)],
-        "▙" => &[(0.0, 0.0, 0.5, 1.0), (0.5, 0.5, 0.5, 0.5)],
-        "▛" => &[(0.0, 0.0, 1.0, 0.5), (0.0, 0.5, 0.5, 0.5)],
-        "▜" => &[(0.0, 0.0, 1.0, 0.5), (0.5, 0.5, 0.5, 0.5)],
-        "▟" => &[(0.5, 0.0, 0.5, 1.0), (0.0, 0.5, 0.5, 0.5)],
+        "█" => [BOTH, BOTH],
+        "▀" => [UPPER, UPPER],
+        "▄" => [LOWER, LOWER],
+        "▌" => [BOTH, 0],
+        "▐" => [0, BOTH],
+        "▘" => [UPPER, 0],
+        "▝" => [0, UPPER],
+        "▖" => [LOWER, 0],
+        "▗" => [0, LOWER],
+        "▚" => [UPPER, LOWER],
+        "▞" => [LOWER, UPPER],
+        "▙" => [BOTH, LOWER],
+        "▛" => [BOTH, UPPER],
+        "▜" => [UPPER, BOTH],
+        "▟" => [LOWER, BOTH],
         _ => return None,
     })
 }
 
-/// The screen as a picture. Blocks are drawn as shapes, so that they join whatever the font.
-pub(crate) fn picture(buffer: &Buffer) -> String {
-    let (width, height) = (buffer.area.width * CELL.0, buffer.area.height * CELL.1);
-    let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
-    let page = colours(&buffer.content[0]).1;
-    let svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         font-family=\"DejaVu Sans Mono,Menlo,Consolas,monospace\" font-size=\"15\">\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>\n",
-        hex(page)
-    );
-    let (mut shapes, mut texts) = (String::new(), String::new());
-    for (row, cells) in buffer.content.chunks(usize::from(buffer.area.width)).enumerate() {
-        let y = row as u16 * CELL.1;
+/// What pictures share: a class for each colour. A row is drawn around its base line.
+struct Pen {
+    page: [u8; 3],
+    classes: BTreeMap<[u8; 3], usize>,
+}
+
+impl Pen {
+    fn new(page: [u8; 3]) -> Self {
+        Self { page, classes: BTreeMap::new() }
+    }
+
+    fn class(&mut self, colour: [u8; 3]) -> String {
+        let next = self.classes.len();
+        format!("c{}", self.classes.entry(colour).or_insert(next))
+    }
+
+    /// A row of the screen: backgrounds and blocks as shapes, so that they join whatever the font, then the letters.
+    fn row(&mut self, cells: &[Cell]) -> String {
+        let (mut backs, mut blocks, mut texts) = (String::new(), String::new(), String::new());
         let mut at = 0;
-        for run in cells.chunk_by(|one, next| colours(one) == colours(next) && one.modifier == next.modifier)
-        {
-            let (fore, back) = colours(&run[0]);
-            let (x, columns) = (at * CELL.0, run.len() as u16 * CELL.0);
-            if back != page {
-                let _ = writeln!(
-                    shapes,
-                    "<rect x=\"{x}\" y=\"{y}\" width=\"{columns}\" height=\"{}\" fill=\"{}\"/>",
-                    CELL.1,
-                    hex(back)
+        for run in cells.chunk_by(|one, next| colours(one).1 == colours(next).1) {
+            let back = colours(&run[0]).1;
+            if back != self.page {
+                let (x, width, class) = (at * CELL.0, run.len() as u16 * CELL.0, self.class(back));
+                let height = CELL.1;
+                let _ = write!(
+                    backs,
+                    "<path d=\"M{x}-{BASELINE}h{width}v{height}h-{width}z\" class=\"{class}\"/>"
                 );
             }
-            let mut path = String::new();
-            let mut text = String::new();
-            for (place, cell) in run.iter().enumerate() {
-                let left = f32::from(x + place as u16 * CELL.0);
-                match quarters(cell.symbol()) {
-                    None => text.push_str(cell.symbol()),
-                    Some(parts) => {
-                        text.push(' ');
-                        for (dx, dy, w, h) in parts {
-                            let (w, h) = (w * f32::from(CELL.0), h * f32::from(CELL.1));
-                            let (dx, dy) =
-                                (left + dx * f32::from(CELL.0), f32::from(y) + dy * f32::from(CELL.1));
-                            let _ = write!(path, "M{dx} {dy}h{w}v{h}h-{w}z");
-                        }
-                    }
-                }
-            }
+            at += run.len() as u16;
+        }
+        at = 0;
+        for run in
+            cells.chunk_by(|one, next| colours(one).0 == colours(next).0 && one.modifier == next.modifier)
+        {
+            let class = self.class(colours(&run[0]).0);
+            let halves: Vec<u8> =
+                run.iter().flat_map(|cell| quarters(cell.symbol()).unwrap_or_default()).collect();
+            let path = path(&halves, at);
             if !path.is_empty() {
-                let _ = writeln!(shapes, "<path d=\"{path}\" fill=\"{}\"/>", hex(fore));
+                let _ = write!(blocks, "<path d=\"{path}\" class=\"{class}\"/>");
             }
+            let letter =
+                |cell: &Cell| if quarters(cell.symbol()).is_some() { " " } else { cell.symbol() }.to_owned();
+            let text: String = run.iter().map(letter).collect();
             let begin = text.len() - text.trim_start().len();
             let trimmed = text.trim();
             if !trimmed.is_empty() {
-                let (x, length) = (x + begin as u16 * CELL.0, trimmed.chars().count() as u16 * CELL.0);
-                let bold =
-                    if run[0].modifier.contains(Modifier::BOLD) { " font-weight=\"bold\"" } else { "" };
+                let (x, length) = (at + begin as u16, trimmed.chars().count() as u16 * CELL.0);
+                let bold = if run[0].modifier.contains(Modifier::BOLD) { " b" } else { "" };
                 // Several spaces would become one.
                 let escaped = trimmed
                     .replace(' ', "\u{a0}")
@@ -138,15 +142,114 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
                     .replace('>', "&gt;");
                 let stretched =
                     if length > CELL.0 { format!(" textLength=\"{length}\"") } else { String::new() };
-                let _ = writeln!(
-                    texts,
-                    "<text x=\"{x}\" y=\"{}\"{stretched} fill=\"{}\"{bold}>{escaped}</text>",
-                    y + BASELINE,
-                    hex(fore)
-                );
+                let x = x * CELL.0;
+                let _ = write!(texts, "<text x=\"{x}\"{stretched} class=\"{class}{bold}\">{escaped}</text>");
             }
             at += run.len() as u16;
         }
+        backs + &blocks + &texts
     }
-    svg + &shapes + &texts + "</svg>\n"
+
+    /// The file around what was drawn.
+    fn file(&self, size: Rect, style: &str, drawn: &str) -> String {
+        let (width, height) = (size.width * CELL.0, size.height * CELL.1);
+        let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+        let mut fills = String::new();
+        for (colour, class) in &self.classes {
+            let _ = write!(fills, ".c{class}{{fill:{}}}", hex(*colour));
+        }
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+             font-family=\"DejaVu Sans Mono,Menlo,Consolas,monospace\" font-size=\"15\">\n\
+             <style>{fills}.b{{font-weight:bold}}{style}</style>\n\
+             <rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>\n{drawn}</svg>\n",
+            hex(self.page)
+        )
+    }
+}
+
+/// Outlines of the halves of cells that are covered alike, from this column on.
+fn path(halves: &[u8], column: u16) -> String {
+    let half = f32::from(CELL.0) / 2.0;
+    let mut path = String::new();
+    let mut at = 0;
+    for run in halves.chunk_by(|one, next| one == next) {
+        let (x, width) = (f32::from(column * CELL.0) + f32::from(at) * half, run.len() as f32 * half);
+        let (top, height) = match run[0] {
+            UPPER => (i32::from(BASELINE), CELL.1 / 2),
+            LOWER => (i32::from(BASELINE) - i32::from(CELL.1 / 2), CELL.1 / 2),
+            _ => (i32::from(BASELINE), CELL.1),
+        };
+        if run[0] != 0 {
+            let _ = write!(path, "M{x}-{top}h{width}v{height}h-{width}z");
+        }
+        at += run.len() as u16;
+    }
+    path
+}
+
+fn rows(buffer: &Buffer) -> impl Iterator<Item = (u16, &[Cell])> {
+    let cells = buffer.content.chunks(usize::from(buffer.area.width));
+    cells.enumerate().map(|(row, cells)| (row as u16 * CELL.1 + BASELINE, cells))
+}
+
+/// The screen as a picture.
+pub(crate) fn picture(buffer: &Buffer) -> String {
+    let mut pen = Pen::new(colours(&buffer.content[0]).1);
+    let mut drawn = String::new();
+    for (y, cells) in rows(buffer) {
+        let row = pen.row(cells);
+        if !row.is_empty() {
+            let _ = writeln!(drawn, "<g transform=\"translate(0,{y})\">{row}</g>");
+        }
+    }
+    pen.file(buffer.area, "", &drawn)
+}
+
+/// Screens one after the other, each for its time in s, again and again. A row that several show is stored once. Who asks for
+/// less motion, and a program that knows no motion, shows the last.
+pub(crate) fn moving_picture(screens: &[(Buffer, f64)]) -> String {
+    let (last, _) = screens.last().expect("a screen");
+    let mut pen = Pen::new(colours(&last.content[0]).1);
+    let (mut kept, mut frames): (BTreeMap<String, usize>, _) = (BTreeMap::new(), String::new());
+    let all_s: f64 = screens.iter().map(|(_, shown_s)| shown_s).sum();
+    let (mut defined, mut motion, mut from_s) = (String::new(), String::new(), 0.0);
+    for (number, (buffer, shown_s)) in screens.iter().enumerate() {
+        let _ = write!(frames, "<g id=\"f{number}\" class=\"f\">");
+        for (y, cells) in rows(buffer) {
+            let row = pen.row(cells);
+            if row.is_empty() {
+                continue;
+            }
+            let next = kept.len();
+            let id = *kept.entry(row).or_insert_with_key(|row| {
+                let _ = writeln!(defined, "<g id=\"r{next}\">{row}</g>");
+                next
+            });
+            let _ = write!(frames, "<use href=\"#r{id}\" y=\"{y}\"/>");
+        }
+        frames.push_str("</g>\n");
+        let percent = |at_s: f64| format!("{:.2}%", 100.0 * at_s / all_s);
+        let until_s = from_s + shown_s;
+        // Before and after its time a frame is hidden.
+        let before = if number == 0 { "" } else { "0%{visibility:hidden}" };
+        let after = if number + 1 == screens.len() {
+            String::new()
+        } else {
+            percent(until_s) + "{visibility:hidden}"
+        };
+        let from = percent(from_s);
+        let _ = writeln!(
+            motion,
+            "@keyframes k{number}{{{before}{from}{{visibility:visible}}{after}}}\
+             #f{number}{{animation:k{number} {all_s}s step-end infinite}}"
+        );
+        from_s = until_s;
+    }
+    let shown = screens.len() - 1;
+    let style = format!(
+        ".f{{visibility:hidden}}#f{shown}{{visibility:visible}}\n\
+         @media (prefers-reduced-motion:no-preference){{\n{motion}}}"
+    );
+    pen.file(last.area, &style, &format!("<defs>\n{defined}</defs>\n{frames}"))
 }
