@@ -64,6 +64,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         MavMessage::TD_PAD_CHECK(data) => {
             vehicle.pad_check = Some(PadCheck::with(vehicle.pad_check.take(), data, now));
         }
+        MavMessage::TD_FINDING(data) => vehicle.findings.take(data, name(&data.text[..])),
         _ => {}
     }
     // The flight may have passed unheard: what comes after it shows that it was.

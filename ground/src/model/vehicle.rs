@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use mavlink::{MavlinkVersion, Message as _, MessageData};
 use protocol::dialect::{
-    MavMessage, PARAM_VALUE_DATA, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TdInterlock, TdPhase, TdRole,
+    MavMessage, PARAM_VALUE_DATA, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
 
@@ -137,6 +137,8 @@ pub struct Vehicle {
     pub operators: BTreeMap<u8, (TdRole, String)>,
     /// `TD_PAD_CHECK`: the last check on the pad.
     pub pad_check: Option<PadCheck>,
+    /// `TD_FINDING`: what the vehicle says went wrong in its flight.
+    pub findings: Findings,
     /// The recent change of its velocity.
     pub trend: Trend,
     /// The path it flew.
@@ -150,6 +152,33 @@ pub struct Vehicle {
     pub(crate) before: Option<Sample<KeepAway>>,
     /// The vehicle with another autopilot that was heard under this id.
     pub foreign: Option<Foreign>,
+}
+
+/// What the vehicle says went wrong in its flight, as far as it has arrived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Findings {
+    /// How many there are; `None` if the vehicle has not said so, which it does after the flight if there is none.
+    pub count: Option<u8>,
+    /// When each began, s since the release, and a short sentence, by its place.
+    arrived: BTreeMap<u8, (f64, String)>,
+}
+
+impl Findings {
+    /// Takes a message with its text as it can be shown.
+    pub(super) fn take(&mut self, message: &TD_FINDING_DATA, words: String) {
+        self.count = Some(message.found);
+        if message.place < message.found {
+            self.arrived.insert(message.place, (f64::from(message.since_s), words));
+        }
+    }
+
+    /// Those that have arrived, first in time: T+ in seconds and a short sentence.
+    pub fn in_time(&self) -> Vec<(f64, &str)> {
+        let mut all: Vec<_> =
+            self.arrived.values().map(|(since_s, words)| (*since_s, words.as_str())).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all
+    }
 }
 
 impl Vehicle {

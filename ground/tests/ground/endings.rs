@@ -279,3 +279,29 @@ fn a_hold_in_the_silence_takes_the_warning_back() {
     rig.run(60.0);
     assert!(!rig.screen(80, 24).contains("IN THE AIR"), "{}", rig.screen(80, 24));
 }
+
+/// The review begins with what the vehicle found, first in time; what has not arrived is said.
+#[test]
+fn the_review_says_what_went_wrong() {
+    let sink = TdLimit::TD_LIMIT_AXIAL_SPEED;
+    let mut rig = judged([2.4, 0.3], false, sink, TdChute::TD_CHUTE_STOWED);
+    rig.key(Key::Char('4'));
+    assert!(!rig.screen(120, 36).contains("what went wrong"), "an older vehicle says nothing of it");
+    rig.finding(1, 3, 15.75, "landing motor's impulse 0.867 of the mission's");
+    rig.finding(0, 3, 21.5, "no plan that lands for 1.2 s\u{1b}[2J");
+    for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
+        let screen = rig.screen(columns, rows);
+        let [impulse, plan, more] =
+            ["T+15.8", "T+21.5", "1 more not heard yet"].map(|part| screen.find(part));
+        assert!(impulse.is_some() && impulse < plan && plan < more, "{screen}");
+        assert!(screen.contains("what went wrong") && screen.contains("landing motor's"), "{screen}");
+        assert!(!screen.contains('\u{1b}'), "{screen}");
+    }
+    rig.finding(2, 3, 25.0, "battery down to 6.50 V");
+    assert!(!rig.screen(120, 36).contains("not heard yet"));
+
+    let mut rig = judged([0.4, 0.1], true, TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
+    rig.finding(0, 0, 0.0, "");
+    rig.key(Key::Char('4'));
+    assert!(rig.screen(120, 36).contains("nothing but what the verdict says"), "{}", rig.screen(120, 36));
+}

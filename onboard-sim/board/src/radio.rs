@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use flight::computer::findings::Findings;
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, Output};
@@ -45,6 +46,7 @@ pub(crate) struct Crewed {
     silent_frames: u32,
     name: MissionName,
     sensors: SensorWatch,
+    findings: Findings,
     parachute_ejected: bool,
     /// For the next frame.
     heard: UplinkState,
@@ -71,6 +73,7 @@ impl Crewed {
             silent_frames: 0,
             name,
             sensors: SensorWatch::default(),
+            findings: Findings::default(),
             parachute_ejected: false,
         }
     }
@@ -96,6 +99,7 @@ impl Crewed {
             Sensed::Known(_) => None,
         };
         self.sensors.take(measured, input.frame);
+        self.findings.note(computer);
         self.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
         let flown = VehicleState {
             computer,
@@ -103,6 +107,7 @@ impl Crewed {
             name: &self.name,
             operators: &[],
             sensors: &self.sensors,
+            findings: &self.findings,
             battery: input.battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
             rehearsed: None,
             parachute_ejected: self.parachute_ejected,

@@ -1,10 +1,12 @@
-//! The messages that are sent periodically, and their rates; and the values of a check on the pad, one after the other.
+//! The messages that are sent periodically, and their rates; and the values of a check on the pad and what went wrong in the
+//! flight, one after the other.
 
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use flight::computer::pad_check::CheckState;
+use flight::rules::phase::Phase;
 use mavlink::MessageData;
 use protocol::dialect::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA,
@@ -521,6 +523,41 @@ impl CheckReporter {
         let often = check.is_running() || self.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
         Some(telemetry::pad_check(check, place, vehicle.time_s))
+    }
+}
+
+// Tells the stations what went wrong in the flight, in the same way.
+
+/// Whose turn it is.
+#[derive(Debug, Default)]
+pub(super) struct FindingReporter {
+    place: usize,
+    due_s: f64,
+    /// How many findings there were when the last one was told.
+    found: usize,
+}
+
+impl FindingReporter {
+    /// The message to send now.
+    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, now_s: f64) -> Option<MavMessage> {
+        let found = vehicle.findings.as_found().len();
+        let flew = vehicle.computer.released_at_s().is_some();
+        let over =
+            flew && (vehicle.input().contact || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed));
+        // A new one does not wait.
+        let is_new = found > self.found;
+        if (found == 0 && !over) || (now_s < self.due_s && !is_new) {
+            return None;
+        }
+        if is_new {
+            self.place = self.found;
+        } else if self.place >= found {
+            self.place = 0;
+        }
+        let place = self.place;
+        (self.place, self.due_s) = (place + 1, now_s + SELDOM_S);
+        self.found = self.found.max(found.min(place + 1));
+        Some(telemetry::finding(vehicle.findings, place, vehicle.time_s))
     }
 }
 

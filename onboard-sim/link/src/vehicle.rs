@@ -2,6 +2,7 @@
 
 use alloc::string::String;
 
+use flight::computer::findings::Findings;
 use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown_m};
 use flight::computer::{Computer, Input};
 use flight::estimation::estimator::Estimate;
@@ -103,6 +104,8 @@ pub struct VehicleState<'a> {
     /// Who may command; empty without operators.
     pub operators: &'a [Operator],
     pub sensors: &'a SensorWatch,
+    /// What went wrong so far.
+    pub findings: &'a Findings,
     /// `None` where its voltage is not measured.
     pub battery: Option<BatteryFacts>,
     /// What the rehearsal found, where there was one.

@@ -128,6 +128,10 @@ fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
 
 /// Columns of a phase with its time.
 const TIMELINE_COLUMNS: usize = 24;
+/// Columns of the time before a finding.
+const FINDING_TIME_COLUMNS: usize = 10;
+
+const FINDINGS_TITLE: &str = "what went wrong";
 
 /// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -156,7 +160,16 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         draw_height(model, theme, now, frame, inside);
     };
     if room == Room::Small {
-        let [left, right] = columns(area, [Fill(6), Fill(5)]);
+        let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
+        let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
+        if model.vehicle.findings.count.is_some_and(|count| count > 0) {
+            // What went wrong first: half of the panel's height at most, or all of it where the map has no room.
+            let wanted = u16::try_from(found.len()).unwrap_or(u16::MAX).saturating_add(2);
+            let most = if area.height < 14 { area.height } else { area.height / 2 };
+            let [above, below] = rows(right, [Length(wanted.min(most)), Fill(1)]);
+            table(FINDINGS_TITLE, &found, theme, frame, above);
+            right = below;
+        }
         let [limits, below] = rows(left, [Length(LIMIT_ROWS.min(area.height)), Fill(1)]);
         bars::draw_limits(model, theme, now, frame, limits);
         if below.height > 5 {
@@ -175,8 +188,13 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     map(model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
     bars::draw_limits(model, theme, now, frame, left);
-    let (title, maxima) = maxima(model, theme, now);
-    table(title, &maxima, theme, frame, middle);
+    let found = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
+    let (title, greatest) = maxima(model, theme, now);
+    if found.is_empty() {
+        table(title, &greatest, theme, frame, middle);
+    } else {
+        table(FINDINGS_TITLE, &found, theme, frame, middle);
+    }
     events(model, theme, frame, right);
 }
 
@@ -193,12 +211,41 @@ pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
     };
     let mut lines = vec![theme.line(format!(" {words}"), role), theme.line(title, TextRole::Title)];
     lines.extend(limits);
+    let found = findings(model, theme, columns);
+    if !found.is_empty() {
+        lines.push(theme.line(format!(" {FINDINGS_TITLE}"), TextRole::Title));
+        lines.extend(found);
+    }
     let (title, maxima) = maxima(model, theme, now);
     lines.push(theme.line(format!(" {title}"), TextRole::Title));
     lines.extend(unheard(model, now).map(|words| theme.line(format!(" {words}"), TextRole::Caution)));
     lines.extend(maxima);
     lines.push(theme.line(" Timeline", TextRole::Title));
     lines.extend(timeline(model, theme, columns));
+    lines
+}
+
+/// What the vehicle says went wrong, each with its T+; nothing if it has not said anything of it.
+fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    let findings = &model.vehicle.findings;
+    let Some(count) = findings.count else { return Vec::new() };
+    if count == 0 {
+        return vec![theme.line(" nothing but what the verdict says", TextRole::Label)];
+    }
+    let arrived = findings.in_time();
+    let missing = usize::from(count).saturating_sub(arrived.len());
+    let room = columns.saturating_sub(FINDING_TIME_COLUMNS).max(8);
+    let mut lines = Vec::new();
+    for (since_s, words) in arrived {
+        let time = format!(" T+{:<7}", fixed(since_s, 1));
+        for (row, part) in lists::wrap(words, room).into_iter().enumerate() {
+            let time = if row == 0 { time.clone() } else { " ".repeat(FINDING_TIME_COLUMNS) };
+            lines.push(Line::from(vec![theme.label(time), theme.span(part, TextRole::Caution)]));
+        }
+    }
+    if missing > 0 {
+        lines.push(theme.line(format!(" {missing} more not heard yet"), TextRole::Label));
+    }
     lines
 }
 

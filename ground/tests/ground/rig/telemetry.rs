@@ -1,9 +1,11 @@
 //! The telemetry of the vehicle of a rig.
 
+use mavlink::types::CharArray;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA, TD_DESCENT_DATA,
-    TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdBooster, TdChute, TdControlLevel, TdLimit, TdMotor, TdSolverStatus,
+    TD_FINDING_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdBooster, TdChute, TdControlLevel, TdLimit,
+    TdMotor, TdSolverStatus,
 };
 
 use super::Rig;
@@ -228,6 +230,20 @@ impl Rig {
     /// A landing at this distance from the pad, m.
     pub(crate) fn verdict_at(&mut self, x_m: f32) {
         self.contact([x_m, 1.554, -0.058, 0.029, -0.0078], true, TdLimit::empty());
+    }
+
+    /// What went wrong: the finding at this place of so many.
+    pub(crate) fn finding(&mut self, place: u8, found: u8, since_s: f32, text: &str) {
+        let mut characters = [0; 96];
+        characters[..text.len()].copy_from_slice(text.as_bytes());
+        self.hear(&MavMessage::TD_FINDING(TD_FINDING_DATA {
+            time_boot_ms: self.boot_ms(),
+            since_s,
+            held_s: 1.0,
+            place,
+            found,
+            text: CharArray::new(characters),
+        }));
     }
 
     /// A verdict with the values at contact: distance, pitch, speeds, rate.

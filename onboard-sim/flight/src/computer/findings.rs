@@ -220,6 +220,11 @@ impl Findings {
         }
     }
 
+    /// What was found so far, in the order in which it was found: a finding keeps its place.
+    pub fn as_found(&self) -> &[Finding] {
+        &self.found
+    }
+
     /// What was found so far, first in time.
     pub fn found(&self) -> Vec<Finding> {
         let mut found = self.found.clone();
@@ -363,7 +368,9 @@ impl Watcher {
             self.gate = computer.pilot().gate_check_that_fails(computer.mode(), flown);
         }
         let nose_up = estimate.state.nose_in_world().z;
-        let near = estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up && nose_up > LIDAR_COS_TILT;
+        let near = has_sensors(flown)
+            && estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up
+            && nose_up > LIDAR_COS_TILT;
         self.down |= flown.contact && !phase.before_apogee();
         self.astray |= phase.in_landing_burn() && nose_up < ASTRAY_COS_TILT;
         self.must_see_s = if near { self.must_see_s.or(Some(time_s)) } else { None };
@@ -374,12 +381,11 @@ impl Watcher {
         let (phase, time_s) = (computer.mode().phase, flown.time_s);
         let pilot = computer.pilot();
         let mission = pilot.mission();
-        let has_sensors = matches!(flown.sensed, Sensed::Measured(_));
         let in_air = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down;
         let now = |value: f64, beside| Seen { since_s: time_s, size: value, value, beside, detail: "" };
         let silent = |since_s: f64, longest_s: f64, beside: f64| {
             let silent_s = time_s - since_s;
-            (in_air && has_sensors && silent_s > longest_s)
+            (in_air && has_sensors(flown) && silent_s > longest_s)
                 .then_some(Seen { since_s, ..now(silent_s, beside) })
         };
         match sign {
@@ -400,6 +406,11 @@ impl Watcher {
             _ => None,
         }
     }
+}
+
+/// Without a model of sensors the state is known, and none of them can fail.
+fn has_sensors(flown: &Input<'_>) -> bool {
+    matches!(flown.sensed, Sensed::Measured(_))
 }
 
 /// A sign that only a vehicle in the air has.
@@ -454,7 +465,8 @@ fn seen_in_flight(
             let burnt_kg = 0.5 * booster.motor_curve.propellant_mass_kg();
             let mass_kg = mission.airframe.mass.loaded_kg + booster.dry_kg + burnt_kg;
             let share = watcher.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
-            (mode.phase == Phase::Coast && share < ASCENT_WEAK).then(|| now(share, 1.0))
+            let felt = has_sensors(flown) && mode.phase == Phase::Coast;
+            (felt && share < ASCENT_WEAK).then(|| now(share, 1.0))
         }
         Sign::Separation => (flown.booster_attached && watcher.parted_s.is_some()).then(|| now(1.0, 0.0)),
         Sign::Parachute => {

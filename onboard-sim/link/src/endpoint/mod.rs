@@ -41,7 +41,7 @@ use self::requests::{Answered, Refusals, Waiting, Warnings};
 use crate::commands::Command;
 pub use crate::stations::Path;
 use crate::stations::{Sender, Stations};
-use crate::streams::{CheckReporter, Streams};
+use crate::streams::{CheckReporter, FindingReporter, Streams};
 use crate::vehicle::{Identity, VehicleKind, VehicleState};
 use crate::{commands, telemetry};
 
@@ -84,6 +84,7 @@ pub struct VehicleEndpoint {
     aborted_at_s: Option<f64>,
     files: FileService,
     check_teller: CheckReporter,
+    finding_teller: FindingReporter,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -155,6 +156,7 @@ impl VehicleEndpoint {
             aborted_at_s: None,
             files: FileService::default(),
             check_teller: CheckReporter::default(),
+            finding_teller: FindingReporter::default(),
         }
     }
 
@@ -303,7 +305,9 @@ impl VehicleEndpoint {
                 lane.tell_of_uplink(message.clone());
             }
         }
-        if let Some(message) = self.check_teller.due(vehicle, self.now_s) {
+        let in_turn =
+            [self.check_teller.due(vehicle, self.now_s), self.finding_teller.due(vehicle, self.now_s)];
+        for message in in_turn.into_iter().flatten() {
             for lane in &mut self.lanes {
                 // A lane without room loses this one: every value comes again.
                 lane.request(vec![message.clone()]);

@@ -33,8 +33,8 @@ use protocol::dialect::{
 use protocol::identity::GIT_COMMIT;
 use protocol::mission::MissionHash;
 
-pub(crate) use self::ours::pad_check;
 pub use self::ours::td_phase;
+pub(crate) use self::ours::{finding, pad_check};
 use crate::vehicle::{Identity, VehicleKind, VehicleState};
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.

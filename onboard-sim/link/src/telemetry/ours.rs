@@ -1,6 +1,7 @@
 //! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew and check on the pad.
 
 use flight::computer::crew::People;
+use flight::computer::findings::Findings;
 use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
 use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::operator::{Operator, Role};
@@ -11,11 +12,11 @@ use flight::vehicle::mission::StartPoint;
 use mavlink::types::CharArray;
 use num_traits::FromPrimitive as _;
 use protocol::dialect::{
-    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
-    TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct, TdCheck, TdControlLevel,
-    TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict,
-    TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
+    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct,
+    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState,
+    TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
@@ -310,6 +311,22 @@ pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
         role,
         name: CharArray::new(*operator.name.bytes()),
     }))
+}
+
+/// What went wrong in the flight: the finding at this place, or that there is none.
+pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64) -> MavMessage {
+    let found = findings.as_found();
+    let mut data = TD_FINDING_DATA {
+        time_boot_ms: boot_ms(time_s),
+        found: u8::try_from(found.len()).unwrap_or(u8::MAX),
+        ..TD_FINDING_DATA::default()
+    };
+    if let Some(finding) = found.get(place) {
+        (data.since_s, data.held_s) = (finding.since_s as f32, finding.held_s as f32);
+        data.place = u8::try_from(place).unwrap_or(u8::MAX);
+        data.text = characters(&finding.words());
+    }
+    MavMessage::TD_FINDING(data)
 }
 
 // The last check of the vehicle on its pad, value by value.

@@ -9,6 +9,7 @@ mod ground;
 use std::time::Duration;
 
 use flight::computer::crew::{Answer, People, Request};
+use flight::computer::findings::Findings;
 use flight::computer::news::{CrewMessage, Severity};
 use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
@@ -41,6 +42,7 @@ pub struct RocketFlight {
 pub struct Vehicle {
     sortie: Sortie,
     sensors: SensorWatch,
+    findings: Findings,
     /// How long the last plan took, s.
     took_s: f64,
     /// A frame of the flight computer was flown in the air just now.
@@ -94,6 +96,7 @@ impl Vehicle {
         Ok(Self {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             sensors: SensorWatch::default(),
+            findings: Findings::default(),
             took_s: 0.0,
             flown: false,
             pin_out: false,
@@ -182,6 +185,7 @@ impl Vehicle {
         let flying = self.computer().released_at_s().is_some();
         self.flown = flying && !released && !self.ground.is_over(self.sortie.computer());
         self.sensors.take(self.sortie.measured(), self.sortie.frame());
+        self.findings.note(self.sortie.computer());
         events.extend(self.events_of_the_simulation(released));
         VehicleStep { events, answers }
     }
@@ -226,6 +230,7 @@ impl Vehicle {
             name: &self.mission,
             operators: &self.operators,
             sensors: &self.sensors,
+            findings: &self.findings,
             battery: Some(BatteryFacts {
                 volts: battery.volts(),
                 current_a: Some(battery.current_a()),

@@ -177,6 +177,36 @@ fn in_the_descent_the_band_is_told_four_times_a_second() {
     assert!(healthy);
 }
 
+fn findings(sent: &[Frame]) -> Vec<(u8, u8, String)> {
+    let decoded = sent.iter().filter_map(|frame| frame.decode().ok());
+    let findings = decoded.filter_map(|message| match message {
+        MavMessage::TD_FINDING(finding) => Some(finding),
+        _ => None,
+    });
+    findings.map(|found| (found.place, found.found, String::from(found.text.to_str().unwrap()))).collect()
+}
+
+/// The station hears what went wrong while it happens and, after the landing, again and again.
+#[test]
+fn what_went_wrong_is_told() {
+    let mut airborne = Airborne::let_go_with_faults("field", &["gnss-out@1"]);
+    let sent = airborne.run_while(|rocket| rocket.phase() != Phase::Touchdown);
+    let lost = "GNSS lost for";
+    let first = findings(&sent).into_iter().next().unwrap();
+    assert!((first.0, first.1) == (0, 1) && first.2.starts_with(lost), "{first:?}");
+    let after = findings(&airborne.run(10.0));
+    let count = usize::from(after[0].1);
+    assert!((9..=11).contains(&after.len()), "{after:?}");
+    assert!((0..count).all(|place| after.iter().any(|told| usize::from(told.0) == place)), "{after:?}");
+
+    // Here are no sensors that could be silent.
+    let mut airborne = Airborne::let_go("none");
+    let mut sent = airborne.run_while(|rocket| rocket.phase() != Phase::Touchdown);
+    sent.extend(airborne.run(3.0));
+    let told = findings(&sent);
+    assert!(told.len() >= 3 && told.iter().all(|told| *told == (0, 0, String::new())), "{told:?}");
+}
+
 #[test]
 fn the_landing_burn_tells_its_plan() {
     let mut airborne = Airborne::let_go("none");
