@@ -153,7 +153,7 @@ impl Screen {
     pub fn bell(&mut self) {
         if self.bell {
             // Writing to a buffer in memory cannot fail.
-            let _ = io::Write::write_all(&mut self.terminal.backend_mut().0, b"\x07");
+            let _ = io::Write::write_all(&mut self.terminal.backend_mut().terminal, b"\x07");
             self.writer.send();
         }
     }
@@ -221,7 +221,7 @@ fn take_terminal() -> io::Result<(Terminal<Thrifty<FrameBuffer>>, TerminalWriter
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
-    Ok((Terminal::new(Thrifty(CrosstermBackend::new(buffer)))?, writer))
+    Ok((Terminal::new(Thrifty::new(CrosstermBackend::new(buffer)))?, writer))
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

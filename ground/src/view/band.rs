@@ -145,9 +145,12 @@ pub fn draw_band(
         let columns = width(item, other_size);
         let at = Rect { x, width: columns, ..band }.intersection(band);
         letters(item, other_size, theme, frame, at);
-        let under = 1 + other_size.rows;
-        let trend = Rect { y: band.y + under, height: rows.saturating_sub(under), ..at };
-        draw_trend(model, item, theme, now, frame, trend);
+        // At 80x24 the line is a slow one, and every cell of a trend changes all the time.
+        if room != Room::Small {
+            let under = 1 + other_size.rows;
+            let trend = Rect { y: band.y + under, height: rows.saturating_sub(under), ..at };
+            draw_trend(model, item, theme, now, frame, trend);
+        }
         x += columns + gap;
     }
     rest
