@@ -14,7 +14,7 @@ use simulated_vehicle::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;
-use crate::model::{Amount, Bindings, Degrees, words};
+use crate::model::words;
 use crate::view::theme::Palette;
 
 /// The profile that the demonstration flies by default.
@@ -23,9 +23,10 @@ const DEMO_SEED: u64 = 1;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
-/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from apogee to touchdown,
+/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its pad to touchdown,
 /// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
-/// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended.
+/// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended. Colours,
+/// keys, voice and bell stand in the settings (`ground config example`).
 #[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = exit::HELP, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -35,9 +36,6 @@ pub struct Cli {
 
     #[command(flatten)]
     pub station: StationArgs,
-
-    #[command(flatten)]
-    pub screen: ScreenArgs,
 
     /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
     /// touchdown-*.mcap in the current directory.
@@ -135,14 +133,6 @@ pub struct StationArgs {
     #[arg(long, value_name = "FILE")]
     pub checklist: Option<PathBuf>,
 
-    /// Where the pad is, for maps of a lost vehicle: latitude,longitude in degrees.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
-    pub pad: Option<Degrees>,
-
-    /// Where this station is, for the way to a lost vehicle: latitude,longitude in degrees.
-    #[arg(long, value_name = "LAT,LON", allow_hyphen_values = true)]
-    pub here: Option<Degrees>,
-
     /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
@@ -176,45 +166,9 @@ pub struct StationArgs {
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub watchers: Option<String>,
 
-    /// Command to run with `sh -c` when an alarm is raised, with its text in $TOUCHDOWN_ALARM; or `none`.
-    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new())]
-    pub alarm_command: Option<String>,
-
     /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
     #[arg(long)]
     pub auto: bool,
-}
-
-/// What a screen shows, says and takes.
-#[derive(Debug, Clone, Args)]
-pub struct ScreenArgs {
-    /// Ring the terminal's bell on an alarm. Default: true.
-    #[arg(long, value_name = "true|false")]
-    pub bell: Option<bool>,
-
-    /// What the terminal can show. Default: auto, by LC_ALL, LC_CTYPE, LANG and TERM.
-    #[arg(long, value_name = "WHICH")]
-    pub characters: Option<Characters>,
-
-    /// Colours. Default: auto, by NO_COLOR, TERM, COLORTERM and COLORFGBG.
-    #[arg(long, value_name = "WHICH")]
-    pub theme: Option<ThemeChoice>,
-
-    /// Command that speaks each line of its standard input, split at spaces, without a shell; or `none`.
-    #[arg(long, value_name = "COMMAND|none", value_parser = NonEmptyStringValueParser::new())]
-    pub voice: Option<String>,
-
-    /// How much is called out. Default: normal.
-    #[arg(long, value_name = "HOW_MUCH")]
-    pub talk: Option<Amount>,
-
-    /// The least time between two heights that are called out. Default: 1.5.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    pub talk_every_s: Option<Seconds>,
-
-    /// Other keys for actions, as in theme=w,path=m; the key : lists every action.
-    #[arg(long, value_name = "ACTION=KEY,...")]
-    pub keys: Option<Bindings>,
 }
 
 /// The commands of `ground` besides a station with its screen.
@@ -227,9 +181,6 @@ pub enum Command {
     Daemon {
         #[command(flatten)]
         station: Box<StationArgs>,
-        /// Fly the demonstration even if the settings name a link.
-        #[arg(long, conflicts_with = "connect")]
-        demo: bool,
     },
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
     #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
@@ -246,17 +197,13 @@ pub enum Command {
     #[command(after_help = "Example: ground status")]
     Status,
     /// End a station. This is refused while its vehicle is armed or in flight.
-    #[command(after_help = "Example: ground stop")]
+    #[command(after_help = "Examples:\n  ground stop\n  ground stop --force")]
     Stop {
         /// End it even while the vehicle is armed or in flight; the vehicle is not affected.
         #[arg(long)]
         force: bool,
         #[command(flatten)]
         socket: SocketArgs,
-        #[command(flatten)]
-        operator: OperatorArgs,
-        #[command(flatten)]
-        config: ConfigArgs,
     },
     /// Check the settings file or print an example.
     #[command(after_help = "Example: ground config check")]
@@ -289,8 +236,6 @@ pub struct AttachArgs {
     pub socket: SocketArgs,
     #[command(flatten)]
     pub operator: OperatorArgs,
-    #[command(flatten)]
-    pub screen: ScreenArgs,
     #[command(flatten)]
     pub config: ConfigArgs,
 }
@@ -334,6 +279,8 @@ pub struct Demonstration<'a> {
     pub start: Option<StartPoint>,
     pub seed: u64,
     pub speed: Speed,
+    /// Nobody has named a mission, so nobody waits for the countdown that it says.
+    pub counts_down_quickly: bool,
 }
 
 impl LinkArgs {
@@ -356,6 +303,7 @@ impl StationArgs {
             start: self.start,
             seed: self.seed.unwrap_or(DEMO_SEED),
             speed: self.speed.unwrap_or(Speed::Factor(1.0)),
+            counts_down_quickly: self.profile.is_none() && self.mission.is_none(),
         }
     }
 
@@ -548,8 +496,18 @@ mod tests {
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap().station;
-        let expected = Demonstration { profile: "mk2", start: None, seed: 1, speed: Speed::Factor(1.0) };
-        assert_eq!(demo.demonstration(), expected, "the mission itself");
+        let expected = Demonstration {
+            profile: "mk2",
+            start: None,
+            seed: 1,
+            speed: Speed::Factor(1.0),
+            counts_down_quickly: true,
+        };
+        assert_eq!(demo.demonstration(), expected);
+        for named in ["--profile", "--mission"] {
+            let named = Cli::try_parse_from(["ground", named, "mk2"]).unwrap().station;
+            assert!(!named.demonstration().counts_down_quickly, "the mission itself");
+        }
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
         let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap().station;
         assert!(!live.starts_by_itself(false));
@@ -561,7 +519,7 @@ mod tests {
             let command = Cli::command().find_subcommand(name).unwrap().clone();
             command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
         };
-        assert_eq!(flags("stop"), ["force", "socket", "operator", "config"]);
+        assert_eq!(flags("stop"), ["force", "socket"]);
         assert_eq!(flags("status"), [""; 0]);
         let link = ["to", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
         assert_eq!(flags("download"), link);

@@ -1,4 +1,5 @@
-//! The settings file (TOML). [`EXAMPLE`] documents every key; the flag of the same name overrides it.
+//! The settings file (TOML). [`EXAMPLE`] documents every key. What changes from one start to the next has a flag of the same
+//! name, which overrides the key; what a person or a place keeps has none.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,14 +9,13 @@ use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 
-use crate::cli::{Characters, LinkArgs, LogChoice, ScreenArgs, Seconds, StationArgs, ThemeChoice};
-use crate::model::{Amount, Bindings, DEFINITIONS, Talk};
+use crate::cli::{Characters, LinkArgs, LogChoice, Seconds, StationArgs, ThemeChoice};
+use crate::model::{Amount, Bindings, DEFINITIONS, Degrees, Talk};
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = include_str!("../config-example.toml");
 
-/// The content of a settings file. A missing key leaves the default. Each field has the meaning of the flag of the
-/// same name.
+/// The content of a settings file. A missing key leaves the default.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
@@ -31,6 +31,8 @@ pub struct Config {
     pub log: Option<String>,
     pub tlog: Option<String>,
     pub socket: Option<PathBuf>,
+    pub pad: Option<String>,
+    pub here: Option<String>,
     pub bell: Option<bool>,
     pub alarm_command: Option<String>,
     #[serde(default)]
@@ -99,7 +101,13 @@ impl Config {
                 return Err(format!("{key} is empty; give a command or \"none\""));
             }
         }
+        for (key, place) in [("pad", &config.pad), ("here", &config.here)] {
+            if let Some(place) = place {
+                place.parse::<Degrees>().map_err(|error| format!("{key}: {error}"))?;
+            }
+        }
         config.voice.take_if(|command| command == "none");
+        config.alarm_command.take_if(|command| command == "none");
         Ok(config)
     }
 
@@ -124,8 +132,11 @@ impl Config {
         fill(&mut station.log, parsed(self.log.as_ref()));
         fill(&mut station.tlog, parsed(self.tlog.as_ref()));
         fill(&mut station.socket.socket, self.socket.clone());
-        fill(&mut station.alarm_command, self.alarm_command.clone());
-        station.alarm_command.take_if(|command| command == "none");
+    }
+
+    /// Where the pad is, and where this station is.
+    pub fn places(&self) -> [Option<Degrees>; 2] {
+        [&self.pad, &self.here].map(|place| place.as_ref().and_then(|place| place.parse().ok()))
     }
 
     /// Fills in the flags of a link that the command line does not give.
@@ -144,21 +155,6 @@ impl Config {
         let usual = Talk::default();
         let height_every = self.talk_every_s.map_or(usual.height_every, |Seconds(every)| every);
         Talk { amount: self.talk, height_every, has_voice: self.voice.is_some() }
-    }
-
-    /// The flags about the screen override the file.
-    #[must_use]
-    pub fn overridden_by(self, screen: &ScreenArgs) -> Self {
-        Self {
-            bell: screen.bell.or(self.bell),
-            characters: screen.characters.unwrap_or(self.characters),
-            theme: screen.theme.unwrap_or(self.theme),
-            keys: screen.keys.clone().unwrap_or(self.keys),
-            voice: screen.voice.clone().or(self.voice).filter(|command| command != "none"),
-            talk: screen.talk.unwrap_or(self.talk),
-            talk_every_s: screen.talk_every_s.or(self.talk_every_s),
-            ..self
-        }
     }
 }
 
@@ -198,6 +194,8 @@ impl Config {
             log,
             tlog,
             socket,
+            pad,
+            here,
             bell,
             alarm_command,
             characters,
@@ -230,6 +228,8 @@ impl Config {
             ("log", given(log.clone(), "touchdown-YYYYMMDD-HHMMSS.mcap in the current directory")),
             ("tlog", given(tlog.clone(), "with a link: beside the log")),
             ("socket", given(path(socket), "one for each station")),
+            ("pad", given(pad.clone(), "not known")),
+            ("here", given(here.clone(), "not known")),
             ("bell", given(bell.map(|bell| bell.to_string()), "true")),
             ("alarm_command", given(alarm_command.clone(), "none")),
             ("characters", chosen(value_name(characters), *characters == usual.characters)),
@@ -265,7 +265,6 @@ mod tests {
     use clap::{CommandFactory as _, Parser as _};
 
     use crate::cli::{Cli, Command};
-    use crate::model::{Act, Amount};
 
     // Tests of the settings file, its example and the flags.
 
@@ -283,7 +282,7 @@ mod tests {
                 && config.tlog.is_some()
         );
         assert!(config.socket.is_some() && config.bell == Some(true) && config.alarm_command.is_some());
-        assert_eq!(uncommented.lines().count(), 19, "one line a key: {uncommented}");
+        assert_eq!(uncommented.lines().count(), 21, "one line a key: {uncommented}");
         assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));
     }
 
@@ -296,6 +295,7 @@ mod tests {
         assert!(wrong("sysid = 0").contains("sysid: 0 addresses every system"));
         assert!(wrong("vehicle_sysid = 256").contains("vehicle_sysid"));
         assert!(wrong("log = \"\"").contains("log: "));
+        assert!(wrong("pad = \"here\"").contains("pad: `here` is no place"));
         assert!(wrong("voice = \"\"").contains("voice is empty"));
         assert!(wrong("talk = \"loud\"").contains("few"));
         assert!(wrong("talk_every_s = 0.0").contains("from 0.1 to 86400"));
@@ -304,87 +304,83 @@ mod tests {
     }
 
     /// A key, its value in a file, its flags, and a check that the value of the flag is used.
-    type Override = (&'static str, &'static str, &'static [&'static str], fn(&StationArgs, &Config) -> bool);
+    type Override = (&'static str, &'static str, &'static [&'static str], fn(&StationArgs) -> bool);
 
-    const OVERRIDES: [Override; 19] = [
-        ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |station, _| {
+    const OVERRIDES: [Override; 11] = [
+        ("connect", "[\"udpin:0.0.0.0:1\"]", &["--connect", "udpin:0.0.0.0:2"], |station| {
             station.link.connect == [LinkAddress::UdpIn("0.0.0.0:2".to_owned())]
         }),
-        ("sysid", "3", &["--sysid", "4"], |station, _| station.link.us().system_id == 4),
-        ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |station, _| station.link.vehicle().system_id == 4),
-        ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |station, _| {
+        ("sysid", "3", &["--sysid", "4"], |station| station.link.us().system_id == 4),
+        ("vehicle_sysid", "3", &["--vehicle-sysid", "4"], |station| station.link.vehicle().system_id == 4),
+        ("key", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--key", "b"], |station| {
             station.link.key == Some("b".into())
         }),
-        ("crew", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--crew", "b"], |station, _| {
+        ("crew", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--crew", "b"], |station| {
             station.link.crew == Some("b".into())
         }),
-        ("operator", "\"Ann\"", &["--operator", "Bob"], |station, _| {
+        ("operator", "\"Ann\"", &["--operator", "Bob"], |station| {
             station.link.operator.operator.as_deref() == Some("Bob")
         }),
-        ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |station, _| {
+        ("mission", "\"mk2\"", &["--connect", "udpin:0.0.0.0:2", "--mission", "mk3"], |station| {
             station.mission.as_deref() == Some("mk3")
         }),
-        ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |station, _| {
+        ("checklist", "\"a\"", &["--connect", "udpin:0.0.0.0:2", "--checklist", "b"], |station| {
             station.checklist.as_deref() == Some(Path::new("b"))
         }),
-        ("log", "\"a.mcap\"", &["--log", "b.mcap"], |station, _| {
+        ("log", "\"a.mcap\"", &["--log", "b.mcap"], |station| {
             station.log == Some(LogChoice::File("b.mcap".into()))
         }),
-        ("tlog", "\"a.tlog\"", &["--tlog", "none"], |station, _| station.tlog == Some(LogChoice::None)),
-        ("socket", "\"/a\"", &["--socket", "/b"], |station, _| station.socket.socket == Some("/b".into())),
-        ("bell", "true", &["--bell", "false"], |_, config| config.bell == Some(false)),
-        ("alarm_command", "\"a\"", &["--alarm-command", "b"], |station, _| {
-            station.alarm_command.as_deref() == Some("b")
-        }),
-        ("characters", "\"unicode\"", &["--characters", "ascii"], |_, config| {
-            config.characters == Characters::Ascii
-        }),
-        ("theme", "\"dark\"", &["--theme", "light"], |_, config| config.theme == ThemeChoice::Light),
-        ("voice", "\"a\"", &["--voice", "b"], |_, config| config.voice.as_deref() == Some("b")),
-        ("talk", "\"few\"", &["--talk", "all"], |_, config| config.talk().amount == Amount::All),
-        ("talk_every_s", "3", &["--talk-every-s", "4"], |_, config| {
-            config.talk().height_every.as_secs() == 4
-        }),
-        ("keys", "{ theme = \"w\" }", &["--keys", "theme=z"], |_, config| {
-            config.keys.name(Act::NextTheme) == "z"
-        }),
+        ("tlog", "\"a.tlog\"", &["--tlog", "none"], |station| station.tlog == Some(LogChoice::None)),
+        ("socket", "\"/a\"", &["--socket", "/b"], |station| station.socket.socket == Some("/b".into())),
     ];
 
+    /// The keys without a flag, with a value.
+    const ONLY_HERE: [(&str, &str); 10] = [
+        ("pad", "\"35.347,-117.809\""),
+        ("here", "\"35.348,-117.808\""),
+        ("bell", "true"),
+        ("alarm_command", "\"a\""),
+        ("characters", "\"unicode\""),
+        ("theme", "\"dark\""),
+        ("voice", "\"a\""),
+        ("talk", "\"few\""),
+        ("talk_every_s", "3"),
+        ("keys", "{ theme = \"w\" }"),
+    ];
+
+    fn keys_with_values() -> impl Iterator<Item = (&'static str, &'static str)> {
+        OVERRIDES.into_iter().map(|(key, value, ..)| (key, value)).chain(ONLY_HERE)
+    }
+
     /// Combines settings and command line as a run does.
-    fn together(file: &str, flags: &[&str]) -> (StationArgs, Config) {
+    fn together(file: &str, flags: &[&str]) -> StationArgs {
         let config = Config::parse(file).unwrap();
         let cli = Cli::try_parse_from([&["ground"], flags].concat()).unwrap();
-        let config = config.overridden_by(&cli.screen);
-        let station = match cli.command {
-            Some(Command::Daemon { mut station, demo }) => {
-                if !demo {
-                    config.fill_connect(&mut station);
-                }
+        let mut station = match cli.command {
+            Some(Command::Daemon { mut station }) => {
+                config.fill_connect(&mut station);
                 *station
             }
             _ => cli.station,
         };
-        let mut station = station;
         config.fill(&mut station);
-        (station, config)
+        station
     }
 
     #[test]
-    fn every_key_has_a_flag_that_overrides_it() {
+    fn a_flag_overrides_the_key_of_its_name() {
         let keys: Vec<&str> = EXAMPLE
             .lines()
             .filter_map(|line| line.strip_prefix('#')?.split_once(" = "))
             .map(|(key, _)| key)
             .filter(|key| !key.contains(' '))
             .collect();
-        assert_eq!(OVERRIDES.map(|(key, ..)| key).as_slice(), keys);
+        assert_eq!(keys_with_values().map(|(key, _)| key).collect::<Vec<_>>(), keys);
         for (key, in_file, flags, holds) in OVERRIDES {
             let file = format!("{key} = {in_file}");
             assert!(flags.contains(&format!("--{}", key.replace('_', "-")).as_str()), "{key}: its own name");
-            let (station, config) = together(&file, flags);
-            assert!(holds(&station, &config), "{key}: the flag counts");
-            let (station, config) = together(&file, &[]);
-            assert!(!holds(&station, &config), "{key}: without the flag the file counts");
+            assert!(holds(&together(&file, flags)), "{key}: the flag counts");
+            assert!(!holds(&together(&file, &[])), "{key}: without the flag the file counts");
         }
     }
 
@@ -406,29 +402,25 @@ mod tests {
     #[test]
     fn a_bare_ground_takes_no_link_from_the_settings() {
         for bare in [&[][..], &["--auto"], &["--headless"], &["--log", "none"]] {
-            assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).0.link.connect, [], "{bare:?}");
+            assert_eq!(together("connect = [\"udpin:0.0.0.0:14550\"]", bare).link.connect, [], "{bare:?}");
         }
     }
 
     #[test]
-    fn flags_for_the_demonstration_and_none_override_the_file() {
+    fn flags_for_the_demonstration_override_the_file() {
         let file = "connect = [\"udpin:0.0.0.0:14550\"]";
-        for demonstration in [&["daemon", "--demo"][..], &["daemon", "--seed", "2"]] {
-            assert_eq!(together(file, demonstration).0.link.connect, []);
+        for demonstration in [&["daemon", "--profile", "mk2"][..], &["daemon", "--seed", "2"]] {
+            assert_eq!(together(file, demonstration).link.connect, []);
         }
-        assert_eq!(together(file, &["daemon"]).0.link.connect.len(), 1);
-        let (station, _) = together("alarm_command = \"aplay horn.wav\"", &["--alarm-command", "none"]);
-        assert_eq!(station.alarm_command, None);
-        let empty = Cli::try_parse_from(["ground", "--alarm-command", ""]);
-        assert!(empty.unwrap_err().to_string().contains("--alarm-command"));
+        assert_eq!(together(file, &["daemon"]).link.connect.len(), 1);
     }
 
     /// The table has a line for every key; what the file does not give is in parentheses.
     #[test]
     fn the_table_shows_every_key() {
         let usual = Config::default().table();
-        assert_eq!(usual.lines().count(), OVERRIDES.len());
-        for (key, in_file, ..) in OVERRIDES {
+        assert_eq!(usual.lines().count(), keys_with_values().count());
+        for (key, in_file) in keys_with_values() {
             let line = |table: &str| {
                 let found = table.lines().find(|line| line.split(' ').next() == Some(key));
                 found.unwrap_or_else(|| panic!("no line for {key} in {table}")).to_owned()

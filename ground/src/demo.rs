@@ -22,6 +22,9 @@ use crate::cli::Demonstration;
 /// How long to wait for the end of the simulator.
 const STOP_WITHIN: Duration = Duration::from_secs(3);
 
+/// Long enough to see what holds a countdown and to hold it: from 2 s before the release on nothing does.
+const QUICK_COUNTDOWN_S: f64 = 5.0;
+
 /// What is simulated.
 #[derive(Debug, Clone)]
 pub struct DemoOptions {
@@ -31,14 +34,17 @@ pub struct DemoOptions {
 }
 
 impl DemoOptions {
-    /// Reads the mission. A mission that has a launch begins on its pad, unless a start is given.
+    /// Reads the mission. One that has a launch begins on its pad, unless a start is given.
     ///
     /// # Errors
     /// There is no mission of that name, or it is invalid.
     pub fn load(demonstration: &Demonstration<'_>, system_id: u8) -> anyhow::Result<Self> {
-        let Demonstration { profile, start, seed, speed } = *demonstration;
+        let Demonstration { profile, start, seed, speed, counts_down_quickly } = *demonstration;
         let mut flight = fly::load_flight(profile)?.starting_at(start)?;
         flight.recipe.seed = seed;
+        if counts_down_quickly {
+            flight.recipe = flight.recipe.counting_down(QUICK_COUNTDOWN_S)?;
+        }
         Ok(Self { flight, speed, system_id })
     }
 

@@ -75,13 +75,13 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Some(Command::Completions { shell }) => print_completions(shell),
         Some(Command::Man) => print_manual(),
         Some(Command::Status) => runtime.block_on(stations::list()),
-        Some(Command::Stop { force, socket, operator: who, config }) => {
-            let config = load(&config)?;
-            let (socket, who) = (socket.socket.or(config.socket), who.operator.or(config.operator));
+        Some(Command::Stop { force, socket }) => {
+            let config = Config::load(None)?;
+            let (socket, who) = (socket.socket.or(config.socket), config.operator);
             runtime.block_on(stations::stop(socket.as_deref(), force, operator(who.as_deref())))
         }
         Some(Command::Attach(args)) => {
-            let config = load(&args.config)?.overridden_by(&args.screen);
+            let config = load(&args.config)?;
             let (socket, who) = (
                 args.socket.socket.or(config.socket.clone()),
                 args.operator.operator.or(config.operator.clone()),
@@ -100,18 +100,16 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
             load(&args.config)?.fill_link(&mut args.link);
             runtime.block_on(download::run_download(&args))
         }
-        Some(Command::Daemon { mut station, demo }) => {
+        Some(Command::Daemon { mut station }) => {
             let config = load(&station.config)?;
-            if !demo {
-                config.fill_connect(&mut station);
-            }
+            config.fill_connect(&mut station);
             config.fill(&mut station);
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
         None => {
             let mut station = cli.station;
-            let config = load(&station.config)?.overridden_by(&cli.screen);
+            let config = load(&station.config)?;
             if let Some(path) = &cli.replay {
                 // It shows the vehicle in the log, not the one in the settings.
                 let vehicle = station.link.vehicle_sysid.map(|_| station.link.vehicle());
@@ -152,6 +150,9 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
                 return Err(error);
             }
         };
+    if duty.is_daemon {
+        print(output::greeting(&model).as_bytes())?;
+    }
     let ran = station.run(&mut model, &mut wire).await;
     station.close_book(&mut model, &mut wire);
     if let Some(msg) = wire.save_timestamps() {
@@ -200,6 +201,7 @@ async fn start(
     };
     let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
+    let [pad, here] = config.places();
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
@@ -219,8 +221,8 @@ async fn start(
         start: args.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
-        pad: args.pad,
-        here: args.here,
+        pad,
+        here,
         start_unix_s,
         demonstration: demo.is_some(),
         auto,
@@ -256,7 +258,7 @@ async fn start(
         socket: args.socket.socket.clone(),
         server,
         screens: Vec::new(),
-        alarm_command: args.alarm_command.clone(),
+        alarm_command: config.alarm_command.clone(),
         quiet_input: None,
         signatures,
         book: None,

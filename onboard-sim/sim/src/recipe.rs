@@ -68,6 +68,18 @@ impl Recipe {
         Ok(Self { mission, mission_toml, ..self })
     }
 
+    /// This recipe with another countdown, s.
+    ///
+    /// # Errors
+    /// The mission does not allow it.
+    pub fn counting_down(self, countdown_s: f64) -> Result<Self, RecipeError> {
+        let mut document = document_of(&self.mission_toml, &self.mission.name)?;
+        document["start"]["countdown_s"] = toml_edit::value(countdown_s);
+        let mission_toml = document.to_string();
+        let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
+        Ok(Self { mission, mission_toml, ..self })
+    }
+
     /// A recipe from a built-in mission and a built-in set of dispersions.
     ///
     /// # Errors
@@ -79,16 +91,19 @@ impl Recipe {
     }
 }
 
+fn document_of(mission_toml: &str, origin: &str) -> Result<toml_edit::DocumentMut, MissionError> {
+    let parsed = mission_toml.parse();
+    parsed.map_err(|error: toml_edit::TomlError| {
+        FileError::Parse { origin: origin.to_owned(), message: error.to_string() }.into()
+    })
+}
+
 /// The text of a mission with another start; comments and order stay. `origin` names it in messages.
 ///
 /// # Errors
 /// The text is not TOML.
 pub fn toml_starting_at(mission_toml: &str, origin: &str, start: StartPoint) -> Result<String, MissionError> {
-    let mut document: toml_edit::DocumentMut =
-        mission_toml.parse().map_err(|error: toml_edit::TomlError| FileError::Parse {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        })?;
+    let mut document = document_of(mission_toml, origin)?;
     let before = document.get("start").and_then(|section| section.get("at")).and_then(|at| at.as_str());
     if before.unwrap_or(StartPoint::Apogee.name()) == start.name() {
         return Ok(mission_toml.to_owned());

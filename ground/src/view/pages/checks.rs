@@ -227,7 +227,7 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         return vec![
             label(" The vehicle has not left the pad."),
             label(" In flight its last place is kept beside the log, for maps"),
-            label(" (GeoJSON, and KML with --pad)."),
+            label(" (GeoJSON, and KML with the pad's place)."),
         ];
     };
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
@@ -244,10 +244,10 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(row("heard", format!("{ago} s ago, boot {:08X}", place.boot), theme));
     lines.push(Line::default());
     if place.pad.is_none() {
-        let words = " Latitude, longitude and KML need the pad's place: --pad LATITUDE,LONGITUDE";
+        let words = " Latitude, longitude and KML need the pad's place: `pad` in the settings";
         lines.push(theme.line(words, TextRole::Label));
     } else if model.settings.here.is_none() {
-        let words = " The way from this station needs its place: --here LATITUDE,LONGITUDE";
+        let words = " The way from this station needs its place: `here` in the settings";
         lines.push(theme.line(words, TextRole::Label));
     }
     lines
