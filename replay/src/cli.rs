@@ -1,6 +1,6 @@
 //! What all commands have in common: how they ended, what they print, how they stop.
 
-use std::io::{self, IsTerminal as _, Write};
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -171,17 +171,6 @@ pub(crate) fn warn_of_cut(file: &str, cut: Option<&Cut>) {
 /// Does work on so many threads, or on as many as there are processors.
 pub(crate) fn in_pool<R: Send>(jobs: Option<NonZeroUsize>, work: impl FnOnce() -> R + Send) -> Result<R> {
     Ok(threads(jobs.map(NonZeroUsize::get)).context("cannot start threads")?.install(work))
-}
-
-/// Shows progress about twenty times on a terminal, elsewhere only at the end.
-pub(crate) fn show_progress(done: usize, flights: usize) {
-    let mut output = io::stderr();
-    let ended = done == flights;
-    if ended || (output.is_terminal() && done.is_multiple_of((flights / 20).max(1))) {
-        let end = if ended { "\n" } else { "" };
-        // Progress goes to standard error, which may be closed.
-        let _ = write!(output, "\rreplay: {done} of {flights} flights{end}");
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! * [`store`]: everything that a campaign's results depend on, and its directory.
 //! * [`tally`]: flies one flight of a campaign and collects the values of its [`row`].
 //! * [`run`]: the same work on many things, on several threads; flies the missing flights and writes the results.
+//! * [`stopwatch`]: how far something long is.
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`map`]: where a vehicle lands, over two quantities.
@@ -22,6 +23,7 @@ pub mod row;
 pub mod run;
 pub mod scenario;
 pub mod statistics;
+pub mod stopwatch;
 pub mod store;
 pub mod summary;
 pub mod tally;

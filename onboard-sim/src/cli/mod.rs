@@ -8,16 +8,14 @@ pub(crate) mod motors;
 pub(crate) mod paper;
 mod single;
 
-use std::fmt;
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
 use ::campaign::map::{self, Axis, Map, MapError};
 use ::campaign::motors::ranking::Progress;
 use ::campaign::run::threads;
+use ::campaign::stopwatch::Stopwatch;
 use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::mission::StartPoint;
@@ -66,52 +64,6 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     let dispersion_toml = fly::with_wind(&recipe.dispersion_toml, wind_m_s);
     let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
-}
-
-/// Time between two lines of progress: on a terminal, and in a file.
-const SHOW_EVERY: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
-
-/// Shows on standard error how far something is, and how long the rest will take.
-struct Stopwatch {
-    /// When it began, and when it was shown last.
-    times: Mutex<(Instant, Option<Instant>)>,
-    on_terminal: bool,
-}
-
-impl Stopwatch {
-    fn start() -> Self {
-        Self { times: Mutex::new((now(), None)), on_terminal: std::io::stderr().is_terminal() }
-    }
-
-    fn elapsed_s(&self) -> f64 {
-        (now() - self.times.lock().unwrap_or_else(PoisonError::into_inner).0).as_secs_f64()
-    }
-
-    /// Shows how many of some things are done, unless it was shown just before. With none done it starts anew.
-    fn show(&self, done: usize, of: usize, what: impl fmt::Display) {
-        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = now();
-        if done == 0 {
-            *times = (now, None);
-        }
-        let (started, shown) = *times;
-        let due = shown.is_none_or(|last| now - last >= SHOW_EVERY[usize::from(!self.on_terminal)]);
-        if !due && done < of {
-            return;
-        }
-        times.1 = Some(now);
-        let left_s = (now - started).as_secs_f64() * of.saturating_sub(done) as f64 / done.max(1) as f64;
-        let left = if done > 0 && done < of { format!("; {left_s:.0} s to go") } else { String::new() };
-        let (before, after) = if self.on_terminal { ("\r\x1b[K", "") } else { ("", "\n") };
-        let after = if done < of { after } else { "\n" };
-        // Messages go to standard error, which may be closed.
-        let _ = write!(std::io::stderr(), "{before}{done} of {of} {what}{left}{after}");
-    }
-}
-
-#[expect(clippy::disallowed_methods, reason = "the duration is only reported")]
-fn now() -> Instant {
-    Instant::now()
 }
 
 /// Shows how far a ranking or a card is, which looks at motors and flies.

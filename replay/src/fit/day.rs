@@ -14,6 +14,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use campaign::run::in_parallel;
+use campaign::stopwatch::Stopwatch;
 use clap::Args;
 use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::mission::Mission;
@@ -329,7 +330,8 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw, law.clone())?.run().legs)
     };
-    let landed = in_parallel(&motors, one, &|_| {});
+    let stopwatch = Stopwatch::start();
+    let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
     trials.collect()

@@ -9,12 +9,13 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use anyhow::{Result, ensure};
+use campaign::stopwatch::Stopwatch;
 use clap::Args;
 use serde::Serialize;
 
 pub use super::jobs::sweep;
 use super::{FlownHow, ReflyError, StartAt, can_be_flown};
-use crate::cli::{Outcome, answer, in_pool, say, show_progress, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, in_pool, say, warn_of_what_is_missing};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
 use crate::settings::Setting;
@@ -331,7 +332,9 @@ impl Arguments {
             }
         }
         ensure!(!flights.is_empty(), "none of the {} logs can be flown again", files.len());
-        let report = in_pool(self.jobs, || sweep(&flights, &points, &options, &show_progress))??;
+        let stopwatch = Stopwatch::start();
+        let told = |done, of| stopwatch.show(done, of, "flights");
+        let report = in_pool(self.jobs, || sweep(&flights, &points, &options, &told))??;
         answer(|output| {
             if json {
                 print_json(&report, output)

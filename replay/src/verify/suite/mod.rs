@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, bail, ensure};
+use campaign::stopwatch::Stopwatch;
 use clap::Args;
 pub use find::{Found, Skipped, SuiteError, find};
 pub use fly::{SuiteState, fly_all};
@@ -22,7 +23,7 @@ use protocol::log::build::build_info;
 use serde::{Deserialize, Serialize};
 
 use super::Printed;
-use crate::cli::{Outcome, answer, in_pool, say, show_progress, stop_on_interrupt};
+use crate::cli::{Outcome, answer, in_pool, say, stop_on_interrupt};
 use crate::output::{Destination, NewFile, Overwrite, WriteError, write_whole};
 use crate::print::{JunitCase, JunitOutcome, counted, print_json, print_junit, shown, write_junit};
 
@@ -488,7 +489,9 @@ impl Arguments {
             }
         };
         let stop = stop_on_interrupt()?;
-        let outcomes = in_pool(self.jobs, || fly_all(&flights, &mut state, &stop, &show_progress))?
+        let stopwatch = Stopwatch::start();
+        let told = |done, of| stopwatch.show(done, of, "flights");
+        let outcomes = in_pool(self.jobs, || fly_all(&flights, &mut state, &stop, &told))?
             .context("the state file cannot be written")?;
         let interrupted = stop.load(Ordering::Relaxed) && outcomes.len() < flights.len();
         let mut judged = judge(&outcomes, &baseline, self.tolerance);
