@@ -60,7 +60,7 @@ enum Command {
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
-    #[command(after_help = "Example: onboard-sim hazard --profile mk2 --winds 0,3,6 --svg hazard.svg")]
+    #[command(after_help = "Example: onboard-sim hazard --profile mk2 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
     #[command(after_help = "Example: onboard-sim paper --figures figures")]

@@ -81,7 +81,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
     assert!(refused(&["motors", "--from", "list.json"]).contains("list.json: not a list of motors"));
     assert!(refused(&["motors", "--ballast", "1"]).contains("`1` is not FROM:TO"));
     assert!(refused(&["motors", "--tube", "90"]).contains("--tube 90: must be above 0 and up to 74 mm"));
-    assert!(refused(&["card", "--winds", "3,40"]).contains("--winds 40: must be 0 to 30 m/s"));
+    assert!(refused(&["card", "--wind", "3,40"]).contains("--wind 40: must be 0 to 30 m/s"));
     assert!(
         refused(&["card", "--wind-from", "400"]).contains("`400` is not a direction of 0 to 360 degrees")
     );
@@ -98,7 +98,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
 fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights() {
     let directory = tempfile::tempdir().unwrap();
     let arguments =
-        ["card", "--winds", "6,0", "--flights", "2", "--hazard-flights", "3", "--wind-from", "225"];
+        ["card", "--wind", "6,0", "--flights", "2", "--hazard-flights", "3", "--wind-from", "225"];
     let written = run(directory.path(), &arguments);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
     let progress = stderr(&written);
@@ -109,7 +109,7 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
     for expected in [
         "Range safety: mk2-h45w",
         "no radius, no rate and no wind to fly in. Do not fly by this card.",
-        "--dispersion real --winds 0,6 --seed 1 --survey 2 --flights 3",
+        "--dispersion real --wind 0,6 --seed 1 --flights 2 --hazard-flights 3",
         "landing motor lit ",
         "Book of station 1 ______ : ______ - ",
         "signature",
@@ -165,7 +165,7 @@ fn the_help_has_an_example() {
 #[test]
 fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
     let directory = tempfile::tempdir().unwrap();
-    let few = ["hazard", "--profile", "vlr", "--winds", "0,4", "--survey", "1", "--flights", "2"];
+    let few = ["hazard", "--profile", "vlr", "--wind", "0,4", "--flights", "1", "--hazard-flights", "2"];
     let hazard = |more: &[&str]| run(directory.path(), &[&few, more].concat());
     let written = hazard(&["--csv", "hazard.csv", "--svg", "hazard.svg"]);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));

@@ -62,7 +62,7 @@ pub struct TimedFault {
 
 /// Why the text of a fault is wrong.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("fault `{given}`: {problem}; write NAME[:VALUE]@WHEN, NAME one of {known}, WHEN seconds or one of {phases} with +SECONDS or +FROM..TO", known = known(), phases = phases())]
+#[error("fault `{given}`: {problem}; write {}", how_to_write())]
 pub struct FaultError {
     given: String,
     problem: String,
@@ -137,6 +137,15 @@ const PHASES: &[(&str, Phase)] = &[
     ("chute", Phase::Chute),
     ("touchdown", Phase::Touchdown),
 ];
+
+/// How to write a fault, with every name, for a help text.
+pub fn how_to_write() -> String {
+    format!(
+        "NAME[:VALUE]@WHEN, as in gnss-out@5 or fin-stuck:2@apogee. NAME: {}. WHEN: seconds, or with +SECONDS or +FROM..TO one of {}",
+        known(),
+        phases()
+    )
+}
 
 fn known() -> String {
     let with_value = |(name, value, _): &(&str, &str, Build)| {

@@ -20,7 +20,7 @@ use protocol::log::build::build_info;
 use serde_json::json;
 use sha2::Digest as _;
 use sim::dispersion;
-use sim::fault::TimedFault;
+use sim::fault::{TimedFault, how_to_write};
 
 use super::{MapArguments, Stopwatch, on_threads, recipe, single};
 
@@ -56,8 +56,8 @@ pub(crate) struct CampaignArguments {
     /// Fall with equally open fins that do not steer.
     #[arg(long)]
     passive: bool,
-    /// Break something in every flight: NAME[:VALUE]@WHEN, as in gnss-out@5 or fin-stuck:2@apogee; may be repeated.
-    #[arg(long = "fault", value_name = "FAULT")]
+    /// Break something in every flight; may be repeated.
+    #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
     /// Inject the faults of a scenario file.
     #[arg(long, value_name = "FILE")]

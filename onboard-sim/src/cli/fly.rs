@@ -14,7 +14,7 @@ use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
 use sim::dispersion::{self, Dispersion};
-use sim::fault::TimedFault;
+use sim::fault::{TimedFault, how_to_write};
 use simulated_vehicle::fly::{
     FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed, load_flight,
 };
@@ -96,22 +96,22 @@ pub(crate) struct FlyArguments {
     /// Mean wind 10 m above the ground, m/s, instead of the set's.
     #[arg(long, value_name = "M_S")]
     wind: Option<f64>,
-    /// Break something: NAME[:VALUE]@WHEN, as in link-delay:1@descent; may be repeated.
-    #[arg(long = "fault", value_name = "FAULT")]
+    /// Break something; may be repeated.
+    #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
     /// Speed of simulated time: a factor, or max.
     #[arg(long, default_value = "1")]
     speed: Speed,
     /// Arm and start without a ground station, also with --mavlink.
     #[arg(long)]
-    auto_start: bool,
+    auto: bool,
     /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
     #[arg(long)]
     stay: bool,
     /// The flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
     /// folder, and speaks MAVLink on its own radio (onboard-sim/board/emulate). A frame that it decides otherwise ends the
     /// flight.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto_start"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto"])]
     board: Option<PathBuf>,
 }
 
@@ -173,7 +173,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let options = FlyOptions {
         on_the_wire,
         flight,
-        auto_start: arguments.auto_start || (arguments.mavlink.is_empty() && arguments.board.is_none()),
+        auto_start: arguments.auto || (arguments.mavlink.is_empty() && arguments.board.is_none()),
         system_id: arguments.sysid,
         links: arguments.mavlink,
         key_file: arguments.key,

@@ -30,14 +30,14 @@ pub(crate) struct HazardArguments {
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Mean winds 10 m above the ground, m/s.
-    #[arg(long, value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
-    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of the interval.
-    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    flights: u64,
     /// Flights in each wind of every way, by which the ways are known that come down farthest.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
-    survey: u64,
+    flights: u64,
+    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of the interval.
+    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    hazard_flights: u64,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
-    let flights = Flights { survey: arguments.survey, of_widest: arguments.flights };
+    let flights = Flights { survey: arguments.flights, of_widest: arguments.hazard_flights };
     let stopwatch = Stopwatch::start();
     let told = |done, of| stopwatch.show(done, of, "flights");
     let impacts = on_threads(arguments.jobs, || Ok(hazard::studies(&recipes, flights, &told)?))?;
@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
 /// Refuses a wind that cannot be flown.
 pub(super) fn check_winds(winds_m_s: &[f64]) -> anyhow::Result<()> {
     let wrong = winds_m_s.iter().find(|wind_m_s| !(0.0..=WIND_MAX_M_S).contains(*wind_m_s));
-    wrong.map_or(Ok(()), |wind_m_s| anyhow::bail!("--winds {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"))
+    wrong.map_or(Ok(()), |wind_m_s| anyhow::bail!("--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"))
 }
 
 /// The mission in each wind.
@@ -220,7 +220,7 @@ impl Study<'_> {
             arrow: Some("where the wind blows to"),
             panels: &panels.collect::<Vec<_>>(),
         };
-        let shown = self.arguments.survey.min(SHOWN);
+        let shown = self.arguments.flights.min(SHOWN);
         let title =
             format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission);
         Ok(places_svg(&title, &places)?)

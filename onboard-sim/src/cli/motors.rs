@@ -95,7 +95,7 @@ pub(crate) struct CardArguments {
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
-    #[arg(long, value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
     /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up and the line downwind. By default
     /// downwind is up.
@@ -235,9 +235,6 @@ struct Choices {
     /// Ballast that can be added, kg; below zero it is taken out. By default up to 30 % of the mission's mass.
     #[arg(long, value_name = "FROM:TO", allow_hyphen_values = true)]
     ballast: Option<Range>,
-    /// Where the ballast is, m above the nozzle. By default at the centre of gravity of the airframe without its motor.
-    #[arg(long, value_name = "M")]
-    ballast_station: Option<f64>,
     /// Widest motor that fits, mm. By default the diameter of the mission's own motor.
     #[arg(long, value_name = "MM")]
     tube: Option<f64>,
@@ -280,7 +277,6 @@ impl Choices {
         let mission = &recipe.mission;
         Ok(Team {
             ballast_kg: self.ballast_kg(mission),
-            ballast_station_m: self.ballast_station_m(mission)?,
             start: self.start(mission)?,
             tube_m: self.tube_m(mission)?,
             recipe,
@@ -303,17 +299,6 @@ impl Choices {
         /// Of the loaded mass.
         const MOST_SHARE: f64 = 0.3;
         self.ballast.map_or([0.0, MOST_SHARE * mission.airframe.mass.loaded_kg], |Range(kg)| kg)
-    }
-
-    fn ballast_station_m(&self, mission: &Mission) -> anyhow::Result<Option<f64>> {
-        let length_m = mission.airframe.body.length_m;
-        if let Some(station_m) = self.ballast_station {
-            anyhow::ensure!(
-                (0.0..=length_m).contains(&station_m),
-                "--ballast-station {station_m}: must be 0 (the nozzle) to {length_m} m (the nose)"
-            );
-        }
-        Ok(self.ballast_station)
     }
 
     fn tube_m(&self, mission: &Mission) -> anyhow::Result<Option<f64>> {

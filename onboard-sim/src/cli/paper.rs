@@ -25,7 +25,7 @@ pub(crate) struct PaperArguments {
     stability: bool,
     /// Write the figures of what is printed as SVG into this folder: Figures 5 to 9, or the map.
     #[arg(long, value_name = "DIR")]
-    figures: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// Replace existing files.
     #[arg(long)]
     force: bool,
@@ -65,7 +65,7 @@ fn written(
     arguments: &PaperArguments,
     draw: impl FnOnce() -> Result<Vec<(&'static str, String)>, paper::PaperError>,
 ) -> anyhow::Result<ExitCode> {
-    let Some(folder) = &arguments.figures else { return Ok(ExitCode::SUCCESS) };
+    let Some(folder) = &arguments.out else { return Ok(ExitCode::SUCCESS) };
     let files = draw()?;
     write_folder(folder, &files, arguments.force)?;
     tell(folder, &files)?;

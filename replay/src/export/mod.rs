@@ -56,9 +56,6 @@ pub(crate) struct Args {
     /// name with .mcap if left out.
     #[arg(long, short, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// For tlog: the endpoint whose frames are written, if the log has several [default: ground].
-    #[arg(long, value_name = "vehicle|ground")]
-    endpoint: Option<String>,
     /// Replace existing files.
     #[arg(long)]
     force: bool,
@@ -127,7 +124,7 @@ impl Args {
 
     fn tlog(&self, destination: Destination) -> Result<Outcome> {
         let open = || FlightLog::open(&self.file);
-        let written = export_tlog(&open, self.endpoint.as_deref(), destination)?;
+        let written = export_tlog(&open, None, destination)?;
         self.answer(&written, |output| {
             let path = destination.path.display();
             let (received, sent) = (written.received, written.sent);

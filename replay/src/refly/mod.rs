@@ -466,16 +466,11 @@ pub(crate) struct Args {
     files: Vec<PathBuf>,
     #[command(flatten)]
     how: FlownHow,
-    /// Begin at this frame instead of the landing's first.
-    #[arg(long, value_name = "N", conflicts_with_all = ["at", "phase", "vary", "vary_plant"])]
-    tick: Option<u64>,
-    /// Begin at this time in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8
-    /// (since power-up), log:19.7 (since the first record).
-    #[arg(long, value_name = "TIME", conflicts_with_all = ["phase", "vary", "vary_plant"])]
-    at: Option<ClockTime>,
-    /// Begin with this phase, as in POWERED.
-    #[arg(long, value_name = "PHASE", value_parser = phase_named, conflicts_with_all = ["vary", "vary_plant"])]
-    phase: Option<Phase>,
+    /// Begin here instead of at the landing's first frame: at a time in seconds on the clock that its name says, T+12.9 or 12.9
+    /// (since the release), boot:19.8 (since power-up), log:19.7 (since the first record); with a phase, as in POWERED; or at
+    /// a frame, as in frame:1290.
+    #[arg(long, value_name = "TIME|PHASE|FRAME", value_parser = moment_named, conflicts_with_all = ["vary", "vary_plant"])]
+    at: Option<Moment>,
     /// Write the flight as a new log.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["vary", "vary_plant"])]
     log: Option<PathBuf>,
@@ -506,7 +501,11 @@ pub(crate) struct FlownHow {
     controller: Law,
     /// Another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
     /// flown with it from its beginning.
-    #[arg(long = "fault", value_name = "FAULT")]
+    #[arg(
+        long = "fault",
+        value_name = "FAULT",
+        long_help = format!("Another fault, from the beginning of the flight on; may be given more than once. Write {}", sim::fault::how_to_write())
+    )]
     faults: Vec<String>,
     /// Leave out a recorded fault, by its name or in full; `all` for every one.
     #[arg(long, value_name = "FAULT")]
@@ -539,11 +538,11 @@ impl Args {
             bail!("several flights need --vary, as in --vary powered.weights.theta=50:110:7")
         };
         let recording = Recording::open(file)?;
-        let start = match (self.tick, self.at, self.phase) {
-            (Some(tick), ..) => StartAt::Tick(tick),
-            (_, Some(time), _) => StartAt::Time(flight_time_s(&recording, time)?),
-            (.., Some(phase)) => StartAt::Phase(phase),
-            _ => StartAt::Landing,
+        let start = match self.at {
+            Some(Moment::Frame(tick)) => StartAt::Tick(tick),
+            Some(Moment::Time(time)) => StartAt::Time(flight_time_s(&recording, time)?),
+            Some(Moment::Phase(phase)) => StartAt::Phase(phase),
+            None => StartAt::Landing,
         };
         warn_of_what_is_missing(&recording);
         let options = self.how.options(start)?;
@@ -565,10 +564,26 @@ fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
     })
 }
 
-fn phase_named(given: &str) -> Result<Phase> {
-    let known = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given));
-    known.ok_or_else(|| {
+/// Where a flight is taken over, as a person names it.
+#[derive(Debug, Clone, Copy)]
+enum Moment {
+    Frame(u64),
+    Time(ClockTime),
+    Phase(Phase),
+}
+
+fn moment_named(given: &str) -> Result<Moment> {
+    if let Some(number) = given.strip_prefix("frame:") {
+        return number
+            .parse()
+            .map(Moment::Frame)
+            .with_context(|| format!("`{given}`: a frame is a whole number"));
+    }
+    if let Some(phase) = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given)) {
+        return Ok(Moment::Phase(phase));
+    }
+    given.parse().map(Moment::Time).map_err(|error| {
         let names: Vec<&str> = Phase::ALL.iter().map(|phase| phase.name()).collect();
-        anyhow!("no phase `{given}`; there are {}", names.join(", "))
+        anyhow!("{error}, a phase ({}), or frame:NUMBER", names.join(", "))
     })
 }

@@ -213,11 +213,14 @@ pub fn grid(vary: &[Vary], plant: &[Vary]) -> Result<Vec<Choice>, VaryError> {
     Ok((0..points).map(choice).collect())
 }
 
+/// Points of a sweep that are printed.
+const SHOWN: usize = 20;
+
 /// Writes the best points of a sweep as text.
 ///
 /// # Errors
 /// The output failed.
-pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) -> io::Result<()> {
+pub fn print_sweep(report: &SweepReport, output: &mut impl Write) -> io::Result<()> {
     let flights = report.flights.len();
     writeln!(
         output,
@@ -230,7 +233,7 @@ pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) ->
         not_reproduced(name, output)?;
     }
     writeln!(output, "{:>4} {:>9} {:>9}  settings; worst flight", "rank", "margin", "landed")?;
-    for (rank, point) in report.points.iter().enumerate().take(top) {
+    for (rank, point) in report.points.iter().enumerate().take(SHOWN) {
         let PointOutcome { settings, landed, worst_flight, .. } = point;
         writeln!(
             output,
@@ -242,8 +245,8 @@ pub fn print_sweep(report: &SweepReport, top: usize, output: &mut impl Write) ->
             shown(worst_flight)
         )?;
     }
-    if report.points.len() > top {
-        writeln!(output, "and {} more; --top shows more, --csv all", report.points.len() - top)?;
+    if report.points.len() > SHOWN {
+        writeln!(output, "and {} more; --csv shows all", report.points.len() - SHOWN)?;
     }
     Ok(())
 }
@@ -299,9 +302,6 @@ pub(super) struct Arguments {
     /// Flights flown at the same time; the answer does not depend on it [default: all processors].
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Points to show.
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    top: usize,
     /// Answer as CSV, with every point on every flight.
     #[arg(long)]
     csv: bool,
@@ -341,7 +341,7 @@ impl Arguments {
             } else if self.csv {
                 print_sweep_csv(&report, output)
             } else {
-                print_sweep(&report, self.top, output)
+                print_sweep(&report, output)
             }
         })?;
         Ok(Outcome::Given)

@@ -54,7 +54,7 @@ fn a_sweep_names_the_flights_that_are_not_reproduced() {
     let other = Recording { name: "other.mcap".to_owned(), ..forged() };
     let report = swept(&[MK2.recording(), other]);
     assert_eq!(report.not_reproduced, ["other.mcap"]);
-    let text = words(|output| print_sweep(&report, 1, output));
+    let text = words(|output| print_sweep(&report, output));
     assert!(
         text.contains("other.mcap: with nothing changed this build does not fly it as recorded"),
         "{text}"

@@ -44,7 +44,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
         (&["info"][..], "type 0, which does not exist".to_owned()),
         (&["verify"], format!("{ticks} of {ticks} frames identical of the readable part")),
         (&["evaluate"], "open loop".to_owned()),
-        (&["refly", "--tick", "12"], "closed loop".to_owned()),
+        (&["refly", "--at", "frame:12"], "closed loop".to_owned()),
         (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
     ] {
         let (code, said) = within(200, arguments, &path);

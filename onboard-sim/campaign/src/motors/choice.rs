@@ -201,8 +201,6 @@ pub struct Team {
     pub recipe: Recipe,
     /// Least and most ballast, kg.
     pub ballast_kg: [f64; 2],
-    /// Where the ballast is, m above the nozzle; at the centre of gravity of the airframe without its motor if not given.
-    pub ballast_station_m: Option<f64>,
     pub start: StartHeight,
     /// Widest motor that fits, m; that of the mission's own motor if not given.
     pub tube_m: Option<f64>,
@@ -212,7 +210,7 @@ impl Team {
     /// With a start up to the mission's own height.
     pub fn new(recipe: Recipe, ballast_kg: [f64; 2]) -> Self {
         let start = StartHeight::AtMost(start_height_m(&recipe.mission));
-        Self { recipe, ballast_kg, ballast_station_m: None, start, tube_m: None }
+        Self { recipe, ballast_kg, start, tube_m: None }
     }
 
     /// What it can change with a motor.
@@ -220,7 +218,7 @@ impl Team {
         let without_kg = frame.mass_kg() + curve.total_mass_kg();
         Limits {
             masses_kg: self.ballast_kg.map(|ballast_kg| without_kg + ballast_kg),
-            ballast_station_m: self.ballast_station_m.unwrap_or(frame.cg_station_m()),
+            ballast_station_m: frame.cg_station_m(),
             start: self.start,
             tube_m: self.tube_m.unwrap_or(frame.tube_m()),
         }

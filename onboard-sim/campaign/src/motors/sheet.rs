@@ -150,7 +150,7 @@ impl Card {
             "Front. Nobody within: the largest of what holds 99 % of the flights of the way of ending that reaches farthest (upper end), of the rows \
              above, and of {} ({}); rounded up to 10 m.{} On their legs: of the flights as planned, Wilson's interval. Fewer than {FEWEST} flights tell \
              neither. The fence of the mission ({:.0} m) only decides whether the landing motor may light. The same flights again: \
-             onboard-sim hazard --profile mission.toml --dispersion {} --winds {} --seed {} --survey {} --flights {}",
+             onboard-sim hazard --profile mission.toml --dispersion {} --wind {} --seed {} --flights {} --hazard-flights {}",
             self.rule,
             Rule::SOURCE,
             if open { " At least: there are too few flights for an upper end." } else { "" },

@@ -141,7 +141,7 @@ pub enum FlyError {
     #[error("a crew needs --key, the key that vehicle and stations share")]
     CrewWithoutKey,
     /// Two people cannot be replaced by a program.
-    #[error("a two-person crew arms and starts by hand: without --auto-start, and with --mavlink")]
+    #[error("a two-person crew arms and starts by hand: without --auto, and with --mavlink")]
     CrewWithoutHands,
     /// The board, or what it has decided.
     #[error(transparent)]
