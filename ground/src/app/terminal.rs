@@ -76,26 +76,31 @@ impl Style {
 /// A row and a column.
 type Place = (u16, u16);
 
-/// How the cursor gets to a place: down and along from where it stands, or at once. A line feed does nothing but go down, because
-/// the terminal is in raw mode.
+/// How the cursor gets to a place: from row to row and along from where it stands, or at once.
 #[derive(Debug, Clone, Copy)]
 enum Way {
     AtOnce(Place),
-    Along { down: u16, right: u16, left: u16 },
+    Along { rows: i16, columns: i16 },
 }
 
-/// The bytes of `ESC [ NUMBER LETTER`; one step needs no number.
+/// The bytes of `ESC [ NUMBER LETTER`; one step needs no number, and none no sequence.
 fn sequence_bytes(number: u16) -> usize {
-    if number == 1 { 3 } else { 4 + number.checked_ilog10().unwrap_or(0) as usize }
+    match number {
+        0 => 0,
+        1 => 3,
+        _ => 4 + number.ilog10() as usize,
+    }
 }
 
 impl Way {
     /// The shortest one. Nothing is known of the cursor without `from`.
     fn shortest(from: Option<Place>, to: Place) -> Self {
         let at_once = Self::AtOnce(to);
-        let Some((row, column)) = from.filter(|(row, _)| *row <= to.0) else { return at_once };
-        let (right, left) = (to.1.saturating_sub(column), column.saturating_sub(to.1));
-        let along = Self::Along { down: to.0 - row, right, left };
+        let Some((row, column)) = from else { return at_once };
+        let along = Self::Along {
+            rows: to.0.wrapping_sub(row).cast_signed(),
+            columns: to.1.wrapping_sub(column).cast_signed(),
+        };
         if along.bytes() < at_once.bytes() { along } else { at_once }
     }
 
@@ -104,27 +109,34 @@ impl Way {
             Self::AtOnce((row, column)) => {
                 sequence_bytes(row + 1).max(4) + sequence_bytes(column + 1).max(4) - 2
             }
-            Self::Along { down, right: 0, left } => {
-                usize::from(down) + usize::from(left).min(sequence_bytes(left))
+            Self::Along { rows, columns } => {
+                let vertical = if rows > 0 {
+                    usize::from(rows.unsigned_abs())
+                } else {
+                    sequence_bytes(rows.unsigned_abs())
+                };
+                vertical + sequence_bytes(columns.unsigned_abs())
             }
-            Self::Along { down, right, .. } => usize::from(down) + sequence_bytes(right),
         }
     }
 
     fn write(self, out: &mut impl Write) -> io::Result<()> {
-        let Self::Along { down, right, left } = self else {
-            let Self::AtOnce((row, column)) = self else { return Ok(()) };
-            return write!(out, "\x1b[{};{}H", row + 1, column + 1);
+        let (rows, columns) = match self {
+            Self::AtOnce((row, column)) => return write!(out, "\x1b[{};{}H", row + 1, column + 1),
+            Self::Along { rows, columns } => (rows, columns),
         };
-        (0..down).try_for_each(|_| out.write_all(b"\n"))?;
-        match (right, left) {
-            (0, left) if usize::from(left) <= sequence_bytes(left) => {
-                (0..left).try_for_each(|_| out.write_all(b"\x08"))
-            }
-            (0, left) => write!(out, "\x1b[{left}D"),
-            (1, _) => write!(out, "\x1b[C"),
-            (right, _) => write!(out, "\x1b[{right}C"),
-        }
+        // A line feed does nothing but go down, because the terminal is in raw mode.
+        (0..rows).try_for_each(|_| out.write_all(b"\n"))?;
+        steps(out, rows.min(0).unsigned_abs(), 'A')?;
+        steps(out, columns.unsigned_abs(), if columns < 0 { 'D' } else { 'C' })
+    }
+}
+
+fn steps(out: &mut impl Write, number: u16, letter: char) -> io::Result<()> {
+    match number {
+        0 => Ok(()),
+        1 => write!(out, "\x1b[{letter}"),
+        _ => write!(out, "\x1b[{number}{letter}"),
     }
 }
 
