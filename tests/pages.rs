@@ -27,7 +27,7 @@ fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// The lines of a page's blocks of code, without comments.
-fn lines_of_code(page: &str) -> Vec<String> {
+pub(crate) fn lines_of_code(page: &str) -> Vec<String> {
     let mut inside = false;
     let mut lines = Vec::new();
     for line in page.lines() {
@@ -42,7 +42,7 @@ fn lines_of_code(page: &str) -> Vec<String> {
 }
 
 /// The commands of a line: several after a semicolon or `&&`, one after a pipe, one in the quotes of `sbatch`.
-fn commands_of(line: &str) -> Vec<(Program, Vec<String>)> {
+pub(crate) fn commands_of(line: &str) -> Vec<(Program, Vec<String>)> {
     let parts = line.split([';', '|', '\'']).flat_map(|part| part.split("&&"));
     let words_of = |part: &str| -> Vec<String> {
         // Slurm and GNU parallel fill in a number.
@@ -130,7 +130,7 @@ fn every_help_has_an_example_that_its_program_understands() {
 }
 
 /// The text of a page at the root of the workspace.
-fn page(name: &str) -> String {
+pub(crate) fn page(name: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)).expect(name)
 }
 

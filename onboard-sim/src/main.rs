@@ -63,7 +63,7 @@ enum Command {
     #[command(after_help = "Example: onboard-sim hazard --profile mk2 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
     /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
-    #[command(after_help = "Example: onboard-sim paper --figures figures")]
+    #[command(after_help = "Example: onboard-sim paper --out figures")]
     Paper(cli::paper::PaperArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]

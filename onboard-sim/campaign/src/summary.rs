@@ -153,6 +153,15 @@ impl Sensitivity {
     pub fn cost(&self) -> f64 {
         self.inner.share - self.outer.share
     }
+
+    /// The 95 % interval of the cost: Newcombe's, from the Wilson intervals of both halves (Statistics in Medicine 17, 873-890,
+    /// method 10).
+    pub fn cost_interval(&self) -> [f64; 2] {
+        let Self { inner, outer, .. } = self;
+        let down = libm::hypot(inner.share - inner.low, outer.high - outer.share);
+        let up = libm::hypot(inner.high - inner.share, outer.share - outer.low);
+        [self.cost() - down, self.cost() + up]
+    }
 }
 
 impl Summary {
@@ -287,9 +296,9 @@ fn percent(share: &Share) -> String {
 }
 
 /// What attainable means.
-const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height is the same for all \
-                          flights; once the thrust begins, motor, mass and drag are known, and fins and tilt are a \
-                          throttle. Motion is vertical: wind, place and attitude dynamics are left out";
+const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height
+is the same for all flights; once the thrust begins, motor, mass and drag are
+known, and fins and tilt are a throttle. Wind, place and attitude are left out";
 
 /// The landings beyond that.
 fn others(attainable: &Attainable) -> String {
@@ -321,33 +330,37 @@ fn what(manifest: &Manifest) -> String {
 /// A heading and rows; the first column is text, the others are numbers.
 type Table = Vec<Vec<String>>;
 
+/// What fits into 80 columns; the summary has the other percentiles.
 fn distributions(summary: &Summary) -> Table {
-    let heading = ["", "least", "5 %", "25 %", "50 %", "75 %", "95 %", "99 %", "greatest"];
+    let heading = ["", "least", "5 %", "50 %", "95 %", "greatest"];
     let row = |found: &Distribution| {
-        let Distribution { least, p5, p25, p50, p75, p95, p99, greatest, .. } = found;
-        let values = [least, p5, p25, p50, p75, p95, p99, greatest].map(|value| format!("{value:.3}"));
+        let Distribution { least, p5, p50, p95, greatest, .. } = found;
+        let values = [least, p5, p50, p95, greatest].map(|value| format!("{value:.3}"));
         core::iter::once(found.column.to_owned()).chain(values).collect()
     };
     let heading = heading.map(str::to_owned).to_vec();
     core::iter::once(heading).chain(summary.distributions.iter().map(row)).collect()
 }
 
+/// The quantities whose cost the number of flights can tell from nothing.
 fn sensitivities(summary: &Summary) -> Table {
-    let heading = ["", "deviation", "inner %", "outer %", "cost %", "rank corr."];
+    let heading = ["", "deviation", "inner %", "outer %", "cost %", "from %", "to %"];
     let row = |found: &Sensitivity| {
-        let [inner, outer, cost] =
-            [found.inner.share, found.outer.share, found.cost()].map(|share| format!("{:.1}", 100.0 * share));
-        let (deviation, rank) = (found.median_deviation, found.rank_correlation);
-        vec![found.column.to_owned(), format!("{deviation:.4}"), inner, outer, cost, format!("{rank:.3}")]
+        let [low, high] = found.cost_interval();
+        let percents = [found.inner.share, found.outer.share, found.cost(), low, high];
+        let percents = percents.map(|share| format!("{:.1}", 100.0 * share));
+        let first = [found.column.to_owned(), format!("{:.4}", found.median_deviation)];
+        first.into_iter().chain(percents).collect()
     };
-    let heading = heading.map(str::to_owned).to_vec();
-    core::iter::once(heading).chain(summary.sensitivity.iter().map(row)).collect()
+    let told = summary.sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
+    core::iter::once(heading.map(str::to_owned).to_vec()).chain(told.map(row)).collect()
 }
 
 fn write_text(table: &Table, out: &mut String) -> fmt::Result {
+    let width = table.first().map_or(0, |heading| 50 / heading.len().saturating_sub(1).max(1));
     for row in table {
         for (place, cell) in row.iter().enumerate() {
-            if place == 0 { write!(out, "{cell:<32}") } else { write!(out, "{cell:>11}") }?;
+            if place == 0 { write!(out, "{cell:<30}") } else { write!(out, "{cell:>width$}") }?;
         }
         writeln!(out)?;
     }
@@ -355,8 +368,10 @@ fn write_text(table: &Table, out: &mut String) -> fmt::Result {
 }
 
 fn text(summary: &Summary, out: &mut String) -> fmt::Result {
+    let legs = &summary.legs;
+    writeln!(out, "{} of {} flights land on their legs.", legs.count, legs.of)?;
     writeln!(out, "{}", what(&summary.manifest))?;
-    writeln!(out, "legs    {}", percent(&summary.legs))?;
+    writeln!(out, "legs    {}", percent(legs))?;
     writeln!(out, "strict  {}", percent(&summary.strict))?;
     if let Some(attainable) = &summary.attainable {
         let Attainable { command_height_m, .. } = attainable;
@@ -378,7 +393,7 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     let plans = &summary.plans;
     writeln!(
         out,
-        "\nplans: {} converged, {} best feasible, {} shifted, {} upright law; {} iterations, {} solves not converged",
+        "\nplans: {} converged, {} best feasible, {} shifted, {} upright law;\n{} iterations, {} solves not converged",
         plans.converged,
         plans.best_feasible,
         plans.shifted,
@@ -388,12 +403,17 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     )?;
     writeln!(out)?;
     write_text(&distributions(summary), out)?;
+    let told = sensitivities(summary);
+    if told.len() == 1 {
+        return writeln!(out, "\nwhat costs landings: {} flights do not tell", legs.of);
+    }
     writeln!(
         out,
-        "\nwhat costs most: landings (legs) in the half nearest the nominal value (of wind and the state at apogee: the lower \
-         half) and in the other half; Spearman's rank correlation of deviation and use of the legs"
+        "\nwhat costs landings, with 95 % intervals: the half nearest the nominal value (of\nwind and the state at apogee the \
+         lower half) against the other half. Of {} quantities\none in forty stands here by chance",
+        summary.sensitivity.len()
     )?;
-    write_text(&sensitivities(summary), out)
+    write_text(&told, out)
 }
 
 /// Bars of a histogram.
