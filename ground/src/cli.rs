@@ -194,8 +194,12 @@ pub enum Command {
     )]
     Download(DownloadArgs),
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
-    #[command(after_help = "Example: ground status")]
-    Status,
+    #[command(after_help = "Examples:\n  ground status\n  ground status --json")]
+    Status {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// End a station. This is refused while its vehicle is armed or in flight.
     #[command(after_help = "Examples:\n  ground stop\n  ground stop --force")]
     Stop {
@@ -520,7 +524,7 @@ mod tests {
             command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
         };
         assert_eq!(flags("stop"), ["force", "socket"]);
-        assert_eq!(flags("status"), [""; 0]);
+        assert_eq!(flags("status"), ["json"]);
         let link = ["to", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
         assert_eq!(flags("download"), link);
         assert!(Cli::try_parse_from(["ground", "--timeout-s", "3", "attach"]).is_err());

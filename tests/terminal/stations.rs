@@ -1,5 +1,7 @@
 //! Stations are found, listed and stopped, and other programs do not affect them.
 
+use std::path::Path;
+
 use e2e::{ARM, Bound, Ended, Running, Signal, Terminal};
 
 use super::rig::{Pad, ground};
@@ -60,12 +62,15 @@ fn stations_are_listed_and_stopped_and_an_armed_one_only_by_force() {
         station.pad.proxy.ground_link().as_str(),
         "vehicle 1/1",
         "PAD_IDLE disarmed",
-        "log held.mcap",
+        "/held.mcap",
         "screen 1, anna",
         ".sock",
     ] {
         assert!(listed.output.contains(words), "no {words} in:\n{}", listed.output);
     }
+    let told: serde_json::Value = serde_json::from_str(&station.run(&["status", "--json"]).output).unwrap();
+    assert_eq!(told[0]["phase"], "PAD_IDLE disarmed", "{told}");
+    assert!(Path::new(told[0]["log"].as_str().unwrap()).is_absolute(), "{told}");
     screen.type_until(b"AARM\r", " ARMED ");
     assert!(station.run(&["status"]).output.contains("PAD_ARMED ARMED"));
     let refused = station.run(&["stop"]);

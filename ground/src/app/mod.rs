@@ -74,7 +74,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Some(Command::Config { command }) => print_config(&command),
         Some(Command::Completions { shell }) => print_completions(shell),
         Some(Command::Man) => print_manual(),
-        Some(Command::Status) => runtime.block_on(stations::list()),
+        Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;
             let (socket, who) = (socket.socket.or(config.socket), config.operator);

@@ -132,13 +132,15 @@ fn is_of_the_flight(event: &Event) -> bool {
     (!by_ground || told.iter().any(|words| event.text.starts_with(words))) && !of_the_solver
 }
 
+/// A path that is the same wherever it is read.
+pub(super) fn absolute(path: &str) -> String {
+    std::path::absolute(path).map_or_else(|_no_folder| path.to_owned(), |path| path.display().to_string())
+}
+
 /// What a station without a screen says at once: its links, its log, and what to type next.
 pub(super) fn greeting(model: &Model) -> String {
     let link = &model.settings.link_name;
-    let log = model.settings.log_path.as_ref().map_or_else(
-        || "none".to_owned(),
-        |path| std::path::absolute(path).map_or_else(|_| path.clone(), |path| path.display().to_string()),
-    );
+    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     format!("link: {link}\nlog: {log}\ntype next: ground attach (a screen), ground stop (the end)\n")
 }
 

@@ -8,9 +8,10 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::transport::LinkAddress;
+use serde::Serialize;
 use tokio::io::AsyncWriteExt as _;
 
-use super::output::print;
+use super::output::{absolute, print};
 use super::server::read_one;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
 use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
@@ -28,7 +29,7 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
     let settings = &model.settings;
     let vehicle = &model.vehicle;
     let boot = vehicle.status.as_ref().map_or(0, |status| status.value.boot_number);
-    let boot = if boot == 0 { String::new() } else { format!(" boot {boot}") };
+    let boot = if boot == 0 { String::new() } else { format!(" boot {boot:08X}") };
     let kind = match settings.demonstration {
         true => "DEMO",
         false if vehicle.is_simulated() => "SIM",
@@ -48,14 +49,14 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
         vehicle: if heard { named } else { "not heard".to_owned() },
         phase: format!("{phase} {}", if armed { "ARMED" } else { "disarmed" }),
         at_risk: model.is_at_risk(),
-        log: settings.log_path.clone().unwrap_or_default(),
+        log: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
         screens: own.into_iter().chain(attached).collect::<Vec<_>>().join("; "),
     }
 }
 
 /// Answers a request to stop this station.
 pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
-    let log = model.settings.log_path.as_deref().unwrap_or("none");
+    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     let free = force || model.settings.demonstration;
     match why_not_stop(model, now).filter(|_| !free) {
         Some(why) => {
@@ -157,6 +158,25 @@ fn listed(found: &[Found]) -> String {
     text
 }
 
+/// A station as a program reads it: its socket, and its status or why it gives none.
+#[derive(Serialize)]
+struct Listed<'a> {
+    socket: &'a Path,
+    #[serde(flatten)]
+    status: Option<&'a StationStatus>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<&'a str>,
+}
+
+fn listed_as_json(found: &[Found]) -> anyhow::Result<String> {
+    let one = |(socket, status): &'_ Found| -> serde_json::Result<serde_json::Value> {
+        let error = status.as_ref().err().map(String::as_str);
+        serde_json::to_value(Listed { socket, status: status.as_ref().ok(), error })
+    };
+    let all = found.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    Ok(serde_json::to_string_pretty(&all)? + "\n")
+}
+
 /// For a demonstration: a line saying that a station runs and how to reach it.
 pub(super) async fn running_beside() -> Option<String> {
     // An error is ignored, because a demonstration needs no station.
@@ -207,9 +227,13 @@ fn kind_and_port(link: &str) -> String {
 ///
 /// # Errors
 /// The stations cannot be looked for.
-pub async fn list() -> anyhow::Result<Exit> {
+pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
     let found = stations().await.context("looking for ground stations")?;
-    let text = if found.is_empty() { "no ground station of yours runs\n".to_owned() } else { listed(&found) };
+    let text = match &found[..] {
+        _ if as_json => listed_as_json(&found)?,
+        [] => "no ground station of yours runs\n".to_owned(),
+        _ => listed(&found),
+    };
     print(text.as_bytes())?;
     Ok(Exit::Landed)
 }
