@@ -1,5 +1,5 @@
 //! Shows on standard error how far something long is, and how long the rest will take: a bar on a terminal, elsewhere a line every
-//! ten seconds.
+//! ten seconds and one at the end.
 
 use std::fmt::Display;
 use std::io::Write as _;
@@ -47,13 +47,14 @@ impl Stopwatch {
             return;
         }
         let (started, shown) = *times;
-        if done >= of || now() - shown < LINE_EVERY {
-            return;
-        }
-        times.1 = now();
-        let left_s = (now() - started).as_secs_f64() * (of - done) as f64 / done.max(1) as f64;
         // Standard error may be closed.
-        let _ = writeln!(std::io::stderr(), "{done} of {of} {what}; {left_s:.0} s to go");
+        if done >= of {
+            let _ = writeln!(std::io::stderr(), "{done} of {of} {what}");
+        } else if now() - shown >= LINE_EVERY {
+            times.1 = now();
+            let left_s = (now() - started).as_secs_f64() * (of - done) as f64 / done.max(1) as f64;
+            let _ = writeln!(std::io::stderr(), "{done} of {of} {what}; {left_s:.0} s to go");
+        }
     }
 }
 
