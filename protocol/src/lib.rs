@@ -18,6 +18,7 @@
 //! * `links` (the same feature): the open links of a program, together;
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
 //! * [`mission`]: which mission is meant;
+//! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a record of the log;
 //! * [`book`]: who did what, with a signed hash over all of it;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
@@ -92,9 +93,12 @@ pub mod links;
 #[cfg(feature = "std")]
 pub mod log;
 pub mod mission;
+pub mod motion;
 pub mod parameter;
 pub mod records;
 pub mod signing;
 pub mod text;
+#[cfg(feature = "std")]
+pub mod told;
 #[cfg(feature = "transport")]
 pub mod transport;

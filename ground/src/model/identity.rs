@@ -8,6 +8,7 @@ use protocol::dialect::{
     HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TD_FLIGHT_STATUS_DATA, TdVehicleFlag,
 };
 use protocol::identity::LARGEST_BOOT_NUMBER;
+pub use protocol::told::may_be_ours;
 
 use super::{Model, Sample, words};
 
@@ -130,11 +131,6 @@ pub struct Foreign {
     pub heard_at: Duration,
     /// The newest text of each message, with its name.
     pub told: BTreeMap<&'static str, Sample<String>>,
-}
-
-/// Whether a heartbeat is one that our vehicles send. Whether it is ours only its `TD_FLIGHT_STATUS` shows.
-pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
-    beat.autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC && beat.mavtype == MavType::MAV_TYPE_ROCKET
 }
 
 impl Foreign {

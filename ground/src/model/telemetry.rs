@@ -5,10 +5,11 @@ use std::time::Duration;
 use mavlink::MessageData;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
-    TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
+    TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_PREDICTED_PATH_DATA, TdLimit,
+    TdStart,
 };
 use protocol::mission::MissionHash;
+pub use protocol::told::{phase_from_number, phase_of};
 
 use super::{
     Attitude, Battery, Deflection, FlownMission, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction,
@@ -21,13 +22,14 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         return;
     }
     vehicle.boot.hear(message);
+    vehicle.told.hear(message);
     vehicle.keep(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => {
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
         }
-        MavMessage::TD_FLIGHT_STATUS(data) => {
-            vehicle.status = Some(Sample::new(never_back(vehicle, data), now));
+        MavMessage::TD_FLIGHT_STATUS(_) => {
+            vehicle.status = vehicle.told.status().map(|status| Sample::new(status.clone(), now));
         }
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {
@@ -46,10 +48,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
                 vehicle.burn.extend(&motion, now);
             }
         }
-        // Not VFR_HUD: its height is above mean sea level.
         MavMessage::GLOBAL_POSITION_INT(data) => {
-            let motion = Motion::vertical(f64::from(data.relative_alt) / 1e3, -f64::from(data.vz) / 1e2);
-            vehicle.hud = Some(Sample::new(motion, now));
+            vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
         }
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
             let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
@@ -79,14 +79,14 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
 impl Vehicle {
     pub fn fins(&self) -> Option<Sample<[Deflection; 4]>> {
         self.converted(|data: &TD_FINS_DATA| {
-            std::array::from_fn(|k| deflection(data.commanded[k], data.measured[k]))
+            std::array::from_fn(|k| Deflection::of_centidegrees(data.commanded[k], data.measured[k]))
         })
     }
 
     pub fn gimbal(&self) -> Option<Sample<Gimbal>> {
         self.converted(|data: &TD_GIMBAL_DATA| Gimbal {
-            pitch: deflection(data.pitch_commanded, data.pitch_measured),
-            yaw: deflection(data.yaw_commanded, data.yaw_measured),
+            pitch: Deflection::of_centidegrees(data.pitch_commanded, data.pitch_measured),
+            yaw: Deflection::of_centidegrees(data.yaw_commanded, data.yaw_measured),
         })
     }
 
@@ -129,15 +129,6 @@ impl Vehicle {
     }
 }
 
-/// A status whose time since the release never goes back: after the touchdown the vehicle tells the time of the contact, which it
-/// finds a second later.
-fn never_back(vehicle: &Vehicle, status: &TD_FLIGHT_STATUS_DATA) -> TD_FLIGHT_STATUS_DATA {
-    let before_ms = vehicle.status.as_ref().map_or(0, |status| status.value.countdown_ms);
-    let goes_on = before_ms < 0 && status.countdown_ms < 0;
-    let countdown_ms = if goes_on { status.countdown_ms.min(before_ms) } else { status.countdown_ms };
-    TD_FLIGHT_STATUS_DATA { countdown_ms, ..status.clone() }
-}
-
 /// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a message of our vehicles.
 fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
     match message {
@@ -170,37 +161,6 @@ fn heartbeat(data: &HEARTBEAT_DATA) -> Heartbeat {
     }
 }
 
-/// The phase in a HEARTBEAT; `None` if another autopilot has sent it.
-pub fn phase_of(data: &HEARTBEAT_DATA) -> Option<TdPhase> {
-    phase_from_number(data.custom_mode).filter(|_| may_be_ours(data))
-}
-
-/// The phase for the `custom_mode` of a HEARTBEAT; `None` for a number that is not in the dialect.
-pub fn phase_from_number(number: u32) -> Option<TdPhase> {
-    use TdPhase as P;
-    let phases = [
-        P::TD_PHASE_SAFE,
-        P::TD_PHASE_PAD_IDLE,
-        P::TD_PHASE_PAD_ARMED,
-        P::TD_PHASE_BOOST,
-        P::TD_PHASE_COAST,
-        P::TD_PHASE_DEPLOY,
-        P::TD_PHASE_AERO_DESCENT,
-        P::TD_PHASE_LAND_ARMED,
-        P::TD_PHASE_IGNITION,
-        P::TD_PHASE_POWERED,
-        P::TD_PHASE_TOUCHDOWN,
-        P::TD_PHASE_SAFED,
-        P::TD_PHASE_CHUTE,
-    ];
-    phases.into_iter().find(|phase| *phase as u32 == number)
-}
-
-fn deflection(commanded_cdeg: i16, measured_cdeg: i16) -> Deflection {
-    let radians = |cdeg: i16| (f64::from(cdeg) / 100.0).to_radians();
-    Deflection { commanded_rad: radians(commanded_cdeg), measured_rad: radians(measured_cdeg) }
-}
-
 fn path(data: &TD_PREDICTED_PATH_DATA) -> Vec<(f64, f64)> {
     let metres = |cm: i16| f64::from(cm) / 100.0;
     let points = data.x.iter().zip(&data.altitude).map(|(x, altitude)| (metres(*x), metres(*altitude)));
@@ -222,7 +182,7 @@ fn name(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
+    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, TD_FLIGHT_STATUS_DATA};
 
     const NOW: Duration = Duration::from_secs(1);
 

@@ -9,8 +9,11 @@ use protocol::dialect::{
     TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
+use protocol::told::Told;
 
-use super::{Attitude, BodySpeed, Boot, FlownPath, Foreign, KeepAway, Motion, PadCheck, Touchdown, Trend};
+use super::{
+    Attitude, BodySpeed, Boot, Deflection, FlownPath, Foreign, KeepAway, Motion, PadCheck, Touchdown, Trend,
+};
 
 /// A value older than this is marked as stale.
 pub const STALE_AFTER: Duration = Duration::from_millis(1_500);
@@ -52,22 +55,6 @@ pub struct Heartbeat {
     pub phase: Option<TdPhase>,
     /// `MAV_STATE_FLIGHT_TERMINATION`.
     pub terminated: bool,
-}
-
-/// Commanded and measured angle.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Deflection {
-    /// What the controller commanded.
-    pub commanded_rad: f64,
-    /// What the sensor measured.
-    pub measured_rad: f64,
-}
-
-impl Deflection {
-    /// How far it is from where it was commanded, degrees.
-    pub fn error_deg(&self) -> f64 {
-        (self.commanded_rad - self.measured_rad).abs().to_degrees()
-    }
 }
 
 /// Gimbal in both planes.
@@ -128,6 +115,8 @@ pub struct Vehicle {
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
+    /// What goes into the log's record of it.
+    pub told: Told,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
     pub prediction: Option<Sample<Prediction>>,

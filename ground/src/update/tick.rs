@@ -3,16 +3,14 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TD_CONTROLLER_DATA,
-    TIMESYNC_DATA,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TIMESYNC_DATA,
 };
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
 use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
 use crate::model::{
-    Deflection, LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace,
-    unheard_hints,
+    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace, unheard_hints,
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
@@ -181,39 +179,11 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
 }
 
 fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
-    let vehicle = &model.vehicle;
-    let motion = vehicle.best_motion().map(|motion| motion.value);
-    let attitude = vehicle.attitude.map(|attitude| attitude.value);
-    let body = vehicle.body_speed().map(|speed| speed.value);
-    let status = vehicle.status.as_ref().map(|status| &status.value);
-    let controller = vehicle.last::<TD_CONTROLLER_DATA>();
-    let controller = controller.as_ref().map(|controller| &controller.value);
-    let gimbal = vehicle.gimbal().map(|gimbal| gimbal.value.pitch);
-    let fins = vehicle.fins().map_or_else(Vec::new, |fins| fins.value.to_vec());
-    let angles = |pick: fn(&Deflection) -> f64| fins.iter().map(pick).collect();
-    let link = model.link.stats.figures(now);
     Telemetry {
-        time_s: now.as_secs_f64(),
-        phase: vehicle.phase().map(|phase| phase.value as u32),
-        interlocks: status.map(|status| u32::from(status.interlocks.bits())),
-        countdown_ms: status.map(|status| status.countdown_ms),
-        altitude_m: motion.map(|motion| motion.altitude_m),
-        x_m: motion.map(|motion| motion.x_m),
-        pitch_rad: attitude.map(|attitude| attitude.pitch_rad),
-        u_m_s: body.map(|speed| speed.u_m_s),
-        w_m_s: body.map(|speed| speed.w_m_s),
-        q_rad_s: attitude.map(|attitude| attitude.pitch_rate_rad_s),
-        fin_commanded_rad: angles(|fin| fin.commanded_rad),
-        fin_measured_rad: angles(|fin| fin.measured_rad),
-        gimbal_commanded_rad: gimbal.map(|gimbal| gimbal.commanded_rad),
-        gimbal_measured_rad: gimbal.map(|gimbal| gimbal.measured_rad),
-        control_level: controller.map(|controller| controller.level as u32),
-        solver_status: controller.map(|controller| controller.solver_status as u32),
-        iterations: controller.map(|controller| u32::from(controller.iterations)),
-        solve_time_s: controller.map(|controller| f64::from(controller.solve_time_us) * 1e-6),
         link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
         link_loss: model.link.loss(now),
-        link_rx_bytes_s: Some(link.rx_bytes_s),
+        link_rx_bytes_s: Some(model.link.stats.figures(now).rx_bytes_s),
+        ..model.vehicle.told.record(now.as_secs_f64())
     }
 }
 

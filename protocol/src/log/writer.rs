@@ -183,6 +183,15 @@ impl<W: Write + Seek> LogWriter<W> {
         Ok(self.writer.flush()?)
     }
 
+    /// Writes an entry of metadata that is known only now.
+    ///
+    /// # Errors
+    /// The underlying writer failed.
+    pub fn write_metadata(&mut self, name: &str, key: &str, value: String) -> Result<(), LogWriteError> {
+        let metadata = BTreeMap::from([(key.to_owned(), value)]);
+        Ok(self.writer.write_metadata(&mcap::records::Metadata { name: name.to_owned(), metadata })?)
+    }
+
     /// Writes the summary and the footer.
     ///
     /// # Errors

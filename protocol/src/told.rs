@@ -1,0 +1,164 @@
+//! What a vehicle has told of itself, as one record of the log. A station records it as it hears, and `replay` makes the same of
+//! a `.tlog`.
+
+use num_traits::FromPrimitive as _;
+
+use crate::dialect::{
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
+};
+use crate::log::v1::Telemetry;
+use crate::motion::{Attitude, BodySpeed, Deflection, Motion};
+
+/// Whether a heartbeat is one that our vehicles send. Whether it is ours only its `TD_FLIGHT_STATUS` shows.
+pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
+    beat.autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC && beat.mavtype == MavType::MAV_TYPE_ROCKET
+}
+
+/// The phase in a HEARTBEAT; `None` if another autopilot has sent it.
+pub fn phase_of(beat: &HEARTBEAT_DATA) -> Option<TdPhase> {
+    phase_from_number(beat.custom_mode).filter(|_| may_be_ours(beat))
+}
+
+/// The phase for the `custom_mode` of a HEARTBEAT; `None` for a number that is not in the dialect.
+pub fn phase_from_number(number: u32) -> Option<TdPhase> {
+    TdPhase::from_u32(number)
+}
+
+/// The last of each message that goes into the record.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    phase: Option<TdPhase>,
+    status: Option<TD_FLIGHT_STATUS_DATA>,
+    attitude: Option<Attitude>,
+    motion: Option<Motion>,
+    /// Only height and climb.
+    vertical: Option<Motion>,
+    fins: Option<TD_FINS_DATA>,
+    gimbal: Option<TD_GIMBAL_DATA>,
+    controller: Option<TD_CONTROLLER_DATA>,
+}
+
+impl Told {
+    /// Takes a message of the vehicle. Returns whether it goes into the record.
+    pub fn hear(&mut self, message: &MavMessage) -> bool {
+        match message {
+            MavMessage::HEARTBEAT(data) => self.phase = phase_of(data).or(self.phase),
+            MavMessage::TD_FLIGHT_STATUS(data) => {
+                let booted = |before: &TD_FLIGHT_STATUS_DATA| before.boot_number != data.boot_number;
+                if self.status.as_ref().is_some_and(booted) {
+                    *self = Self::default();
+                }
+                self.phase = Some(data.phase);
+                self.status = Some(never_back(self.status.as_ref(), data));
+            }
+            // What is no rotation says nothing.
+            MavMessage::ATTITUDE_QUATERNION(data) => self.attitude = Attitude::of(data).or(self.attitude),
+            MavMessage::LOCAL_POSITION_NED(data) => self.motion = Some(Motion::of(data)),
+            MavMessage::GLOBAL_POSITION_INT(data) => self.vertical = Some(Motion::of_global(data)),
+            MavMessage::TD_FINS(data) => self.fins = Some(data.clone()),
+            MavMessage::TD_GIMBAL(data) => self.gimbal = Some(data.clone()),
+            MavMessage::TD_CONTROLLER(data) => self.controller = Some(data.clone()),
+            _ => return false,
+        }
+        true
+    }
+
+    /// The last status, whose time since the release never goes back.
+    pub fn status(&self) -> Option<&TD_FLIGHT_STATUS_DATA> {
+        self.status.as_ref()
+    }
+
+    /// Everything as one record. It says nothing of the link.
+    pub fn record(&self, time_s: f64) -> Telemetry {
+        let motion = self.motion.or(self.vertical);
+        let known = |value: f64| Some(value).filter(|value| value.is_finite());
+        let body = self.attitude.zip(self.motion).map(|(attitude, motion)| BodySpeed::of(&attitude, &motion));
+        let fins: Vec<Deflection> = self
+            .fins
+            .iter()
+            .flat_map(|fins| {
+                fins.commanded
+                    .iter()
+                    .zip(&fins.measured)
+                    .map(|(commanded, measured)| Deflection::of_centidegrees(*commanded, *measured))
+            })
+            .collect();
+        let gimbal = self.gimbal.as_ref();
+        let gimbal =
+            gimbal.map(|data| Deflection::of_centidegrees(data.pitch_commanded, data.pitch_measured));
+        let controller = self.controller.as_ref();
+        Telemetry {
+            time_s,
+            phase: self.phase.map(|phase| phase as u32),
+            interlocks: self.status.as_ref().map(|status| u32::from(status.interlocks.bits())),
+            countdown_ms: self
+                .status
+                .as_ref()
+                .map(|status| status.countdown_ms)
+                .filter(|left| *left != i32::MAX),
+            altitude_m: motion.map(|motion| motion.altitude_m),
+            x_m: motion.and_then(|motion| known(motion.x_m)),
+            pitch_rad: self.attitude.map(|attitude| attitude.pitch_rad),
+            u_m_s: body.map(|speed| speed.u_m_s),
+            w_m_s: body.map(|speed| speed.w_m_s),
+            q_rad_s: self.attitude.map(|attitude| attitude.pitch_rate_rad_s),
+            fin_commanded_rad: fins.iter().map(|fin| fin.commanded_rad).collect(),
+            fin_measured_rad: fins.iter().map(|fin| fin.measured_rad).collect(),
+            gimbal_commanded_rad: gimbal.map(|angle| angle.commanded_rad),
+            gimbal_measured_rad: gimbal.map(|angle| angle.measured_rad),
+            control_level: controller.map(|controller| controller.level as u32),
+            solver_status: controller.map(|controller| controller.solver_status as u32),
+            iterations: controller.map(|controller| u32::from(controller.iterations)),
+            solve_time_s: controller.map(|controller| f64::from(controller.solve_time_us) * 1e-6),
+            ..Telemetry::default()
+        }
+    }
+}
+
+/// After the touchdown the vehicle tells the time of the contact, which it finds a second later.
+fn never_back(
+    before: Option<&TD_FLIGHT_STATUS_DATA>,
+    status: &TD_FLIGHT_STATUS_DATA,
+) -> TD_FLIGHT_STATUS_DATA {
+    let before_ms = before.map_or(0, |status| status.countdown_ms);
+    let goes_on = before_ms < 0 && status.countdown_ms < 0;
+    let countdown_ms = if goes_on { status.countdown_ms.min(before_ms) } else { status.countdown_ms };
+    TD_FLIGHT_STATUS_DATA { countdown_ms, ..status.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
+
+    /// The record of a vehicle that falls with 20 m/s, after rotations about its own axes: to its pitch, then a roll.
+    fn falling(pitch_deg: f64, roll_deg: f64, sign: f64) -> Telemetry {
+        let half = |angle_deg: f64| libm::sincos(angle_deg.to_radians() / 2.0);
+        let ((sin_p, cos_p), (sin_r, cos_r)) = (half(pitch_deg), half(roll_deg));
+        let [q1, q2, q3, q4] =
+            [cos_p * cos_r, cos_p * sin_r, sin_p * cos_r, -sin_p * sin_r].map(|part| (sign * part) as f32);
+        let mut told = Told::default();
+        let attitude = ATTITUDE_QUATERNION_DATA { q1, q2, q3, q4, ..Default::default() };
+        told.hear(&MavMessage::ATTITUDE_QUATERNION(attitude));
+        let position = LOCAL_POSITION_NED_DATA { vz: 20.0, ..Default::default() };
+        told.hear(&MavMessage::LOCAL_POSITION_NED(position));
+        told.record(0.0)
+    }
+
+    /// A roll turns the lateral axes and nothing else, and both signs of a quaternion are one attitude.
+    #[test]
+    fn pitch_and_axial_speed_do_not_depend_on_the_roll() {
+        for roll_deg in [0.0, 50.0, 180.0, 300.0] {
+            for sign in [1.0, -1.0] {
+                let record = falling(60.0, roll_deg, sign);
+                let near = |found: Option<f64>, expected: f64| {
+                    assert!((found.unwrap() - expected).abs() < 1e-5, "{found:?}, not {expected}");
+                };
+                near(record.pitch_rad, 60.0_f64.to_radians());
+                near(record.u_m_s, -20.0 * 0.866_025_4);
+                near(record.w_m_s, 20.0 * 0.5 * libm::cos(roll_deg.to_radians()));
+            }
+        }
+    }
+}
