@@ -29,7 +29,8 @@ fn fact<'a>(info: &'a Ended, word: &str) -> &'a str {
 fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let mut ground = Running::start(&mut auto_ground(folder, &["udpin:127.0.0.1:0"]));
+    let mut station = auto_ground(folder, &["udpin:127.0.0.1:0"]);
+    let mut ground = Running::start(station.args(["--tlog", "ground.tlog"]));
     let mut fly = vehicle(folder, &[&ground.udp_link()]);
     let flight = Running::start(fly.args(["--profile", "mk2"]));
     expect_landing(flight, ground);
@@ -73,8 +74,58 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
         assert!(received.len() >= of_all, "{table}: {} of {}", received.len(), sent.len());
     }
 
+    its_tlog_tells_the_same(folder);
+
     // And `compare` finds no difference.
     let compared = replay(folder, &["compare", "vehicle.mcap", "ground.mcap"]);
-    assert!(compared.output.contains("**Within tolerance.**"), "{}", compared.output);
+    assert!(
+        compared.output.contains("ground.mcap is within tolerance of vehicle.mcap"),
+        "{}",
+        compared.output
+    );
+    assert!(compared.output.contains("the air lost 0 (0.0 %)"), "{}", compared.output);
     assert!(compared.output.contains("Compared while both recorded"), "{}", compared.output);
+}
+
+/// The times of a table's log and a column, s and its unit, where the column has a value.
+fn over_time(table: &Path, name: &str) -> Vec<(f64, f64)> {
+    let times =
+        column(table, "log_time_ns").into_iter().map(|time_ns| time_ns.parse().unwrap_or(f64::NAN) / 1e9);
+    let rows = times.zip(column(table, name));
+    rows.filter_map(|(time_s, value)| Some((time_s, value.parse().ok()?))).collect()
+}
+
+/// What `replay` makes of a station's `.tlog` is what the station recorded itself: of the vehicle's state, which rolls as it
+/// falls, each value that the station recorded is a value of the same moment there.
+fn its_tlog_tells_the_same(folder: &Path) {
+    replay(folder, &["export", "ground.tlog", "--to", "csv", "--output", "tlog"]);
+    let of = |log: &str, name: &str| over_time(&folder.join(log).join("telemetry.csv"), name);
+    for (name, near) in [
+        ("phase", 0.0),
+        ("altitude_m", 0.01),
+        ("x_m", 0.01),
+        ("pitch_rad", 0.001),
+        ("u_m_s", 0.01),
+        ("w_m_s", 0.01),
+        ("q_rad_s", 0.001),
+        ("gimbal_measured_rad", 0.001),
+    ] {
+        let (recorded, made) = (of("ground", name), of("tlog", name));
+        assert!(recorded.len() > 100, "{name}: {}", recorded.len());
+        let mut equal = 0;
+        for (time_s, value) in &recorded {
+            // Both record ten times a second, and not in the same moments; when nothing is heard, only the station does.
+            let same_moment =
+                made.iter().filter(|(at_s, _)| (at_s - time_s).abs() < 0.25).map(|(_, other)| *other);
+            let values: Vec<f64> = same_moment.collect();
+            let (least, most) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), other| {
+                    (least.min(*other), most.max(*other))
+                });
+            let within = values.is_empty() || (least - near..=most + near).contains(value);
+            assert!(within, "{name}: {value} at {time_s:.3}, and {values:?} in the .tlog");
+            equal += usize::from(values.iter().any(|other| (other - value).abs() <= near));
+        }
+        assert!(equal * 10 >= recorded.len() * 9, "{name}: {equal} of {} are equal", recorded.len());
+    }
 }

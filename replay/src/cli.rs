@@ -101,6 +101,13 @@ pub(crate) fn write_new(path: &Path, text: &str) -> Result<()> {
     Ok(write_whole(path.into(), Path::new(""), |file| file.write_all(text.as_bytes()))?)
 }
 
+/// Writes a table into a new file; an existing one is kept.
+pub(crate) fn write_table(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
+    let mut table = Vec::new();
+    write(&mut table)?;
+    write_new(path, std::str::from_utf8(&table)?)
+}
+
 /// Refuses a path where a file is, before the work for it is done.
 pub(crate) fn refuse_existing(path: &Path) -> Result<()> {
     ensure!(
@@ -142,12 +149,12 @@ pub fn say(text: &str) {
     let _ = writeln!(output, "replay: {text}").and_then(|()| output.flush());
 }
 
-/// Warns about damage, a missing end of the flight and missing ticks.
+/// Warns about damage, a missing end of the flight and missing frames.
 pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
     if let Some(Gap { after, before }) = recording.gap() {
         let name = &recording.name;
         say(&format!(
-            "warning: {name}: after tick {after} comes tick {before}; nothing after the gap was run again"
+            "warning: {name}: after frame {after} comes frame {before}; nothing after the gap was run again"
         ));
     }
     warn_of_damage(&recording.name, recording.damage.as_deref());

@@ -45,7 +45,7 @@ pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
 /// Run facts of a re-flown flight's log: the law of the landing burn, and the first frame that it flew.
 pub(crate) const REFLOWN_BY: &str = "reflown_by";
-pub(crate) const REFLOWN_AT: &str = "reflown_at_tick";
+pub(crate) const REFLOWN_AT: &str = "reflown_at_frame";
 
 /// A flight computer that is run on the frames of a log, from its power-up or its release on; frames must come in order.
 /// Missing frames mean that the computer was restarted: it is restarted here, too.

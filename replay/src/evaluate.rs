@@ -1,6 +1,6 @@
 //! Open loop: runs the controller alone on the recorded inputs, with other settings.
 //!
-//! Every tick gets its recorded input, so the vehicle moves as it did in flight, for any command. The answer
+//! Every frame gets its recorded input, so the vehicle moves as it did in flight, for any command. The answer
 //! is what the controller *would have commanded*, beside what it did command. What *would have happened* is a question
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, refuse_existing, warn_of_what_is_missing, write_table};
 pub use crate::controller::Decided;
 use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
@@ -39,13 +39,13 @@ pub enum EvaluateError {
     /// A timed setting of the estimator, which is set up only once.
     #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
     TimedEstimator { setting: String },
-    /// A setting whose time comes after the last tick.
-    #[error("{setting}: takes effect after the end of {name}, whose last tick is at T+{last_s:.3} s")]
+    /// A setting whose time comes after the last frame.
+    #[error("{setting}: takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s")]
     AfterTheEnd {
         setting: String,
         /// The file.
         name: String,
-        /// Time of the last tick, s.
+        /// Time of the last frame, s.
         last_s: f64,
     },
     /// A setting that the controller does not have.
@@ -56,7 +56,7 @@ pub enum EvaluateError {
         /// The setting.
         path: String,
     },
-    /// A setting that would change the times of the ticks.
+    /// A setting that would change the times of the frames.
     #[error("{path} cannot be changed on recorded inputs: there is one input every {recorded_s} s")]
     SampleTime {
         /// The setting.
@@ -66,10 +66,10 @@ pub enum EvaluateError {
     },
 }
 
-/// A tick: the recorded decision, and the decision with other settings.
+/// A frame: the recorded decision, and the decision with other settings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EvaluatedTick {
-    pub tick: u64,
+pub struct EvaluatedFrame {
+    pub frame: u64,
     /// Vehicle time, s.
     pub time_s: f64,
     pub phase: &'static str,
@@ -98,43 +98,47 @@ pub struct EvaluateReport {
     pub file: String,
     /// The changed settings.
     pub settings: Vec<String>,
-    /// Ticks that this build decides differently from the record even with nothing changed: differences there may come
+    /// Frames that this build decides differently from the record even with nothing changed: differences there may come
     /// from the build and not from the settings.
     pub unchanged_different: usize,
-    /// Number of ticks whose gimbal command differs in any bit.
+    /// Number of frames whose gimbal command differs in any bit.
     pub commands_different: usize,
     /// Root mean square of the differences of the gimbal commands in the landing, rad.
     pub gimbal_difference_rms_rad: f64,
     /// The largest difference of a gimbal command, rad.
     pub gimbal_difference_max_rad: f64,
-    /// The tick with the largest difference.
-    pub gimbal_difference_max_tick: Option<u64>,
+    /// The frame with the largest difference.
+    pub gimbal_difference_max_frame: Option<u64>,
     /// The largest difference of a fin command, rad.
     pub fins_difference_max_rad: f64,
-    /// Number of ticks on which another control level decides.
+    /// Number of frames on which another control level decides.
     pub levels_different: usize,
     /// When each phase was entered, as recorded and with the other settings.
     pub phases: Vec<PhaseEntered>,
-    pub ticks: Vec<EvaluatedTick>,
+    /// Number of frames compared.
+    pub frames_compared: usize,
+    /// Thousands: they go into a file.
+    #[serde(skip)]
+    pub frames: Vec<EvaluatedFrame>,
 }
 
-/// Every tick, and how many of them this build decides differently with nothing changed.
-type Evaluated = (Vec<EvaluatedTick>, usize);
+/// Every frame, and how many of them this build decides differently with nothing changed.
+type Evaluated = (Vec<EvaluatedFrame>, usize);
 
 /// Evaluates a recorded flight under other settings.
 ///
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let ticks = side_by_side(recording, settings)?;
-    let last_s = ticks.0.last().map_or(0.0, |tick| tick.time_s);
+    let frames = side_by_side(recording, settings)?;
+    let last_s = frames.0.last().map_or(0.0, |frame| frame.time_s);
     match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
         Some(late) => Err(EvaluateError::AfterTheEnd {
             setting: late.to_string(),
             name: recording.name.clone(),
             last_s,
         }),
-        None => Ok(summarise(recording, settings, ticks)),
+        None => Ok(summarise(recording, settings, frames)),
     }
 }
 
@@ -154,8 +158,8 @@ fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated
         let again = now.run_again(frame)?;
         let recorded = then.decided(frame);
         unchanged_different += usize::from(then.decided(&unchanged) != recorded);
-        evaluated.push(EvaluatedTick {
-            tick: frame.input.frame,
+        evaluated.push(EvaluatedFrame {
+            frame: recording.release_frame + frame.input.frame,
             time_s: frame.input.time_s,
             phase: phase_name(&frame.output),
             recorded,
@@ -190,26 +194,27 @@ fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
 fn summarise(
     recording: &Recording,
     settings: &[Setting],
-    (ticks, unchanged_different): Evaluated,
+    (frames, unchanged_different): Evaluated,
 ) -> EvaluateReport {
     let difference_rad =
-        |tick: &EvaluatedTick| apart_rad(&tick.recorded.gimbal_rad, &tick.evaluated.gimbal_rad);
-    let landing: Vec<&EvaluatedTick> = ticks
+        |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
+    let landing: Vec<&EvaluatedFrame> = frames
         .iter()
-        .filter(|tick| matches!(tick.phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN"))
+        .filter(|frame| matches!(frame.phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN"))
         .collect();
-    let squares: f64 = landing.iter().map(|tick| difference_rad(tick) * difference_rad(tick)).sum();
-    let largest = ticks.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
-    let count = |differs: &dyn Fn(&EvaluatedTick) -> bool| ticks.iter().filter(|tick| differs(tick)).count();
+    let squares: f64 = landing.iter().map(|frame| difference_rad(frame) * difference_rad(frame)).sum();
+    let largest = frames.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
+    let count =
+        |differs: &dyn Fn(&EvaluatedFrame) -> bool| frames.iter().filter(|frame| differs(frame)).count();
     let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
-    let fins_rad = |tick: &EvaluatedTick| apart_rad(&tick.recorded.fins_rad, &tick.evaluated.fins_rad);
+    let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
     EvaluateReport {
         kind: "open loop: the controller alone on recorded inputs",
         file: recording.name.clone(),
         settings: settings.iter().map(ToString::to_string).collect(),
         unchanged_different,
-        commands_different: count(&|tick| {
-            bits(&tick.recorded.gimbal_rad) != bits(&tick.evaluated.gimbal_rad)
+        commands_different: count(&|frame| {
+            bits(&frame.recorded.gimbal_rad) != bits(&frame.evaluated.gimbal_rad)
         }),
         gimbal_difference_rms_rad: if landing.is_empty() {
             0.0
@@ -217,35 +222,38 @@ fn summarise(
             libm::sqrt(squares / landing.len() as f64)
         },
         gimbal_difference_max_rad: largest.map_or(0.0, difference_rad),
-        gimbal_difference_max_tick: largest.filter(|tick| difference_rad(tick) > 0.0).map(|tick| tick.tick),
-        fins_difference_max_rad: ticks.iter().map(fins_rad).fold(0.0, f64::max),
-        levels_different: count(&|tick| tick.recorded.level != tick.evaluated.level),
-        phases: phases(&ticks),
-        ticks,
+        gimbal_difference_max_frame: largest
+            .filter(|frame| difference_rad(frame) > 0.0)
+            .map(|frame| frame.frame),
+        fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
+        levels_different: count(&|frame| frame.recorded.level != frame.evaluated.level),
+        phases: phases(&frames),
+        frames_compared: frames.len(),
+        frames,
     }
 }
 
 /// Every phase in the order it was first entered.
-fn phases(ticks: &[EvaluatedTick]) -> Vec<PhaseEntered> {
+fn phases(frames: &[EvaluatedFrame]) -> Vec<PhaseEntered> {
     let mut phases: Vec<PhaseEntered> = Vec::new();
-    for tick in ticks {
-        for (phase, is_recorded) in [(tick.recorded.phase, true), (tick.evaluated.phase, false)] {
+    for frame in frames {
+        for (phase, is_recorded) in [(frame.recorded.phase, true), (frame.evaluated.phase, false)] {
             let place = phases.iter().position(|known| known.phase == phase).unwrap_or_else(|| {
                 phases.push(PhaseEntered { phase, recorded_s: None, evaluated_s: None });
                 phases.len() - 1
             });
             let entered = &mut phases[place];
             let time_s = if is_recorded { &mut entered.recorded_s } else { &mut entered.evaluated_s };
-            time_s.get_or_insert(tick.time_s);
+            time_s.get_or_insert(frame.time_s);
         }
     }
     phases
 }
 
-/// Most differing ticks that are shown.
-const TICKS_SHOWN: usize = 120;
+/// Most differing frames that are shown.
+const FRAMES_SHOWN: usize = 120;
 
-/// Writes an evaluation as text: the summary, then the ticks that differ.
+/// Writes an evaluation as text: the summary, then the frames that differ.
 ///
 /// # Errors
 /// The output failed.
@@ -257,24 +265,24 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     if report.unchanged_different > 0 {
         writeln!(
             output,
-            "with nothing changed this build decides {} of {} ticks differently from the record",
+            "with nothing changed this build decides {} of {} frames differently from the record",
             report.unchanged_different,
-            report.ticks.len()
+            report.frames.len()
         )?;
     }
     let largest =
-        report.gimbal_difference_max_tick.map(|tick| format!(" at tick {tick}")).unwrap_or_default();
+        report.gimbal_difference_max_frame.map(|frame| format!(" at frame {frame}")).unwrap_or_default();
     writeln!(
         output,
         "{} of {} gimbal commands differ: root mean square {:.3} deg in the landing, largest {:.3} deg{largest}",
         report.commands_different,
-        report.ticks.len(),
+        report.frames.len(),
         report.gimbal_difference_rms_rad.to_degrees(),
         report.gimbal_difference_max_rad.to_degrees()
     )?;
     writeln!(
         output,
-        "fin commands differ by {:.3} deg at most; {} ticks are decided by another level",
+        "fin commands differ by {:.3} deg at most; {} frames are decided by another level",
         report.fins_difference_max_rad.to_degrees(),
         report.levels_different
     )?;
@@ -286,23 +294,23 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
             writeln!(output, "{phase}: entered {} -> {}", at(*recorded_s), at(*evaluated_s))?;
         }
     }
-    let differing: Vec<&EvaluatedTick> =
-        report.ticks.iter().filter(|tick| tick.recorded != tick.evaluated).collect();
+    let differing: Vec<&EvaluatedFrame> =
+        report.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
     if differing.is_empty() {
         return Ok(());
     }
     // Text shows planning frames only, because the others hardly differ; --csv has all 200 frames a second.
-    let stride = differing.len().div_ceil(TICKS_SHOWN).max(1);
+    let stride = differing.len().div_ceil(FRAMES_SHOWN).max(1);
     if stride > 1 {
-        writeln!(output, "one of {stride} differing ticks; --csv and --json show all:")?;
+        writeln!(output, "one of {stride} differing frames; --csv FILE writes all:")?;
     }
     writeln!(
         output,
         "{:>5} {:>9} {:<12} {:>34} {:>22} {:>13}  plan lands",
-        "tick", "time s", "phase", "gimbal deg", "cost", "iterations"
+        "frame", "time s", "phase", "gimbal deg", "cost", "iterations"
     )?;
-    for tick in differing.into_iter().step_by(stride) {
-        let (then, now) = (&tick.recorded, &tick.evaluated);
+    for frame in differing.into_iter().step_by(stride) {
+        let (then, now) = (&frame.recorded, &frame.evaluated);
         let levels = if then.level == now.level {
             String::new()
         } else {
@@ -311,9 +319,9 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
         writeln!(
             output,
             "{:>5} {:>9.3} {:<12} {:>15} -> {:>15} {:>9.2} -> {:>9.2} {:>5} -> {:>4}   {} -> {}{levels}",
-            tick.tick,
-            tick.time_s,
-            tick.phase,
+            frame.frame,
+            frame.time_s,
+            frame.phase,
             angles(&then.gimbal_rad),
             angles(&now.gimbal_rad),
             then.cost,
@@ -327,16 +335,16 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     Ok(())
 }
 
-/// Writes every tick of an evaluation as CSV.
+/// Writes every frame of an evaluation as CSV.
 ///
 /// # Errors
 /// The output failed.
-pub fn print_evaluate_csv(report: &EvaluateReport, output: &mut impl Write) -> io::Result<()> {
+pub fn write_evaluate_csv(report: &EvaluateReport, output: &mut dyn Write) -> io::Result<()> {
     let lists = report
-        .ticks
+        .frames
         .first()
-        .map_or((0, 0), |tick| (tick.recorded.gimbal_rad.len(), tick.recorded.fins_rad.len()));
-    let mut columns = vec!["tick".to_owned(), "time_s".to_owned()];
+        .map_or((0, 0), |frame| (frame.recorded.gimbal_rad.len(), frame.recorded.fins_rad.len()));
+    let mut columns = vec!["frame".to_owned(), "time_s".to_owned()];
     for side in ["recorded", "evaluated"] {
         columns.extend(["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}")));
         // A single gimbal angle has no index in its name.
@@ -348,9 +356,9 @@ pub fn print_evaluate_csv(report: &EvaluateReport, output: &mut impl Write) -> i
         columns.extend((0..lists.1).map(|fin| format!("{side}_fins_rad_{fin}")));
     }
     writeln!(output, "{}", columns.join(","))?;
-    for tick in &report.ticks {
-        let mut cells = vec![tick.tick.to_string(), format!("{:?}", tick.time_s)];
-        for decided in [&tick.recorded, &tick.evaluated] {
+    for frame in &report.frames {
+        let mut cells = vec![frame.frame.to_string(), format!("{:?}", frame.time_s)];
+        for decided in [&frame.recorded, &frame.evaluated] {
             let Decided { gimbal_rad, fins_rad, phase, level, cost, iterations, plan_lands: _ } = decided;
             cells.extend([(*phase).to_owned(), (*level).to_owned()]);
             cells.extend([format!("{cost:?}"), iterations.to_string()]);
@@ -380,28 +388,26 @@ pub(crate) struct Args {
     file: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
-    /// Answer in JSON, with every tick.
-    #[arg(long, conflicts_with = "csv")]
-    json: bool,
-    /// Answer as CSV, with every tick.
+    /// Answer in JSON.
     #[arg(long)]
-    csv: bool,
+    json: bool,
+    /// Write a table with every frame into a new file.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
+        self.csv.as_deref().map_or(Ok(()), refuse_existing)?;
         let report = evaluate(&recording, &self.settings.all()?)?;
-        answer(|output| {
-            if self.json {
-                print_json(&report, output)
-            } else if self.csv {
-                print_evaluate_csv(&report, output)
-            } else {
-                print_evaluate(&report, output)
-            }
-        })?;
+        if let Some(path) = &self.csv {
+            write_table(path, |output| write_evaluate_csv(&report, output))?;
+        }
+        answer(
+            |output| if self.json { print_json(&report, output) } else { print_evaluate(&report, output) },
+        )?;
         Ok(Outcome::Given)
     }
 }

@@ -81,7 +81,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Describes a log: grade, run, build, phases, verdict, ticks, channels, damage.
+    /// Describes a log: grade, run, build, phases, verdict, frames, channels, damage.
     #[command(after_help = "Example: replay info flight.mcap")]
     Info(info::Args),
     /// Runs the flight computer of a log again and compares its decisions bit for bit.
@@ -92,7 +92,7 @@ enum Command {
     /// and its verdict are compared; truth, events and measured times never are. For a divergence the report says how it grows, and whether the landing would end differently (simulated from the first
     /// frame that differs).
     ///
-    /// With --explain one recorded tick is solved again: cost, residuals, active constraints, warm against cold start,
+    /// With --explain one recorded frame is solved again: cost, residuals, active constraints, warm against cold start,
     /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again,
     /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
@@ -103,7 +103,7 @@ enum Command {
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
     #[command(after_help = "Example: replay evaluate flight.mcap --set powered.weights.theta=90@6.5")]
     Evaluate(evaluate::Args),
-    /// Closed loop: flies the flight again in simulation from a chosen moment, with other settings.
+    /// Closed loop: flies a flight again from a chosen moment, with other settings.
     ///
     /// The flight is flown again from its start with the recorded draw up to that moment, because a log does not hold the
     /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
@@ -111,20 +111,19 @@ enum Command {
     ///
     /// With --vary flights are flown with many settings, which are ranked by the worst flight's margin.
     #[command(
-        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly flight.mcap --without-fault gnss-out\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7"
+        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7"
     )]
     Refly(refly::Args),
-    /// Compares flights signal by signal: RMS, maximum and when; verdicts side by side; added and missing signals.
+    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words, what the air lost.
     ///
-    /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ.
+    /// Signals are named as in an export. Of the vehicle's and a station's log of one flight it counts the messages that one end
+    /// sent and the other did not hear. Exit code 1 if a tolerance is exceeded or the verdicts differ.
     #[command(after_help = "Example: replay compare old.mcap new.mcap")]
     Compare(compare::Args),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
     /// Writes a log's content as CSV, Parquet, .tlog, a Rerun recording or frames for a board; makes a log of a .tlog.
-    ///
-    /// A log of a .tlog has telemetry only: nothing can be re-executed.
     #[command(
         after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
     )]

@@ -28,7 +28,7 @@ pub(crate) fn shown(text: &str) -> String {
     protocol::text::printable(text.as_bytes())
 }
 
-/// `1 tick`, `2 ticks`.
+/// `1 frame`, `2 frames`.
 pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }

@@ -294,12 +294,15 @@ impl<T> Schedule<T> {
 /// Other settings than the recorded ones.
 #[derive(Debug, Args)]
 pub(crate) struct SettingArguments {
-    /// Another setting, named as in the mission; with @SECONDS it applies from that vehicle time on. May be given more
-    /// than once.
-    #[arg(long = "set", value_name = "PATH=VALUE[@SECONDS]")]
+    /// Another setting, PATH=VALUE[@S] as in the mission.
+    ///
+    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
+    #[arg(long = "set", value_name = "SETTING")]
     pub(crate) set: Vec<Setting>,
-    /// File of settings: a TOML file with the structure of the mission and the keys to change. --set overrides it.
-    #[arg(long, value_name = "FILE")]
+    /// File of settings, TOML with the keys of a mission to change.
+    ///
+    /// --set overrides it.
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     pub(crate) settings: Vec<PathBuf>,
 }
 

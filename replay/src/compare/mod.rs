@@ -1,35 +1,38 @@
-//! Compares two flights signal by signal.
+//! Compares two flights: every table that both have.
 //!
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`computer_frame.output.…`). The
 //! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
 //! one flight has are counted separately, because interpolation would hide a lost record.
 //!
-//! The log of a ground station has no ticks. It is compared with the vehicle's own log by the MAVLink messages that
-//! both have, over the vehicle's time in them and while both recorded.
+//! The numbers in MAVLink messages are compared over the vehicle's time in them. When a message is sent depends on who asks for
+//! it, so between two vehicles no message counts as missing. Tables of words (events, limits) are compared row by row, without
+//! times.
+//!
+//! The log of a ground station has no frames of the flight computer. It is compared with the vehicle's own log by the MAVLink
+//! messages that both have, while both recorded, and what the air lost is counted frame by frame.
 
+mod air;
+mod print;
 mod series;
 mod tolerance;
 
-use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+pub use air::{OverTheAir, Stream};
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
+pub use print::{compare_cases, print_compare};
 use serde::Serialize;
-pub use series::Samples;
-pub use series::{Align, Anchors};
-pub use series::{Flown, Series};
+pub use series::{Align, Anchors, Flown, Samples, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
 use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
 use crate::log::RecordingError;
 use crate::log::VerdictFacts;
-use crate::print::{
-    JunitCase, JunitOutcome, LimitRow, counted, print_json, print_junit, shown, verdict_rows, verdict_words,
-};
+use crate::print::{print_json, print_junit};
 
 /// Why flights cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -71,14 +74,34 @@ pub struct Comparison {
     pub missing: Vec<String>,
     /// Signals that only the other has.
     pub added: Vec<String>,
+    /// Rows of words that only one of the two has.
+    pub words: Vec<WordsOfOne>,
+    /// If one log is the vehicle's and the other a station's: what each end sent, and what of it the air lost.
+    pub over_the_air: Vec<OverTheAir>,
     /// Violations of the tolerances, in words.
     pub failures: Vec<String>,
+}
+
+/// A row of words that only one of two logs has, or has more often.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WordsOfOne {
+    pub table: String,
+    pub row: String,
+    /// Rows of the baseline.
+    pub baseline: usize,
+    /// Rows of the other.
+    pub other: usize,
 }
 
 impl Comparison {
     /// Number of signals that are equal in every bit.
     pub fn identical(&self) -> usize {
         self.signals.iter().filter(|signal| signal.max == 0.0 && !signal.not_comparable).count()
+    }
+
+    /// Number of tables whose signals both flights have.
+    pub fn tables(&self) -> usize {
+        self.signals.iter().map(|signal| table_of(&signal.signal)).collect::<BTreeSet<_>>().len()
     }
 }
 
@@ -93,7 +116,8 @@ pub fn compare(
     tolerances: &Tolerances,
 ) -> Result<Comparison, CompareError> {
     let shift_s = align.shift_s(baseline, other)?;
-    let over_the_air = baseline.only_one_has_ticks(other);
+    let over_the_air = baseline.only_one_has_frames(other);
+    let messages_shift_s = align.messages_shift_s(baseline, other);
     let both_recorded_s = over_the_air
         .then(|| series::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
         .flatten();
@@ -111,7 +135,8 @@ pub fn compare(
     };
     let (ours, theirs): (Vec<String>, Vec<String>) =
         (a.keys().cloned().collect(), b.keys().cloned().collect());
-    tolerances.check_names(&ours.iter().chain(&theirs))?;
+    let messages = baseline.over_the_air.keys().chain(other.over_the_air.keys());
+    tolerances.check_names(&ours.iter().chain(&theirs).chain(messages))?;
     let missing: Vec<String> = ours.iter().filter(|name| !b.contains_key(*name)).cloned().collect();
     let added: Vec<String> = theirs.iter().filter(|name| !a.contains_key(*name)).cloned().collect();
     let mut signals = Vec::new();
@@ -122,6 +147,12 @@ pub fn compare(
     }
     let mut failures = tolerances.record_failures([baseline, other]);
     failures.extend(samples_failures(&signals, tolerances));
+    if let Some(shift_s) = messages_shift_s.filter(|_| !over_the_air) {
+        signals.extend(baseline.over_the_air.iter().filter_map(|(name, ours)| {
+            let theirs = other.over_the_air.get(name)?;
+            Some(SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name)))
+        }));
+    }
     failures.extend(signals.iter().filter_map(SignalDifference::failure));
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
@@ -150,15 +181,42 @@ pub fn compare(
         signals,
         missing,
         added,
+        words: words_of_one(baseline, other),
+        over_the_air: air::over_the_air(baseline, other),
         failures,
     })
+}
+
+/// The table of a signal.
+fn table_of(signal: &str) -> &str {
+    signal.split('.').next().unwrap_or_default()
+}
+
+/// The rows of words that only one log has, of the tables that both have.
+fn words_of_one(baseline: &Flown, other: &Flown) -> Vec<WordsOfOne> {
+    let mut found = Vec::new();
+    for (table, ours) in &baseline.words {
+        let Some(theirs) = other.words.get(table) else { continue };
+        let rows: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
+        found.extend(rows.into_iter().filter_map(|row| {
+            let count = |of: &BTreeMap<String, usize>| of.get(row).copied().unwrap_or(0);
+            let (baseline, other) = (count(ours), count(theirs));
+            (baseline != other).then(|| WordsOfOne {
+                table: table.clone(),
+                row: row.clone(),
+                baseline,
+                other,
+            })
+        }));
+    }
+    found
 }
 
 /// Samples missing or added beyond the tolerance: one line for each table, for the signal with the most of them.
 fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Vec<String> {
     let mut worst: BTreeMap<(&str, bool), (usize, String)> = BTreeMap::new();
     for signal in signals {
-        let (table, samples) = (signal.signal.split('.').next().unwrap_or_default(), signal.samples_of_both);
+        let (table, samples) = (table_of(&signal.signal), signal.samples_of_both);
         let (missing, added) = tolerances.samples_of(&signal.signal);
         let all = samples.expected - samples.missing + samples.added;
         for (word, share, limit, count, of) in [
@@ -176,145 +234,6 @@ fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Ve
         }
     }
     worst.into_values().map(|(_, words)| words).collect()
-}
-
-/// Most signals listed that differ within their tolerance or have no tolerance.
-const SIGNALS_SHOWN: usize = 60;
-/// Most names listed of added and missing signals.
-const NAMES_SHOWN: usize = 20;
-
-/// Writes comparisons as Markdown.
-///
-/// # Errors
-/// The output failed.
-pub fn print_compare(comparisons: &[Comparison], output: &mut impl Write) -> io::Result<()> {
-    for comparison in comparisons {
-        print_one(comparison, output)?;
-    }
-    Ok(())
-}
-
-fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
-    let (a, b) = (cell(&comparison.baseline), cell(&comparison.other));
-    writeln!(output, "# {b} against {a}\n")?;
-    let aligned = match comparison.align {
-        Align::Ignition => "ignition",
-        Align::Touchdown => "touchdown",
-        Align::Time => "vehicle time",
-    };
-    writeln!(output, "Aligned on {aligned}: {:+.6} s added to the second's times.\n", comparison.shift_s)?;
-    if let Some([from_s, to_s]) = comparison.both_recorded_s {
-        writeln!(output, "Compared while both recorded: {from_s:.3} to {to_s:.3} s since power-up.\n")?;
-    }
-    print_verdicts(comparison, output)?;
-    let identical = comparison.identical();
-    writeln!(
-        output,
-        "{} of both flights, {identical} of them identical; {} missing, {} added.\n",
-        counted(comparison.signals.len() as u64, "signal"),
-        comparison.missing.len(),
-        comparison.added.len()
-    )?;
-    print_signals(comparison, output)?;
-    for (what, names) in [("Missing", &comparison.missing), ("Added", &comparison.added)] {
-        if !names.is_empty() {
-            let listed: Vec<String> = names.iter().take(NAMES_SHOWN).map(|name| cell(name)).collect();
-            let more = names.len().saturating_sub(NAMES_SHOWN);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            writeln!(output, "{what}: {}{more}.\n", listed.join(", "))?;
-        }
-    }
-    if comparison.failures.is_empty() {
-        return writeln!(output, "**Within tolerance.**\n");
-    }
-    writeln!(output, "**NOT within tolerance:**\n")?;
-    for failure in &comparison.failures {
-        writeln!(output, "- {}", shown(failure))?;
-    }
-    writeln!(output)
-}
-
-fn print_verdicts(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
-    let (a, b) = (comparison.verdicts.0.as_ref(), comparison.verdicts.1.as_ref());
-    let words = |verdict| verdict_words(verdict, "none");
-    writeln!(output, "| | first | second | limit |\n|---|---|---|---|")?;
-    writeln!(output, "| verdict | {} | {} | |", words(a), words(b))?;
-    for LimitRow { limit, values: [first, second] } in verdict_rows(a.or(b), [a, b], cell, " **outside**") {
-        let name = cell(&limit.name);
-        writeln!(output, "| {name} | {first} | {second} | {:.4} to {:.4} |", limit.minimum, limit.maximum)?;
-    }
-    writeln!(output)
-}
-
-fn print_signals(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
-    let differing: Vec<_> = comparison
-        .signals
-        .iter()
-        .filter(|signal| signal.max > 0.0 || signal.not_comparable || !signal.passed)
-        .collect();
-    if differing.is_empty() {
-        return Ok(());
-    }
-    writeln!(output, "| signal | samples | rms | max | at s | tolerance |\n|---|---:|---:|---:|---:|---|")?;
-    let failed = differing.iter().filter(|signal| !signal.passed).count();
-    for signal in differing.iter().take(SIGNALS_SHOWN.max(failed)) {
-        let tolerance = match (signal.tolerance, signal.passed) {
-            (None, _) => String::new(),
-            (Some(_), true) => "within".to_owned(),
-            (Some(_), false) => "**EXCEEDED**".to_owned(),
-        };
-        let at = signal.max_at_s.map(|at_s| format!("{at_s:.3}")).unwrap_or_default();
-        writeln!(
-            output,
-            "| {} | {} | {:.4e} | {:.4e} | {at} | {tolerance} |",
-            cell(&signal.signal),
-            signal.samples,
-            signal.rms,
-            signal.max
-        )?;
-    }
-    if differing.len() > SIGNALS_SHOWN.max(failed) {
-        writeln!(output, "\nand {} more that differ", differing.len() - SIGNALS_SHOWN.max(failed))?;
-    }
-    writeln!(output)
-}
-
-/// Escapes text for a table cell.
-fn cell(text: &str) -> String {
-    shown(text).replace('|', "\\|")
-}
-
-/// Comparisons as test cases: one for the verdict and the counts, and one for each signal with a tolerance.
-pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
-    let mut cases = Vec::new();
-    for comparison in comparisons {
-        let flights = format!("{} against {}", shown(&comparison.other), shown(&comparison.baseline));
-        let mut of_signals = Vec::new();
-        for signal in comparison.signals.iter().filter(|signal| signal.tolerance.is_some()) {
-            let message = comparison
-                .failures
-                .iter()
-                .find(|failure| failure.starts_with(&format!("{}: ", signal.signal)))
-                .cloned()
-                .unwrap_or_default();
-            of_signals.push(message.clone());
-            let outcome = if signal.passed {
-                JunitOutcome::Passed { said: String::new() }
-            } else {
-                JunitOutcome::Failed { details: message.clone(), message }
-            };
-            cases.push(JunitCase { name: format!("{flights}: {}", signal.signal), outcome });
-        }
-        let others: Vec<String> =
-            comparison.failures.iter().filter(|failure| !of_signals.contains(failure)).cloned().collect();
-        let outcome = if others.is_empty() {
-            JunitOutcome::Passed { said: String::new() }
-        } else {
-            JunitOutcome::Failed { message: others.join("; "), details: others.join("\n") }
-        };
-        cases.push(JunitCase { name: format!("{flights}: verdict and signals"), outcome });
-    }
-    cases
 }
 
 #[derive(Debug, clap::Args)]

@@ -4,11 +4,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use flight::rules::phase::Phase;
+use protocol::dialect::MavMessage;
 use serde::Serialize;
 
 use super::CompareError;
-use crate::log::VerdictFacts;
-use crate::log::{Cut, Entry, FlightLog, Flights, LogError, RecordingError, Verdicts, heard_message};
+use super::air::Frames;
+use crate::log::{
+    Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Flights, LogError, RecordingError, VerdictFacts,
+    Verdicts, heard_message,
+};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
@@ -37,6 +41,9 @@ const NO_SIGNALS: [&str; 11] = [
 /// Beginnings of columns that are not signals: the crew and the log, which are others in every flight.
 const NO_SIGNALS_OF: [&str; 6] =
     ["input.log_", "input.uplink", "input.commander", "input.people", "input.rehearsed", "output.answers"];
+
+/// Tables of words.
+const WORDS: [&str; 4] = ["events", "verdict_limits", "operator", "book"];
 
 /// A table without signals.
 const NO_SIGNAL_TABLE: &str = "computer_start";
@@ -77,8 +84,15 @@ pub struct Flown {
     pub signals: BTreeMap<String, Series>,
     /// The numbers in MAVLink messages that carry the vehicle's time, over that time (since power-up).
     pub over_the_air: BTreeMap<String, Series>,
+    /// The rows of tables of words, without times and numbers, with how often each is there.
+    pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
+    /// The frames that went over the air.
+    pub(super) frames: Frames,
+    clocks: Clocks,
+    /// The number of the vehicle's boot, as it was told first.
+    boot_number: Option<u32>,
     /// The log has what the vehicle decided, not only what was heard of it.
-    pub has_ticks: bool,
+    pub has_frames: bool,
     /// Events to align on.
     pub anchors: Anchors,
     /// The landing verdict.
@@ -93,8 +107,8 @@ pub struct Flown {
 
 impl Flown {
     /// Whether only one of two logs has what the vehicle decided: then they are compared by what went over the air.
-    pub(super) fn only_one_has_ticks(&self, other: &Self) -> bool {
-        self.has_ticks != other.has_ticks
+    pub(super) fn only_one_has_frames(&self, other: &Self) -> bool {
+        self.has_frames != other.has_frames
     }
 
     /// Reads a log file.
@@ -104,15 +118,23 @@ impl Flown {
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut anchors = Anchors::default();
         let mut verdicts = Verdicts::default();
-        let mut has_ticks = false;
+        let (mut frames, mut clocks, mut boot_number) = (Frames::default(), Clocks::default(), None);
+        let (mut has_frames, mut first_ns) = (false, None);
         let mut log = FlightLog::open(path)?;
         let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
             flights.note(&stamped);
-            let message = heard_message(log.channel(stamped.channel_id), &stamped);
+            let channel = log.channel(stamped.channel_id);
+            let message = heard_message(channel, &stamped);
+            frames.note(channel, &stamped);
+            if let Some(MavMessage::TD_FLIGHT_STATUS(status)) = &message {
+                boot_number.get_or_insert(status.boot_number);
+            }
+            let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
+            clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
             verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);
-            has_ticks |= matches!(stamped.entry, Entry::ComputerFrame(_));
+            has_frames |= matches!(stamped.entry, Entry::ComputerFrame(_));
         }
         let verdict = verdicts.found().as_ref().map(VerdictFacts::found);
         let name = log.name().to_owned();
@@ -125,15 +147,23 @@ impl Flown {
         let mut signals: BTreeMap<String, Series> = BTreeMap::new();
         let mut over_the_air: BTreeMap<String, Series> = BTreeMap::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
-        let mut first_ns = None;
+        let mut words: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let mut reader = TableReader::new();
         reader
             .read::<_, Stopped>(&mut FlightLog::open(path)?, |shape, row| {
                 if shape.name == NO_SIGNAL_TABLE {
                     return Ok(());
                 }
+                if WORDS.contains(&shape.name.as_str()) {
+                    *words
+                        .entry(shape.name.clone())
+                        .or_default()
+                        .entry(words_of(shape, &row.cells))
+                        .or_default() += 1;
+                    return Ok(());
+                }
                 let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
-                let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
+                let since_s = (log_ns - first_ns.unwrap_or_default() as f64) / 1e9;
                 let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
                     let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
                     (&mut over_the_air, boot_s)
@@ -163,13 +193,17 @@ impl Flown {
                 Stopped::Log(error) => RecordingError::Log(error),
                 Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
             })?;
-        // Tables that mix kinds of rows, and texts, are not signals over time.
-        signals.retain(|name, _| !name.starts_with("verdict") && !name.starts_with("events."));
+        // Its limits and its times stand beside the signals.
+        signals.retain(|name, _| !name.starts_with("verdict."));
         Ok(Self {
             name,
             signals,
             over_the_air,
-            has_ticks,
+            words,
+            frames,
+            clocks,
+            boot_number,
+            has_frames,
             anchors,
             verdict,
             damage,
@@ -188,6 +222,15 @@ impl From<LogError> for Stopped {
     fn from(error: LogError) -> Self {
         Self::Log(error)
     }
+}
+
+/// The words of a row.
+fn words_of(shape: &TableShape, cells: &[Cell]) -> String {
+    let texts = shape.columns.iter().zip(cells).filter_map(|(_, cell)| match cell {
+        Cell::Text(text) => Some(text.as_str()),
+        _ => None,
+    });
+    texts.collect::<Vec<_>>().join(": ")
 }
 
 fn is_signal(column: &str) -> bool {
@@ -261,9 +304,26 @@ impl Align {
         Ok(of(baseline)? - of(other)?)
     }
 
+    /// What to add to the times since power-up in the other flight's messages, s. `None` if the logs do not tell it.
+    pub(super) fn messages_shift_s(self, baseline: &Flown, other: &Flown) -> Option<f64> {
+        if baseline.boot_number.is_some() && baseline.boot_number == other.boot_number {
+            return Some(0.0);
+        }
+        let boot_s = |flown: &Flown| {
+            let time_s = match self {
+                Self::Time => 0.0,
+                Self::Ignition => flown.anchors.ignition_s?,
+                Self::Touchdown => flown.anchors.touchdown_s?,
+            };
+            let since_release = ClockTime { clock: Clock::Flight, time_s };
+            Some(flown.clocks.convert(since_release, Clock::Boot)?.time_s)
+        };
+        Some(boot_s(baseline)? - boot_s(other)?).filter(|_| baseline.has_frames && other.has_frames)
+    }
+
     /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.
     pub fn best_for(baseline: &Flown, other: &Flown) -> Self {
-        if baseline.only_one_has_ticks(other) {
+        if baseline.only_one_has_frames(other) {
             return Self::Time;
         }
         let both = baseline.anchors.ignition_s.is_some() && other.anchors.ignition_s.is_some();

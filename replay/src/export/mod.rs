@@ -1,7 +1,7 @@
 //! Writes the content of a log in the formats of other programs.
 //!
 //! * [`export_tables`]: CSV or Parquet, one file a table; see [`table`](crate::table).
-//! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back; [`import_tlog`]: a flight log of one.
+//! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back.
 //! * [`write_frames`]: the stream that a board reads, and the answers that it should give.
 //!
 //! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
@@ -18,10 +18,10 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 pub use frames::{FramesError, write_frames};
 pub use tables::{ExportedFile, TableFormat, export_tables};
-pub use tlog::{ExportedTlog, ImportError, ImportProgress, ImportedTlog, export_tlog, import_tlog};
+pub use tlog::{ExportedTlog, export_tlog};
 
-use crate::cli::{Outcome, answer, say, warn_of_damage};
-use crate::log::{FlightLog, LogError};
+use crate::cli::{Outcome, answer, warn_of_damage};
+use crate::log::{FlightLog, LogError, import_tlog, is_tlog};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::print_json;
 use serde::Serialize;
@@ -82,7 +82,8 @@ enum Format {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let is_tlog = self.file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+        // What is wrong with the file is said by what reads it.
+        let is_tlog = is_tlog(&self.file).unwrap_or_default();
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv, parquet, tlog, rrd or frames")?;
         let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
@@ -135,8 +136,7 @@ impl Args {
     }
 
     fn log(&self, destination: Destination) -> Result<Outcome> {
-        let mut told = 0;
-        let imported = import_tlog(&self.file, destination, &mut |progress| tell(progress, &mut told))?;
+        let imported = import_tlog(&self.file, destination)?;
         self.answer(&imported, |output| {
             writeln!(
                 output,
@@ -172,16 +172,5 @@ impl Args {
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
         Ok(Outcome::Given)
-    }
-}
-
-/// Reports every tenth of the progress of a long import.
-fn tell(ImportProgress { read, total }: ImportProgress, told: &mut u64) {
-    const LARGE_BYTES: u64 = 32_000_000;
-    const MEGABYTE: u64 = 1_000_000;
-    let tenths = (10 * read).checked_div(total).unwrap_or(0);
-    if total > LARGE_BYTES && tenths > *told {
-        *told = tenths;
-        say(&format!("{} of {} MB", read / MEGABYTE, total / MEGABYTE));
     }
 }

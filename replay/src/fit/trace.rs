@@ -170,7 +170,7 @@ impl Trace {
                 Entry::Verdict(verdict) => landed = Some(verdict.landed),
                 Entry::Telemetry(_) => telemetry = true,
                 Entry::ComputerStart(start) => flights += usize::from(start.released),
-                Entry::ComputerFrame(frame) => waiting = frame.into_tick(),
+                Entry::ComputerFrame(frame) => waiting = frame.in_flight(),
                 Entry::Estimate(estimate) => {
                     let Some(ComputerFrame { input, output, .. }) = waiting.take() else { continue };
                     let number = input.frame;

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{Grade, GradeLevel, ProfileFacts};
 use crate::log::VerdictFacts;
-use crate::log::{Entry, FrameOrder, Gap, StampedEntry, TickRanges};
+use crate::log::{Entry, FrameOrder, FrameRanges, Gap, StampedEntry};
 
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -101,7 +101,7 @@ pub struct FrameFacts {
 /// Counts frames.
 #[derive(Debug, Default)]
 pub(super) struct FrameCounter {
-    frames: TickRanges,
+    frames: FrameRanges,
     order: FrameOrder,
     lost: usize,
     first_lost: Option<Gap>,
@@ -333,7 +333,7 @@ impl EndingTracker {
 /// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
 const TIMES_KEPT: usize = 1_000_000;
 
-/// Durations of the ticks that solve, as measured on board.
+/// Durations of the frames that solve, as measured on board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SolveTimes {
     /// Number of measurements.
@@ -345,7 +345,7 @@ pub struct SolveTimes {
     pub max_s: f64,
     /// The shortest deadline, s.
     pub deadline_s: f64,
-    /// Number of ticks that missed their deadline.
+    /// Number of frames that missed their deadline.
     pub over_deadline: u64,
 }
 

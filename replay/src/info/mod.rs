@@ -318,7 +318,7 @@ pub struct Completeness {
     pub missing_s: Option<f64>,
     /// Messages missing before the last of their channel.
     pub messages_lost: u64,
-    /// Number of flights with ticks: more than one in a joined log.
+    /// Number of flights with frames: more than one in a joined log.
     pub flights: usize,
     /// Where the record of a flight ends, if that is before the end of the flight.
     pub cut: Option<Cut>,

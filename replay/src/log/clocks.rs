@@ -81,7 +81,7 @@ impl Clocks {
         match &stamped.entry {
             Entry::ComputerFrame(frame) => {
                 let input = &frame.record.input;
-                if frame.tick != Some(input.frame) {
+                if frame.since_release != Some(input.frame) {
                     // A flight without a pad has no power-up.
                     self.boot_zero_s.get_or_insert(since_s - input.time_s);
                 }

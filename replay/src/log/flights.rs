@@ -22,7 +22,7 @@ const ROUNDING_S: f64 = 1e-6;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LoggedFlight {
     /// Frames from the release on.
-    pub ticks: u64,
+    pub frames: u64,
     /// Vehicle time, s, and phase of the latest of them.
     last: Option<(f64, u32)>,
     /// The latest frame of the flight computer since power-up: its time, s, and phase.
@@ -41,14 +41,14 @@ pub struct LoggedFlight {
 /// Where an incomplete record of a flight ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Cut {
-    /// Time of the last tick on its clock, s.
+    /// Time of the last frame on its clock, s.
     pub time_s: f64,
     /// The clock: a log that ends before the release has no T+.
     pub clock: Clock,
     pub phase: &'static str,
     /// It ends before the vehicle left its pad.
     pub on_pad: bool,
-    /// Time of contact in the verdict, s, if the verdict is there and only ticks are missing.
+    /// Time of contact in the verdict, s, if the verdict is there and only frames are missing.
     pub contact_s: Option<f64>,
     /// Contact is there, and the frames behind it are missing.
     pub after_contact: bool,
@@ -70,20 +70,20 @@ impl fmt::Display for Cut {
 
 impl LoggedFlight {
     fn note(&mut self, time_s: f64, phase: u32) {
-        self.ticks += 1;
-        // Ticks in the file may be slightly out of order.
+        self.frames += 1;
+        // Frames in the file may be slightly out of order.
         if self.last.is_none_or(|(last_s, _)| last_s <= time_s) {
             self.last = Some((time_s, phase));
         }
     }
 
-    /// Where the record ends, if that is before the end of the flight; `None` also for a flight without ticks.
+    /// Where the record ends, if that is before the end of the flight; `None` also for a flight without frames.
     pub fn cut(&self) -> Option<Cut> {
         let flown = self.last.map(|last| (last, Clock::Flight));
         let ((time_s, phase), clock) = flown.or(self.on_the_pad.map(|last| (last, Clock::Boot)))?;
         let down = self.contact_s.is_some_and(|contact_s| contact_s - time_s <= FRAME_S + ROUNDING_S);
         let ended = if self.powered_up {
-            self.over && (down || self.ticks == 0)
+            self.over && (down || self.frames == 0)
         } else {
             down && self.judged_ns.is_some_and(|judged_ns| judged_ns <= self.framed_ns)
         };
@@ -140,7 +140,7 @@ impl InFlight {
                     None => self.release.or((!phase.is_some_and(Phase::on_pad)).then_some(0)),
                 };
                 let waits = output.over && self.started == Some(Started::AtPowerUp);
-                frame.tick = release
+                frame.since_release = release
                     .filter(|release| !waits && input.frame > *release)
                     .map(|release| input.frame - release);
                 if output.released {
@@ -166,7 +166,7 @@ impl Flights {
             // If the log has the power-up of this flight computer, its release does not begin another flight.
             Entry::ComputerStart(start)
                 if start.released
-                    && self.found.last().is_some_and(|flight| flight.powered_up && flight.ticks == 0) => {}
+                    && self.found.last().is_some_and(|flight| flight.powered_up && flight.frames == 0) => {}
             Entry::ComputerStart(start) => {
                 self.found.push(LoggedFlight { powered_up: !start.released, ..LoggedFlight::default() });
             }
@@ -205,9 +205,9 @@ impl Flights {
         self.found.iter().find_map(LoggedFlight::cut)
     }
 
-    /// How many flights have ticks.
+    /// How many flights have frames.
     pub fn flown(&self) -> usize {
-        self.found.iter().filter(|flight| flight.ticks > 0).count()
+        self.found.iter().filter(|flight| flight.frames > 0).count()
     }
 }
 
@@ -243,37 +243,37 @@ impl FrameOrder {
     }
 }
 
-/// A set of tick numbers, stored as runs.
+/// A set of frame numbers, stored as runs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct TickRanges {
+pub struct FrameRanges {
     /// First number of each run, and its last.
     runs: BTreeMap<u64, u64>,
     repeated: u64,
 }
 
-/// A gap between two ticks.
+/// A gap between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Gap {
-    /// The last tick before the gap.
+    /// The last frame before the gap.
     pub after: u64,
-    /// The first tick after the gap.
+    /// The first frame after the gap.
     pub before: u64,
 }
 
-impl TickRanges {
+impl FrameRanges {
     /// Adds a number.
-    pub fn insert(&mut self, tick: u64) {
-        let left = self.runs.range(..=tick).next_back().map(|(first, last)| (*first, *last));
-        if left.is_some_and(|(_, last)| tick <= last) {
+    pub fn insert(&mut self, frame: u64) {
+        let left = self.runs.range(..=frame).next_back().map(|(first, last)| (*first, *last));
+        if left.is_some_and(|(_, last)| frame <= last) {
             self.repeated += 1;
             return;
         }
         let first = match left {
-            Some((first, last)) if last.checked_add(1) == Some(tick) => first,
-            _ => tick,
+            Some((first, last)) if last.checked_add(1) == Some(frame) => first,
+            _ => frame,
         };
-        let behind = tick.checked_add(1).and_then(|next| self.runs.remove(&next));
-        self.runs.insert(first, behind.unwrap_or(tick));
+        let behind = frame.checked_add(1).and_then(|next| self.runs.remove(&next));
+        self.runs.insert(first, behind.unwrap_or(frame));
     }
 
     /// The lowest and the highest number.
@@ -293,7 +293,7 @@ impl TickRanges {
 }
 
 impl Gap {
-    /// How many ticks are missing.
+    /// How many frames are missing.
     pub fn missing(&self) -> u64 {
         self.before.saturating_sub(self.after).saturating_sub(1)
     }
@@ -330,7 +330,7 @@ mod tests {
     proptest! {
         #[test]
         fn runs_and_gaps_are_those_of_a_plain_set(numbers in prop::collection::vec(0..40_u64, 1..60)) {
-            let mut ranges = TickRanges::default();
+            let mut ranges = FrameRanges::default();
             for number in &numbers {
                 ranges.insert(*number);
             }
@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn the_ends_of_the_numbers_do_not_overflow() {
-        let mut ranges = TickRanges::default();
+        let mut ranges = FrameRanges::default();
         for number in [u64::MAX, 0, u64::MAX - 1, u64::MAX] {
             ranges.insert(number);
         }

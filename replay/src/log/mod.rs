@@ -8,6 +8,7 @@ mod flights;
 mod head;
 mod record;
 mod recording;
+mod tlog;
 mod verdict;
 
 use std::fs::File;
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
 use flights::InFlight;
-pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight, TickRanges};
+pub use flights::{Cut, Flights, FrameOrder, FrameRanges, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 use mcap::records::{Record as McapRecord, op};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
@@ -26,9 +27,11 @@ use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
+pub use tlog::{ImportError, ImportedTlog, import_tlog};
+pub(crate) use tlog::{is_tlog, open_log};
 use verdict::contradiction;
-pub(crate) use verdict::{Heard, Verdicts, frame_of, heard_message};
 pub use verdict::{VerdictFacts, VerdictLimit};
+pub(crate) use verdict::{Verdicts, frame_of, heard_message};
 
 use crate::output::{Destination, NewFile, WriteError};
 
@@ -65,13 +68,13 @@ pub(crate) fn open_regular(path: &Path) -> std::io::Result<File> {
 }
 
 impl FlightLog<BufReader<File>> {
-    /// Opens a log file.
+    /// Opens a log file. A `.tlog` is read as the log that a station would have written.
     ///
     /// # Errors
-    /// The file cannot be read, or is not an MCAP file.
+    /// The file cannot be read, or is no log.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
-        match open_regular(path) {
+        match open_log(path) {
             Ok(file) => Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file)),
             Err(source) => Err(LogError::Read { name, source }),
         }
@@ -189,7 +192,7 @@ impl<R: Read> FlightLog<R> {
     }
 
     fn end(&self) -> Result<(), LogError> {
-        // Without a message, what is missing (ticks, the schema's version) says nothing about the log.
+        // Without a message, what is missing (frames, the schema's version) says nothing about the log.
         if let Some(damage) = self.damage()
             && self.last_log_time_ns.is_none()
         {
@@ -225,9 +228,9 @@ pub enum LogError {
     },
     /// The file is of another kind.
     #[error(
-        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a{}",
-        hex(found),
-        hint(name)
+        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a; a .tlog has \
+        MAVLink 2 frames, each after a time of 8 bytes",
+        hex(found)
     )]
     NotMcap {
         /// The file.
@@ -255,13 +258,6 @@ pub enum LogError {
         library: String,
         topics: Vec<String>,
     },
-}
-
-/// Advice for a file of another known kind.
-fn hint(name: &str) -> &'static str {
-    let is_tlog =
-        std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
-    if is_tlog { "; `replay export` makes a log of a .tlog" } else { "" }
 }
 
 fn hex(bytes: &[u8]) -> String {

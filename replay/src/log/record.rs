@@ -38,18 +38,18 @@ pub struct LoggedFrame {
     /// As recorded: numbers and times count from power-up.
     pub record: computer_v1::ComputerFrame,
     /// Its number since the release, until the flight is over.
-    pub tick: Option<u64>,
+    pub since_release: Option<u64>,
 }
 
 impl LoggedFrame {
     /// Time since the release, s, in flight.
     pub fn flight_time_s(&self) -> Option<f64> {
-        self.tick.map(flight_time_s)
+        self.since_release.map(flight_time_s)
     }
 
     /// The frame on the clock of its flight: number and time count from the release. `None` outside the flight.
-    pub fn into_tick(self) -> Option<computer_v1::ComputerFrame> {
-        let frame = self.tick?;
+    pub fn in_flight(self) -> Option<computer_v1::ComputerFrame> {
+        let frame = self.since_release?;
         let mut record = self.record;
         (record.input.frame, record.input.time_s) = (frame, flight_time_s(frame));
         Some(record)
@@ -100,7 +100,7 @@ impl Entry {
         match channel.topic.as_str() {
             TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
             TOPIC_COMPUTER_FRAME => decoded_if(!trusted, channel, "ComputerFrame", data, |record| {
-                Self::ComputerFrame(Box::new(LoggedFrame { record: *record, tick: None }))
+                Self::ComputerFrame(Box::new(LoggedFrame { record: *record, since_release: None }))
             }),
             TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
                 Self::PilotTiming(*timing)

@@ -89,6 +89,9 @@ pub struct Recording {
     pub from_power_up: bool,
     /// Its frames in flight, in file order: numbers and times count from the release.
     pub frames: Vec<ComputerFrame>,
+    /// What is added to the number of a frame in flight for its number in the log, which counts from power-up and is the one
+    /// that people read.
+    pub release_frame: u64,
     /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
     /// Solve times of planning frames, in file order; empty for a flight simulated without a clock.
@@ -153,12 +156,14 @@ impl Recording {
                 }
                 Entry::ComputerFrame(frame) => {
                     let lost = frame_order.note(frame.record.input.frame, stamped.sequence).is_some();
-                    if let Some(tick) = frame.into_tick() {
+                    let logged = frame.record.input.frame;
+                    if let Some(frame) = frame.in_flight() {
+                        recording.release_frame = logged - frame.input.frame;
                         // What is lost before the release is not of the flight.
-                        if lost && tick.input.frame > 1 {
+                        if lost && frame.input.frame > 1 {
                             frames_lost.get_or_insert(recording.frames.len());
                         }
-                        recording.frames.push(tick);
+                        recording.frames.push(frame);
                     }
                 }
                 Entry::ComputerStart(start) => recording.from_power_up |= !start.released,
@@ -195,7 +200,7 @@ impl Recording {
         }
     }
 
-    /// Time of contact on the clock of its ticks, or of its telemetry, s.
+    /// Time of contact on the clock of its frames, or of its telemetry, s.
     pub fn contact_s(&self) -> Option<f64> {
         let contact_s = self.verdict.as_ref()?.time_s;
         if !self.verdict_heard {
@@ -225,16 +230,18 @@ impl Recording {
     pub fn replayable_frames(&self) -> Result<(&ComputerStart, &[ComputerFrame]), RecordingError> {
         let (start, frames) = self.recorded_frames()?;
         match (frames.get(..self.frames_unbroken), frames.first()) {
-            (Some([]), Some(first)) => {
-                Err(RecordingError::BeginningLost { name: self.name.clone(), first: first.input.frame })
-            }
+            (Some([]), Some(first)) => Err(RecordingError::BeginningLost {
+                name: self.name.clone(),
+                first: self.release_frame + first.input.frame,
+            }),
             (unbroken, _) => Ok((start, unbroken.unwrap_or(frames))),
         }
     }
 
     /// Where re-execution must stop, if the log has frames after that.
     pub fn gap(&self) -> Option<Gap> {
-        let number = |place: usize| self.frames.get(place).map(|tick| tick.input.frame);
+        let number =
+            |place: usize| self.frames.get(place).map(|frame| self.release_frame + frame.input.frame);
         let before = number(self.frames_unbroken)?;
         let after = self.frames_unbroken.checked_sub(1).and_then(number).unwrap_or(0);
         Some(Gap { after, before })

@@ -114,7 +114,7 @@ pub(crate) struct Heard {
 pub(crate) struct Verdicts {
     recorded: Option<v1::LandingVerdict>,
     heard: Heard,
-    has_ticks: bool,
+    has_frames: bool,
 }
 
 /// A verdict of a log.
@@ -239,8 +239,8 @@ impl Verdicts {
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
         match &stamped.entry {
             Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
-            Entry::ComputerFrame(_) => self.has_ticks = true,
-            Entry::RawFrame if !self.has_ticks => {
+            Entry::ComputerFrame(_) => self.has_frames = true,
+            Entry::RawFrame if !self.has_frames => {
                 if let Some(message) = message {
                     self.heard.take(message);
                 }
@@ -249,11 +249,11 @@ impl Verdicts {
         }
     }
 
-    /// The vehicle's own verdict; without its ticks, the one that was heard.
+    /// The vehicle's own verdict; without its frames, the one that was heard.
     pub(crate) fn found(&self) -> Option<Found> {
         let heard = || self.heard.verdict().map(|verdict| Found { verdict, heard: true });
         let recorded = || self.recorded.clone().map(|verdict| Found { verdict, heard: false });
-        if self.has_ticks { recorded() } else { heard().or_else(recorded) }
+        if self.has_frames { recorded() } else { heard().or_else(recorded) }
     }
 }
 

@@ -19,7 +19,7 @@ use serde::Serialize;
 use write::Rescue;
 
 use crate::cli::{Outcome, answer};
-use crate::log::LogError;
+use crate::log::{LogError, is_tlog};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{counted, print_json, shown};
 
@@ -29,6 +29,9 @@ pub enum RecoverError {
     /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// Nothing has to be recovered.
+    #[error("{}: is a .tlog, of which every command reads what can be read; `replay export` makes a log of that", path.display())]
+    Tlog { path: PathBuf },
     /// No message could be kept.
     #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
     Nothing {
@@ -126,6 +129,9 @@ impl Recovery {
 /// replaced, or cannot be written.
 pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<Recovery, RecoverError> {
     let destination = output.into();
+    if is_tlog(input).unwrap_or_default() {
+        return Err(RecoverError::Tlog { path: input.to_owned() });
+    }
     let mut records = Records::open(input)?;
     let contents = records.contents()?;
     let told = contents.told;

@@ -74,7 +74,8 @@ pub enum StartAt {
     /// The first frame of the landing.
     #[default]
     Landing,
-    Tick(u64),
+    /// Its number in the log.
+    Frame(u64),
     /// The first frame at or after this vehicle time, s.
     Time(f64),
     /// The frame after the one that entered this phase.
@@ -94,8 +95,11 @@ pub enum From {
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
-    /// The first frame flown again.
-    pub tick: u64,
+    /// The first frame flown again, by its number in the log.
+    pub frame: u64,
+    /// The same since the release.
+    #[serde(skip)]
+    pub since_release: u64,
     /// Its vehicle time, s.
     pub time_s: f64,
     pub phase: &'static str,
@@ -235,13 +239,13 @@ pub struct ReflyReport {
     /// The smallest distance to a touchdown limit, as a fraction of the limit: 1 in the middle of the range, 0 on the
     /// limit, negative outside. Height is left out, because contact is at the ground. `None` without a contact.
     pub margin: Option<f64>,
-    /// Ticks that the controller ran.
-    pub ticks: usize,
-    /// Of these, how many have a recorded tick of the same number.
+    /// Frames that the controller ran.
+    pub frames: usize,
+    /// Of these, how many have a recorded frame of the same number.
     pub commands_recorded: usize,
     /// Of those, how many commanded the same gimbal angle, bit for bit.
     pub commands_identical: usize,
-    /// The largest difference of a gimbal command from the recorded command of the same tick, rad.
+    /// The largest difference of a gimbal command from the recorded command of the same frame, rad.
     pub gimbal_difference_max_rad: f64,
 }
 
@@ -328,7 +332,7 @@ fn header(
 ) -> LogHeader {
     let mut run: BTreeMap<String, String> = recording.head.run.clone();
     run.insert("reflown_from".to_owned(), report.file.clone());
-    run.insert(REFLOWN_AT.to_owned(), report.start.tick.to_string());
+    run.insert(REFLOWN_AT.to_owned(), report.start.since_release.to_string());
     run.insert("reflown_with".to_owned(), report.settings.join(" "));
     if report.law != Law::AsRecorded {
         run.insert(REFLOWN_BY.to_owned(), report.law.name().to_owned());
@@ -358,7 +362,7 @@ fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
     let began = Event {
         level: EventLevel::Info,
         name: "replay".to_owned(),
-        message: format!("flown again in simulation from tick {}", report.start.tick),
+        message: format!("flown again in simulation from frame {}", report.start.frame),
     };
     records.push((report.start.time_s, Record::Event(began)));
     let end_s = records.iter().map(|(time_s, _)| *time_s).fold(0.0, f64::max);
@@ -376,8 +380,8 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     let start = &report.start;
     writeln!(
         output,
-        "from tick {} (T+{:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
-        start.tick,
+        "from frame {} (T+{:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
+        start.frame,
         start.time_s,
         start.phase,
         match start.from {
@@ -429,7 +433,7 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     writeln!(
         output,
         "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
-        counted(report.ticks as u64, "tick"),
+        counted(report.frames as u64, "frame"),
         report.commands_recorded,
         report.commands_identical,
         report.gimbal_difference_max_rad
@@ -466,21 +470,22 @@ pub(crate) struct Args {
     files: Vec<PathBuf>,
     #[command(flatten)]
     how: FlownHow,
-    /// Begin here instead of at the landing's first frame: at a time in seconds on the clock that its name says, T+12.9 or 12.9
-    /// (since the release), boot:19.8 (since power-up), log:19.7 (since the first record); with a phase, as in POWERED; or at
-    /// a frame, as in frame:1290.
-    #[arg(long, value_name = "TIME|PHASE|FRAME", value_parser = moment_named, conflicts_with_all = ["vary", "vary_plant"])]
+    /// Begin at T+12.9, POWERED or frame:1290.
+    ///
+    /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8 (since power-up),
+    /// log:19.7 (since the first record). A frame has its number in the log. Without this, it is the landing's first frame.
+    #[arg(long, value_name = "WHERE", value_parser = moment_named, conflicts_with_all = ["vary", "vary_plant"])]
     at: Option<Moment>,
     /// Write the flight as a new log.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["vary", "vary_plant"])]
     log: Option<PathBuf>,
     /// Replace an existing file, but never the log that is flown again.
-    #[arg(long, requires = "log")]
+    #[arg(long, requires = "log", hide_short_help = true)]
     force: bool,
     #[command(flatten)]
     vary: vary::Arguments,
     /// Answer in JSON; with --vary, every point.
-    #[arg(long, conflicts_with = "csv")]
+    #[arg(long)]
     json: bool,
 }
 
@@ -489,29 +494,31 @@ pub(crate) struct Args {
 pub(crate) struct FlownHow {
     #[command(flatten)]
     pub(crate) settings: SettingArguments,
-    /// Another setting of the plant only, which the controller does not know about. For example
-    /// airframe.motor=G33, truth.wind_m_s=7, truth.impulse_scale=0.97. May be given more than once.
-    #[arg(long, value_name = "PATH=VALUE")]
+    /// Another setting of the plant alone.
+    ///
+    /// As in truth.impulse_scale=0.97. The controller does not know about it. Also airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
+    #[arg(long, value_name = "SETTING")]
     plant: Vec<Setting>,
     /// The recorded state to begin from.
-    #[arg(long, value_enum, default_value_t = From::Truth)]
+    #[arg(long, value_enum, default_value_t = From::Truth, hide_short_help = true)]
     from: From,
     /// The controller that flies.
-    #[arg(long, value_enum, default_value_t = Law::AsRecorded)]
+    #[arg(long, value_enum, value_name = "NAME", default_value_t = Law::AsRecorded, hide_short_help = true)]
     controller: Law,
-    /// Another fault, NAME[:VALUE]@WHEN as in gnss-out@5; may be given more than once. The flight is
-    /// flown with it from its beginning.
+    /// Another fault, as in gnss-out@5.
     #[arg(
         long = "fault",
         value_name = "FAULT",
         long_help = format!("Another fault, from the beginning of the flight on; may be given more than once. Write {}", sim::fault::how_to_write())
     )]
     faults: Vec<String>,
-    /// Leave out a recorded fault, by its name or in full; `all` for every one.
+    /// Leave out a recorded fault; `all` for every one.
+    ///
+    /// By its name, or in full as it was given.
     #[arg(long, value_name = "FAULT")]
     without_fault: Vec<String>,
     /// Seed of the plant's dispersions instead of the recorded one.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     seed: Option<u64>,
 }
 
@@ -539,7 +546,7 @@ impl Args {
         };
         let recording = Recording::open(file)?;
         let start = match self.at {
-            Some(Moment::Frame(tick)) => StartAt::Tick(tick),
+            Some(Moment::Frame(frame)) => StartAt::Frame(frame),
             Some(Moment::Time(time)) => StartAt::Time(flight_time_s(&recording, time)?),
             Some(Moment::Phase(phase)) => StartAt::Phase(phase),
             None => StartAt::Landing,

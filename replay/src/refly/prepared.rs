@@ -63,7 +63,7 @@ impl<'a> Prepared<'a> {
                 if is_same_flight(&now, then, !recording.from_power_up) {
                     reached.identical += 1;
                 } else {
-                    reached.first_different.get_or_insert(then.input.frame);
+                    reached.first_different.get_or_insert(recording.release_frame + then.input.frame);
                 }
             }
         }
@@ -76,7 +76,8 @@ impl<'a> Prepared<'a> {
             .checked_sub(1)
             .map_or("DEPLOY", |before| phase_of(&frames[before].output).map_or("unknown", Phase::name));
         let state = StartState {
-            tick: first_frame,
+            frame: recording.release_frame + first_frame,
+            since_release: first_frame,
             time_s: frames[place].input.time_s,
             phase: before,
             from: options.from,
@@ -140,14 +141,14 @@ impl<'a> Prepared<'a> {
         mut kept: Option<&mut Kept>,
     ) -> Result<(ReflyReport, Option<protocol::log::v1::LandingVerdict>), ReflyError> {
         let mut rerun = self.changed(options)?;
-        let (mut ticks, mut commands_recorded, mut commands_identical) = (0, 0, 0);
+        let (mut frames, mut commands_recorded, mut commands_identical) = (0, 0, 0);
         let mut gimbal_difference_max_rad = 0.0_f64;
         let mut phase = rerun.flight.computer().mode().phase;
         loop {
             let goes_on = rerun.step();
             let flight = &rerun.flight;
             if let Some(commands) = rerun.commands() {
-                ticks += 1;
+                frames += 1;
                 if let Some(then) = recorded_frame(self.frames, flight.frame()) {
                     let then = &then.output.gimbal_rad;
                     let pairs = || then.iter().zip(&commands.gimbal_rad);
@@ -184,7 +185,7 @@ impl<'a> Prepared<'a> {
             recorded: self.recorded.clone(),
             margin: reflown.as_ref().map(margin),
             reflown,
-            ticks,
+            frames,
             commands_recorded,
             commands_identical,
             gimbal_difference_max_rad,
@@ -359,25 +360,26 @@ fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
 /// cannot act earlier.
 fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Result<usize, ReflyError> {
+    let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
-        let entered = frames.iter().position(|tick| phase_of(&tick.output).is_some_and(wanted))?;
+        let entered = frames.iter().position(|frame| phase_of(&frame.output).is_some_and(wanted))?;
         Some(entered + 1).filter(|place| *place < frames.len())
     };
     let found = match start {
         StartAt::Landing => in_phase(&Phase::is_landing),
-        StartAt::Tick(number) => frames.iter().position(|tick| tick.input.frame == *number),
-        StartAt::Time(time_s) => frames.iter().position(|tick| tick.input.time_s >= *time_s),
+        StartAt::Frame(number) => frames.iter().position(|frame| logged(frame) == *number),
+        StartAt::Time(time_s) => frames.iter().position(|frame| frame.input.time_s >= *time_s),
         StartAt::Phase(phase) => in_phase(&|found| found == *phase),
     };
     found.ok_or_else(|| {
         let (first, last) = (frames.first(), frames.last());
-        let number = |frame: Option<&ComputerFrame>| frame.map_or(0, |frame| frame.input.frame);
+        let number = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
         let reason = match start {
             StartAt::Landing => {
                 "no frame of a landing to start from; a frame, a time or a phase names another moment"
                     .to_owned()
             }
-            StartAt::Tick(asked) => {
+            StartAt::Frame(asked) => {
                 format!("no frame {asked}; there are {} to {}", number(first), number(last))
             }
             StartAt::Time(time_s) => {
@@ -412,6 +414,6 @@ fn place_at_estimate(recording: &Recording, rerun: &mut Rerun, first_frame: u64)
 
 /// A recorded frame by its number; a log may have lost it.
 fn recorded_frame(frames: &[ComputerFrame], number: u64) -> Option<&ComputerFrame> {
-    let place = frames.binary_search_by_key(&number, |tick| tick.input.frame).ok()?;
+    let place = frames.binary_search_by_key(&number, |frame| frame.input.frame).ok()?;
     frames.get(place)
 }

@@ -92,8 +92,8 @@ impl Recorded {
         };
         // An abort that no fault caused came from the crew.
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
-        let crews = frames.iter().filter(|tick| accepts_abort(tick) && !by_fault);
-        let aborts = crews.map(|tick| tick.input.frame).collect();
+        let crews = frames.iter().filter(|frame| accepts_abort(frame) && !by_fault);
+        let aborts = crews.map(|frame| frame.input.frame).collect();
         let rerun = Rerun { flight, schedule: None, aborts, last: LastFrame::default() };
         let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
         Ok(Self { dispersion, number, rerun, faults })

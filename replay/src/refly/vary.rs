@@ -15,7 +15,7 @@ use serde::Serialize;
 
 pub use super::jobs::sweep;
 use super::{FlownHow, ReflyError, StartAt, can_be_flown};
-use crate::cli::{Outcome, answer, in_pool, say, warn_of_what_is_missing};
+use crate::cli::{Outcome, answer, in_pool, refuse_existing, say, warn_of_what_is_missing, write_table};
 use crate::log::Recording;
 use crate::print::{counted, print_json, shown};
 use crate::settings::Setting;
@@ -246,7 +246,7 @@ pub fn print_sweep(report: &SweepReport, output: &mut impl Write) -> io::Result<
         )?;
     }
     if report.points.len() > SHOWN {
-        writeln!(output, "and {} more; --csv shows all", report.points.len() - SHOWN)?;
+        writeln!(output, "and {} more; --csv FILE writes all", report.points.len() - SHOWN)?;
     }
     Ok(())
 }
@@ -255,7 +255,7 @@ pub fn print_sweep(report: &SweepReport, output: &mut impl Write) -> io::Result<
 ///
 /// # Errors
 /// The output failed.
-pub fn print_sweep_csv(report: &SweepReport, output: &mut impl Write) -> io::Result<()> {
+pub fn write_sweep_csv(report: &SweepReport, output: &mut dyn Write) -> io::Result<()> {
     writeln!(output, "rank,point,settings,flight,landed,margin,worst_margin")?;
     for (rank, point) in report.points.iter().enumerate() {
         for (name, flight) in report.flights.iter().zip(&point.flights) {
@@ -292,24 +292,25 @@ fn quoted(text: &str) -> String {
 #[derive(Debug, Args)]
 #[group(id = "varied")]
 pub(super) struct Arguments {
-    /// A setting of controller and plant to vary: PATH=FROM:TO:COUNT or PATH=A,B,C. May be given more than once; every
-    /// combination is flown.
-    #[arg(long, value_name = "PATH=VALUES")]
+    /// Try PATH=FROM:TO:COUNT or PATH=A,B,C and rank.
+    ///
+    /// It is a setting of controller and plant. May be given more than once: every combination is flown.
+    #[arg(long, value_name = "VALUES")]
     vary: Vec<Vary>,
-    /// A setting of the plant alone to vary, in the same form.
-    #[arg(long, value_name = "PATH=VALUES")]
+    /// The same of a setting of the plant alone.
+    #[arg(long, value_name = "VALUES")]
     vary_plant: Vec<Vary>,
     /// Flights flown at the same time; the answer does not depend on it [default: all processors].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     jobs: Option<NonZeroUsize>,
-    /// Answer as CSV, with every point on every flight.
-    #[arg(long)]
-    csv: bool,
+    /// Write a table with every point on every flight into a new file.
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
+    csv: Option<PathBuf>,
 }
 
 impl Arguments {
     pub(super) fn is_asked(&self) -> bool {
-        !(self.vary.is_empty() && self.vary_plant.is_empty()) || self.csv
+        !(self.vary.is_empty() && self.vary_plant.is_empty()) || self.csv.is_some()
     }
 
     pub(super) fn run(&self, files: &[PathBuf], how: &FlownHow, json: bool) -> Result<Outcome> {
@@ -317,6 +318,7 @@ impl Arguments {
             !(self.vary.is_empty() && self.vary_plant.is_empty()),
             "nothing to vary; give --vary powered.weights.theta=50:110:7 or the like"
         );
+        self.csv.as_deref().map_or(Ok(()), refuse_existing)?;
         let points = grid(&self.vary, &self.vary_plant)?;
         let options = how.options(StartAt::Landing)?;
         let mut flights = Vec::new();
@@ -335,15 +337,10 @@ impl Arguments {
         let stopwatch = Stopwatch::start();
         let told = |done, of| stopwatch.show(done, of, "flights");
         let report = in_pool(self.jobs, || sweep(&flights, &points, &options, &told))??;
-        answer(|output| {
-            if json {
-                print_json(&report, output)
-            } else if self.csv {
-                print_sweep_csv(&report, output)
-            } else {
-                print_sweep(&report, output)
-            }
-        })?;
+        if let Some(path) = &self.csv {
+            write_table(path, |output| write_sweep_csv(&report, output))?;
+        }
+        answer(|output| if json { print_json(&report, output) } else { print_sweep(&report, output) })?;
         Ok(Outcome::Given)
     }
 }

@@ -525,12 +525,12 @@ impl Again {
 }
 
 fn plant(sample: &flight_v1::TruthSample, frames: &[ComputerFrame], plane: &Plane) -> Plant {
-    let behind = frames.partition_point(|tick| tick.input.time_s <= sample.time_s + SAME_MOMENT_S);
+    let behind = frames.partition_point(|frame| frame.input.time_s <= sample.time_s + SAME_MOMENT_S);
     let frame = behind.checked_sub(1).and_then(|place| frames.get(place));
     Plant {
         sample: Sample {
             time_s: sample.time_s,
-            phase: phase_of(frame.map_or(0, |tick| tick.output.phase)),
+            phase: phase_of(frame.map_or(0, |frame| frame.output.phase)),
             state: in_plane(plane, &state_from_log(&sample.state), sample.height_m),
         },
         fins_rad: sample.fins_actual_rad.clone(),

@@ -21,6 +21,7 @@ use protocol::log::reader::LogChannel;
 use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
 use protocol::log::v1;
 
+pub(crate) use self::dialect::message_name;
 use self::dialect::{cells_of_frame, shape_of_frame, words_of};
 use crate::log::{Entry, FlightLog, LogError, StampedEntry, frame_of};
 
@@ -117,7 +118,7 @@ fn comment_on(field: &FieldDescriptor) -> String {
 /// The name and the columns of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableShape {
-    /// Its name: the topic in lower case with underscores, as in `controller_tick`.
+    /// Its name: the topic in lower case with underscores, as in `controller_frame`.
     pub name: String,
     /// Its columns; the first is `log_time_ns`, Unix time.
     pub columns: Vec<Column>,

@@ -21,7 +21,10 @@ pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &
             return Ok(None);
         }
         // Up to its last frame it is compared frame by frame, and then its end.
-        let start = recording.frames.last().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
+        let start = recording
+            .frames
+            .last()
+            .map_or(StartAt::Landing, |last| StartAt::Frame(recording.release_frame + last.input.frame));
         let options = ReflyOptions { start, ..ReflyOptions::default() };
         let prepared = Prepared::new(&recording, &options)?;
         let (_, reflown) = prepared.fly_on(&options, None)?;
@@ -39,7 +42,7 @@ pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &
         Ok(Some((first_different, same_verdict))) => {
             facts.compare(first_different.is_none());
             facts.why = first_different
-                .map(|tick| format!("drawn again, the flight is another one from tick {tick} on"));
+                .map(|frame| format!("drawn again, the flight is another one from frame {frame} on"));
             verdict.compare(same_verdict);
             verdict.why = (!same_verdict).then(|| "flown again, the flight ends otherwise".to_owned());
         }

@@ -181,7 +181,7 @@ pub struct Divergence {
     /// Its number since power-up.
     pub frame: u64,
     /// In flight: its number since the release.
-    pub tick: Option<u64>,
+    pub in_flight: bool,
     /// Time since the release in flight, since power-up on the pad, s.
     pub time_s: f64,
     pub phase: &'static str,
@@ -230,7 +230,7 @@ impl Tally {
         }
         let (frame, boot_s) = (recorded.input.frame, recorded.input.time_s);
         self.compared += 1;
-        self.in_flight += u64::from(logged.tick.is_some());
+        self.in_flight += u64::from(logged.since_release.is_some());
         self.first.get_or_insert((frame, boot_s));
         self.last = Some((frame, boot_s));
         if same {
@@ -255,8 +255,8 @@ impl Tally {
         self.growth.note(GrowthStep { frame, time_s, fields_different, gimbal_rad, worst_ulps });
         if self.divergence.is_none() {
             fields.truncate(FIELDS_KEPT);
-            let (tick, phase) = (logged.tick, phase_name(&again.output));
-            self.divergence = Some(Divergence { frame, tick, time_s, phase, fields_different, fields });
+            let (in_flight, phase) = (logged.since_release.is_some(), phase_name(&again.output));
+            self.divergence = Some(Divergence { frame, in_flight, time_s, phase, fields_different, fields });
         }
         Ok(())
     }
@@ -339,13 +339,13 @@ mod tests {
         #[test]
         fn nans_with_different_payloads_differ(a: u64, b: u64) {
             const NAN: u64 = 0x7ff8_0000_0000_0000;
-            let tick = |bits: u64| {
-                let mut tick = ComputerFrame::default();
-                tick.input.time_s = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
-                tick.encode_to_vec()
+            let frame = |bits: u64| {
+                let mut frame = ComputerFrame::default();
+                frame.input.time_s = f64::from_bits(NAN | (bits & 0x7_ffff_ffff_ffff));
+                frame.encode_to_vec()
             };
-            let found = differences(frame_descriptor().as_ref(), &tick(a), &tick(b));
-            if tick(a) == tick(b) {
+            let found = differences(frame_descriptor().as_ref(), &frame(a), &frame(b));
+            if frame(a) == frame(b) {
                 prop_assert!(found.is_empty());
             } else {
                 prop_assert_eq!(found.len(), 1);

@@ -1,6 +1,6 @@
-//! Solves one recorded tick again.
+//! Solves one recorded frame again.
 //!
-//! The controller first runs every earlier tick, so that it has the warm start it had in flight. Then the same landing
+//! The controller first runs every earlier frame, so that it has the warm start it had in flight. Then the same landing
 //! problem is solved again with a cold start, and the two solutions are compared. The third is the judge's:
 //! [`reference_solver`] shares only the equations of motion with the solver that flies.
 
@@ -31,9 +31,9 @@ const ACTIVE: f64 = 1e-4;
 /// State components in order, with their units.
 const COMPONENTS: [&str; 6] = ["x_m", "z_m", "theta_rad", "u_m_s", "w_m_s", "q_rad_s"];
 
-/// Why a tick cannot be solved again.
+/// Why a frame cannot be solved again.
 #[derive(Debug, thiserror::Error)]
-pub enum TickError {
+pub enum ExplainError {
     /// The log lacks the records that are needed.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -43,16 +43,16 @@ pub enum TickError {
     /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// The log has no such tick.
-    #[error("{name}: no tick {tick} that can be re-executed; there are {first} to {last}")]
-    NoTick {
+    /// The log has no such frame.
+    #[error("{name}: no frame {frame} that can be re-executed; there are {first} to {last}")]
+    NoFrame {
         /// The file.
         name: String,
         /// The request.
-        tick: u64,
-        /// The first tick in the log.
+        frame: u64,
+        /// The first frame in the log.
         first: u64,
-        /// The last tick in the log.
+        /// The last frame in the log.
         last: u64,
     },
 }
@@ -102,12 +102,12 @@ pub struct ActiveConstraint {
     pub multiplier: f64,
 }
 
-/// A tick that was solved again.
+/// A frame that was solved again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TickReport {
+pub struct FrameReport {
     /// The log.
     pub file: String,
-    pub tick: u64,
+    pub frame: u64,
     /// Vehicle time, s.
     pub time_s: f64,
     pub phase: &'static str,
@@ -121,21 +121,21 @@ pub struct TickReport {
     pub gimbal_rad: Vec<f64>,
     /// Whether the whole output is equal to the recorded one, bit for bit; and the memory, unless it covers the pad.
     pub identical: bool,
-    /// The solve as in flight; `None` if this tick solved nothing.
+    /// The solve as in flight; `None` if this frame solved nothing.
     pub warm: Option<Solved>,
     /// The same problem with a cold start.
     pub cold: Option<Solved>,
     /// What an independent solver says about the plan.
     pub judged: Option<Judged>,
-    /// The nearest tick that solves a landing: this tick if it does, `None` if no tick does.
+    /// The nearest frame that solves a landing: this frame if it does, `None` if no frame does.
     pub nearest_solved: Option<u64>,
     /// Limits and conditions that the warm plan touches.
     pub active: Vec<ActiveConstraint>,
-    /// The plan: time from the tick, s, and state at each node.
+    /// The plan: time from the frame, s, and state at each node.
     pub path: Vec<PathPoint>,
 }
 
-/// The input of the tick.
+/// The input of the frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct InputFacts {
     /// State components in order: x, z, theta, u, w, q; in the plane of the landing, with velocities relative to the air.
@@ -150,7 +150,7 @@ pub struct InputFacts {
 /// A node of the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PathPoint {
-    /// Time from the tick, s.
+    /// Time from the frame, s.
     pub time_s: f64,
     /// State components in order: x, z, theta, u, w, q.
     pub state: [f64; 6],
@@ -158,19 +158,20 @@ pub struct PathPoint {
     pub gimbal_rad: Option<f64>,
 }
 
-/// Solves one recorded tick again.
+/// Solves one recorded frame again.
 ///
 /// # Errors
-/// See [`TickError`].
-pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError> {
+/// See [`ExplainError`].
+pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, ExplainError> {
     let (start, frames) = recording.replayable_frames()?;
     let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
     let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
-    let place = frames.iter().position(|tick| tick.input.frame == number).ok_or_else(|| {
-        let bound = |tick: Option<&ComputerFrame>| tick.map_or(0, |tick| tick.input.frame);
-        TickError::NoTick {
+    let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
+    let place = frames.iter().position(|frame| logged(frame) == number).ok_or_else(|| {
+        let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
+        ExplainError::NoFrame {
             name: recording.name.clone(),
-            tick: number,
+            frame: number,
             first: bound(frames.first()),
             last: bound(frames.last()),
         }
@@ -188,9 +189,9 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
         Some(solved) => solved.problem.initial,
         None => in_plane(pilot),
     };
-    Ok(TickReport {
+    Ok(FrameReport {
         file: recording.name.clone(),
-        tick: number,
+        frame: number,
         time_s,
         phase: phase_name(&again.output),
         input: InputFacts {
@@ -206,10 +207,7 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
         warm: warm.map(solved_facts),
         cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
         judged: solved.as_ref().map(|solved| judged(&solved.problem, &solved.warm.solution)),
-        nearest_solved: nearest(
-            number,
-            frames.iter().filter(|tick| plans(tick)).map(|tick| tick.input.frame),
-        ),
+        nearest_solved: nearest(number, frames.iter().filter(|frame| plans(frame)).map(logged)),
         active: solved
             .as_ref()
             .map(|solved| active_constraints(&solved.problem, &solved.warm.solution))
@@ -219,7 +217,7 @@ pub fn tick(recording: &Recording, number: u64) -> Result<TickReport, TickError>
 }
 
 fn nearest(number: u64, solved: impl Iterator<Item = u64>) -> Option<u64> {
-    solved.min_by_key(|tick| tick.abs_diff(number))
+    solved.min_by_key(|frame| frame.abs_diff(number))
 }
 
 fn solved_facts(solution: &Solution) -> Solved {
@@ -288,9 +286,9 @@ fn active_constraints(problem: &Problem, solution: &Solution) -> Vec<ActiveConst
 }
 
 /// Whether a landing is planned in a frame.
-fn plans(tick: &ComputerFrame) -> bool {
+fn plans(frame: &ComputerFrame) -> bool {
     let idle = u32::from(ControlLevel::Idle.index());
-    tick.input.frame.is_multiple_of(FRAMES_PER_PLAN) && tick.output.level != idle
+    frame.input.frame.is_multiple_of(FRAMES_PER_PLAN) && frame.output.level != idle
 }
 
 /// The estimated motion in the plane of the landing; before such a plane exists, in the world's x-z plane.
@@ -318,13 +316,13 @@ fn path(solution: &Solution) -> Vec<PathPoint> {
 /// Most nodes of the plan that are shown.
 const NODES_SHOWN: usize = 12;
 
-/// Writes a tick as text.
+/// Writes a frame as text.
 ///
 /// # Errors
 /// The output failed.
-pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()> {
-    let TickReport { tick, time_s, phase, level, input, .. } = report;
-    writeln!(output, "{}: tick {tick} ({time_s:.3} s, {phase}), decided by {level}", shown(&report.file))?;
+pub fn print_explained(report: &FrameReport, output: &mut impl Write) -> io::Result<()> {
+    let FrameReport { frame, time_s, phase, level, input, .. } = report;
+    writeln!(output, "{}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}", shown(&report.file))?;
     let [x, z, theta, u, w, q] = input.state;
     writeln!(
         output,
@@ -348,15 +346,15 @@ pub fn print_tick(report: &TickReport, output: &mut impl Write) -> io::Result<()
     )?;
     if report.warm.is_none() && report.cold.is_none() {
         let nearest = report.nearest_solved.map_or_else(
-            || "no tick of this log does".to_owned(),
+            || "no frame of this log does".to_owned(),
             |nearest| format!("the nearest that does is {nearest}"),
         );
-        return writeln!(output, "solve    this tick solves no landing; {nearest}");
+        return writeln!(output, "solve    this frame solves no landing; {nearest}");
     }
     for (name, solved) in [("warm", &report.warm), ("cold", &report.cold)] {
         match solved {
             Some(solved) => print_solved(name, solved, output)?,
-            None => writeln!(output, "{name:<8} nothing was kept from a solve at this tick")?,
+            None => writeln!(output, "{name:<8} nothing was kept from a solve at this frame")?,
         }
     }
     if let (Some(warm), Some(cold)) = (&report.warm, &report.cold) {
@@ -415,7 +413,7 @@ fn print_solved(name: &str, solved: &Solved, output: &mut impl Write) -> io::Res
     )
 }
 
-fn print_path(report: &TickReport, output: &mut impl Write) -> io::Result<()> {
+fn print_path(report: &FrameReport, output: &mut impl Write) -> io::Result<()> {
     let nodes = &report.path;
     let stride = nodes.len().div_ceil(NODES_SHOWN).max(1);
     for (node, point) in nodes.iter().enumerate() {
@@ -440,7 +438,7 @@ fn print_path(report: &TickReport, output: &mut impl Write) -> io::Result<()> {
 pub(super) fn run(file: &Path, number: u64, json: bool) -> Result<Outcome> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
-    let report = tick(&recording, number)?;
-    answer(|output| if json { print_json(&report, output) } else { print_tick(&report, output) })?;
+    let report = explain(&recording, number)?;
+    answer(|output| if json { print_json(&report, output) } else { print_explained(&report, output) })?;
     Ok(Outcome::Given)
 }

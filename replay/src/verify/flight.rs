@@ -164,9 +164,9 @@ impl FlightVerifier {
     /// Runs a frame again and compares it; `data` and `sequence` are the bytes of its record and its number in the channel.
     fn check(&mut self, frame: &LoggedFrame, data: &[u8], sequence: u32) {
         self.frames += 1;
-        self.flies |= frame.tick.is_some();
+        self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
-        let impossible = self.inputs.judge(&frame.record.input, frame.tick.is_some());
+        let impossible = self.inputs.judge(&frame.record.input, frame.since_release.is_some());
         // What a missing field was filled with says nothing.
         let impossible = impossible.filter(|_| misread_frame(data).is_none());
         self.parts.inputs.recorded += 1;
@@ -176,7 +176,7 @@ impl FlightVerifier {
         }
         let lost = self.order.note(number, sequence);
         // A computer that begins at its release can be run again behind a loss on the pad.
-        let begins = !self.from_power_up && frame.tick == Some(1);
+        let begins = !self.from_power_up && frame.since_release == Some(1);
         self.awaited.thought.clear();
         if self.obstacle.is_some() {
             return;
@@ -199,7 +199,7 @@ impl FlightVerifier {
                         self.parts.starts.recorded += 1;
                         encode_into(&computer.as_start(), &mut self.awaited.release);
                     }
-                    if frame.tick.is_some()
+                    if frame.since_release.is_some()
                         && let Some(thought) = thought_to_log(computer.pilot())
                     {
                         self.parts.thoughts.recorded += 1;
@@ -238,11 +238,11 @@ impl FlightVerifier {
             }
             // If nothing was compared, the result must not be "identical".
             (None, None) if compared == 0 && self.computer.is_some() => Some(Obstacle::NoFrames),
-            (None, None) if compared == 0 => Some(Obstacle::NoTicks),
+            (None, None) if compared == 0 => Some(Obstacle::NoComputer),
             (obstacle, _) => obstacle,
         };
         let obstacle = match (obstacle, &facts.schema) {
-            (obstacle @ Some(Obstacle::Unreadable { .. } | Obstacle::NoTicks), _) | (obstacle, None) => {
+            (obstacle @ Some(Obstacle::Unreadable { .. } | Obstacle::NoComputer), _) | (obstacle, None) => {
                 obstacle
             }
             (_, Some(found)) => Some(Obstacle::Schema { found: found.clone() }),
@@ -319,12 +319,12 @@ impl Unread {
     }
 }
 
-/// Whether this build's controller would land differently if it flew from the first tick that differs. This is closed
+/// Whether this build's controller would land differently if it flew from the first frame that differs. This is closed
 /// loop, unlike the comparison itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Consequence {
-    /// The tick from which the flight was flown again.
-    pub from_tick: u64,
+    /// The frame from which the flight was flown again.
+    pub from_frame: u64,
     /// The recorded verdict.
     pub recorded: Option<VerdictFacts>,
     /// The verdict with this build's controller; `None` if the vehicle does not come down.
@@ -336,23 +336,23 @@ pub struct Consequence {
 }
 
 impl Consequence {
-    /// Flies from a tick, or from the beginning of the landing if that comes later or the divergence lies on the pad.
+    /// Flies from a frame, or from the beginning of the landing if that comes later or the divergence lies on the pad.
     pub(super) fn of(recording: &Recording, first_divergence: Option<u64>) -> Self {
         let at = |start| refly(recording, &ReflyOptions { start, ..ReflyOptions::default() });
         let flown = at(StartAt::Landing).and_then(|landing| match first_divergence {
-            Some(tick) if landing.start.tick < tick => at(StartAt::Tick(tick)),
+            Some(frame) if landing.start.frame < frame => at(StartAt::Frame(frame)),
             _ => Ok(landing),
         });
         match flown {
             Ok(report) => Self {
-                from_tick: report.start.tick,
+                from_frame: report.start.frame,
                 recorded: report.recorded,
                 reflown: report.reflown,
                 changed: report.verdict_changed,
                 obstacle: None,
             },
             Err(error) => Self {
-                from_tick: first_divergence.unwrap_or(1),
+                from_frame: first_divergence.unwrap_or(recording.release_frame + 1),
                 recorded: recording.verdict.as_ref().map(VerdictFacts::of),
                 reflown: None,
                 changed: None,

@@ -7,7 +7,7 @@
 //! measured times are not.
 //!
 //! A vehicle's log has every frame from power-up on, so self-test, arming, countdown, gate and abort are compared as well. A
-//! frame in flight is a *tick* and counts from the release; a log of a flight that begins there has only ticks, and the
+//! frame in flight is a *frame* and counts from the release; a log of a flight that begins there has only frames, and the
 //! report says so.
 //!
 //! The computer remembers its plan, so a frame can be re-executed only if every frame before it can be. The comparison
@@ -16,8 +16,8 @@
 //! A log joined by other tools may hold several flights; each has its own report. A flight without comparisons is never
 //! identical, and a flight whose record ends before the flight did is reported as cut.
 //!
-//! For a divergence, the report says how it grows from tick to tick. If a whole file is verified, it also says whether
-//! the landing would end differently: only for this, the flight is simulated from the first tick that differs.
+//! For a divergence, the report says how it grows from frame to frame. If a whole file is verified, it also says whether
+//! the landing would end differently: only for this, the flight is simulated from the first frame that differs.
 
 mod again;
 pub mod book;
@@ -77,7 +77,7 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
         && let Some(first) = &report.first_divergence
         && let Ok(recording) = Recording::open(path)
     {
-        report.consequence = Some(Consequence::of(&recording, first.tick));
+        report.consequence = Some(Consequence::of(&recording, first.in_flight.then_some(first.frame)));
     }
     Ok(reports)
 }
@@ -109,7 +109,7 @@ pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     Ok(reports)
 }
 
-/// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first tick comes before
+/// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first frame comes before
 /// its profile.
 ///
 /// # Errors
@@ -164,7 +164,7 @@ pub fn verify_log<R: Read>(
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verification {
-    /// The flight is whole, has ticks, and all that was compared is identical.
+    /// The flight is whole, has frames, and all that was compared is identical.
     Identical,
     /// The log is damaged, ends before its flight did or lacks a part, and what could be compared is identical.
     IdenticalReadablePart,
@@ -172,7 +172,7 @@ pub enum Verification {
     Diverged,
     /// Nothing differs, and an input cannot be.
     Impossible,
-    /// Some tick could not be re-executed, and all others are identical.
+    /// Some frame could not be re-executed, and all others are identical.
     NotReplayable,
 }
 
@@ -188,14 +188,14 @@ impl Verification {
     }
 }
 
-/// Why ticks were not compared.
+/// Why frames were not compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Obstacle {
-    /// No tick in the log.
+    /// No frame of a flight computer in the log.
     #[error(
         "it has no frames of a flight computer that this build knows: replay needs the log of the vehicle or of the demonstration, not of a ground station"
     )]
-    NoTicks,
+    NoComputer,
     /// No profile in the log.
     #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile,
@@ -205,22 +205,22 @@ pub enum Obstacle {
         /// What is wrong with the profile.
         reason: String,
     },
-    /// The log does not begin with the first tick.
+    /// The log does not begin with the first frame.
     #[error(
         "it begins with frame {first}, and the frames before it are missing: what the flight computer remembered then is unknown"
     )]
     BeginningMissing {
-        /// The first tick in the log.
+        /// The first frame in the log.
         first: u64,
     },
-    /// Ticks are missing.
+    /// Frames are missing.
     #[error(
         "after frame {after} comes frame {before}: what the flight computer remembered there is unknown, and nothing behind the gap was compared"
     )]
     Gap {
-        /// The last tick before the gap.
+        /// The last frame before the gap.
         after: u64,
-        /// The first tick after the gap.
+        /// The first frame after the gap.
         before: u64,
     },
     /// A record cannot be read.
@@ -259,7 +259,7 @@ pub struct FlightPlace {
     pub of: usize,
 }
 
-/// Facts about a flight's record besides its ticks.
+/// Facts about a flight's record besides its frames.
 pub(super) struct FileFacts {
     pub(super) file: String,
     pub(super) flight: Option<FlightPlace>,
@@ -310,7 +310,7 @@ pub struct VerifyReport {
     pub growth: Option<Growth>,
     /// Whether the landing would end differently; only for whole files.
     pub consequence: Option<Consequence>,
-    /// Why not every tick was compared.
+    /// Why not every frame was compared.
     pub obstacle: Option<Obstacle>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
@@ -498,12 +498,12 @@ fn print_beginning(report: &VerifyReport, output: &mut impl Write) -> io::Result
                 "from power-up to {flight_s:.3} s after it, {frames_in_flight} of them in flight"
             )
         }
-        _ => writeln!(output, "{TICKS_ALONE}"),
+        _ => writeln!(output, "{FRAMES_ALONE}"),
     }
 }
 
 /// The remark on a log whose flight computer cannot be run again from power-up on.
-const TICKS_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
+const FRAMES_ALONE: &str = "the log has no frames of the flight computer from power-up: arming and countdown, if any, were not run again";
 
 /// The remark on a log without a summary.
 const NOT_COUNTED: &str =
@@ -521,23 +521,23 @@ fn name_of(report: &VerifyReport) -> String {
 fn what_is_missing(report: &VerifyReport) -> String {
     let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
     let unread = report.damage.as_ref().map(|damage| {
-        let ticks = match report.unread.and_then(|unread| unread.frames) {
+        let frames = match report.unread.and_then(|unread| unread.frames) {
             Some((unread, all)) => format!("{unread} of {all} frames were not read"),
             None => "how many frames were not read is not known".to_owned(),
         };
         let seconds = report.unread.and_then(|unread| unread.seconds);
         let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
-        format!("; {ticks}{seconds}: {}", shown(damage))
+        format!("; {frames}{seconds}: {}", shown(damage))
     });
     [cut, unread].into_iter().flatten().collect()
 }
 
 fn print_divergence(first: &Divergence, output: &mut impl Write) -> io::Result<()> {
-    let Divergence { frame, tick, time_s, phase, fields_different, .. } = first;
-    let place = match tick {
-        Some(tick) if tick != frame => format!("frame {frame}, tick {tick} (T+{time_s:.3} s, {phase})"),
-        Some(_) => format!("frame {frame} (T+{time_s:.3} s, {phase})"),
-        None => format!("frame {frame} ({time_s:.3} s after power-up, {phase})"),
+    let Divergence { frame, in_flight, time_s, phase, fields_different, .. } = first;
+    let place = if *in_flight {
+        format!("frame {frame} (T+{time_s:.3} s, {phase})")
+    } else {
+        format!("frame {frame} ({time_s:.3} s after power-up, {phase})")
     };
     writeln!(output, "first at {place}, {}:", counted(*fields_different as u64, "field"))?;
     for field in first.fields.iter().take(FIELDS_SHOWN) {
@@ -599,9 +599,9 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     };
     writeln!(
         output,
-        "verdict: {answer}: recorded {}, flown on by this build from tick {} (closed loop) {}",
+        "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
         words(consequence.recorded.as_ref().map(|verdict| verdict.landed)),
-        consequence.from_tick,
+        consequence.from_frame,
         words(consequence.reflown.as_ref().map(|verdict| verdict.landed))
     )
 }
@@ -644,8 +644,8 @@ pub(crate) struct Args {
         long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
     )]
     strict: Option<bool>,
-    /// Solve this tick of the only log again.
-    #[arg(long, value_name = "TICK", conflicts_with_all = ["junit", "strict"])]
+    /// Solve this frame of the only log again.
+    #[arg(long, value_name = "FRAME", conflicts_with_all = ["junit", "strict"])]
     explain: Option<u64>,
     #[command(flatten)]
     suite: suite::Arguments,
@@ -661,9 +661,9 @@ impl Args {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
-        if let Some(tick) = self.explain {
+        if let Some(frame) = self.explain {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
-            return explain::run(file, tick, self.json);
+            return explain::run(file, frame, self.json);
         }
         let to_stdout = |path: &Path| path.as_os_str() == "-";
         let junit = self.junit.as_deref().filter(|path| !to_stdout(path));

@@ -13,12 +13,12 @@ use crate::from_apogee;
 fn an_aborted_flight_from_apogee_verifies_and_is_reflown_identically() {
     let aborted = from_apogee::fly(&["abort@powered+0..3"]);
     let recording = Recording::open(&aborted.log).unwrap();
-    assert_eq!(recording.frames.iter().filter(|tick| accepts_abort(tick)).count(), 1);
+    assert_eq!(recording.frames.iter().filter(|frame| accepts_abort(frame)).count(), 1);
     let report = only(verify(&aborted.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
     let landing = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..ReflyOptions::default() };
     let (report, again) = refly_flight(&recording, &landing).unwrap();
-    assert_eq!(report.commands_identical, report.ticks, "the moment that was drawn is drawn again");
+    assert_eq!(report.commands_identical, report.frames, "the moment that was drawn is drawn again");
     assert_eq!(again.verdict, recording.verdict);
     assert!(aborted.landed);
 }

@@ -30,7 +30,7 @@ fn forged() -> Recording {
 fn an_evaluation_counts_differences_caused_by_the_build() {
     let forged = forged();
     let said = format!(
-        "with nothing changed this build decides 2 of {} ticks differently from the record",
+        "with nothing changed this build decides 2 of {} frames differently from the record",
         forged.frames.len()
     );
     for given in [&[][..], &["powered.weights.theta=300"]] {

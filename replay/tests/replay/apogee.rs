@@ -10,7 +10,7 @@ use replay::evaluate::{EvaluateError, evaluate};
 use replay::log::Recording;
 use replay::refly::vary::{grid, sweep};
 use replay::refly::{Law, ReflyOptions, StartAt, refly, refly_flight, write_log};
-use replay::verify::explain::tick;
+use replay::verify::explain::explain;
 use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with, with_plant};
@@ -34,7 +34,7 @@ fn without_changes_the_decisions_are_the_recorded_ones() {
     let report = evaluate(&recording(), &[]).unwrap();
     assert!(report.kind.starts_with("open loop"));
     assert_eq!((report.commands_different, report.levels_different), (0, 0));
-    assert!(report.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
+    assert!(report.frames.iter().all(|frame| frame.recorded == frame.evaluated));
     assert!(report.phases.iter().all(|phase| phase.recorded_s == phase.evaluated_s));
 }
 
@@ -48,7 +48,7 @@ fn timed_settings_change_the_commands_from_their_time_on() {
     let setting = format!("powered.weights.theta=300@{from_s:?}");
     let report = evaluate(&recording, &settings(&[&setting])).unwrap();
     assert!(report.commands_different > 100, "{}", report.commands_different);
-    assert!(report.ticks.iter().all(|tick| tick.time_s >= from_s || tick.recorded == tick.evaluated));
+    assert!(report.frames.iter().all(|frame| frame.time_s >= from_s || frame.recorded == frame.evaluated));
     // Lighting at a fixed height moves the ignition and nothing before it.
     let report = evaluate(&recording, &settings(&["ignition.fixed_height_m=90.0"])).unwrap();
     let ignition = report.phases.iter().find(|phase| phase.phase == "IGNITION").unwrap();
@@ -76,7 +76,7 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
     let recording = recording();
     let starts = [
         StartAt::Landing,
-        StartAt::Tick(1),
+        StartAt::Frame(1),
         StartAt::Time(5.0),
         StartAt::Phase(Phase::AeroDescent),
         StartAt::Phase(Phase::Powered),
@@ -88,12 +88,12 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
         assert!(report.kind.starts_with("closed loop"));
         let reached = report.reached;
         assert_eq!((reached.identical, reached.first_different), (reached.frames, None), "{start:?}");
-        assert_eq!(report.commands_identical, report.ticks, "{start:?}");
-        assert_eq!(reached.frames + report.ticks, recording.frames.len(), "{start:?}");
+        assert_eq!(report.commands_identical, report.frames, "{start:?}");
+        assert_eq!(reached.frames + report.frames, recording.frames.len(), "{start:?}");
         assert_eq!(flown.verdict, recording.verdict, "{start:?}");
         assert_eq!(report.verdict_changed, Some(false));
         let again = flown.records.iter().filter_map(|(_, record)| match record {
-            Record::ComputerFrame(tick) => Some(tick.as_ref()),
+            Record::ComputerFrame(frame) => Some(frame.as_ref()),
             _ => None,
         });
         assert!(again.eq(&recording.frames), "{start:?}");
@@ -122,10 +122,10 @@ fn another_controller_flies_the_burn() {
     let recording = recording();
     let flown_by = |law| refly(&recording, &ReflyOptions { law, ..ReflyOptions::default() });
     let same = flown_by(Law::Nmpc).unwrap();
-    assert_eq!((same.commands_identical, same.verdict_changed), (same.ticks, Some(false)));
+    assert_eq!((same.commands_identical, same.verdict_changed), (same.frames, Some(false)));
     for law in [Law::OpenLoop, Law::Oscillating] {
         let report = flown_by(law).unwrap();
-        assert!(report.commands_identical < report.ticks, "{law:?}");
+        assert!(report.commands_identical < report.frames, "{law:?}");
     }
 }
 
@@ -135,7 +135,7 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     let refusal = |start| {
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap_err().to_string()
     };
-    assert!(refusal(StartAt::Tick(99_999)).contains("no frame 99999; there are 1 to"));
+    assert!(refusal(StartAt::Frame(99_999)).contains("no frame 99999; there are 1 to"));
     assert!(refusal(StartAt::Time(1e6)).contains("the last is at"));
     assert!(refusal(StartAt::Phase(Phase::Chute)).contains("no frame in phase CHUTE"));
     let refused = |options: &ReflyOptions| refly(&recording, options).unwrap_err().to_string();
@@ -146,7 +146,7 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     assert!(refused(&with_plant(&["powered.gimbal_deg=3"])).contains("everything else is the controller's"));
     assert!(refused(&with(&["truth.wind_m_s=3"])).contains("belongs to the plant alone"));
     assert!(refused(&with(&["estimator.frame_s=1.0"])).contains("evaluate"));
-    let landing = |tick: &ComputerFrame| tick.output.phase > u32::from(Phase::AeroDescent.index());
+    let landing = |frame: &ComputerFrame| frame.output.phase > u32::from(Phase::AeroDescent.index());
     let fallen = recording.frames.iter().position(landing).unwrap();
     let mut falling = recording.clone();
     falling.frames.truncate(fallen);
@@ -176,7 +176,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         ("weak.mcap", with_plant(&["truth.impulse_scale=0.9"])),
         (
             "timed.mcap",
-            ReflyOptions { law: Law::OpenLoop, start: StartAt::Tick(1), ..ReflyOptions::default() },
+            ReflyOptions { law: Law::OpenLoop, start: StartAt::Frame(1), ..ReflyOptions::default() },
         ),
     ] {
         let (report, flown) = refly_flight(&recording, &options).unwrap();
@@ -200,12 +200,12 @@ fn every_plan_solved_again_is_the_flown_one() {
     let powered: Vec<u64> = recording
         .frames
         .iter()
-        .filter(|tick| tick.output.phase == u32::from(Phase::Powered.index()))
-        .map(|tick| tick.input.frame)
+        .filter(|frame| frame.output.phase == u32::from(Phase::Powered.index()))
+        .map(|frame| frame.input.frame)
         .filter(|frame| frame.is_multiple_of(40))
         .collect();
     for frame in powered {
-        let report = tick(&recording, frame).unwrap();
+        let report = explain(&recording, frame).unwrap();
         assert!(report.identical, "frame {frame}");
         let Some((warm, cold)) = report.warm.zip(report.cold) else { continue };
         plans += 1;
@@ -218,12 +218,12 @@ fn every_plan_solved_again_is_the_flown_one() {
         assert!(report.active.iter().any(|constraint| constraint.what == "z_m = 0.0000"), "frame {frame}");
     }
     assert!(plans > 5 && warm_iterations < cold_iterations, "{plans}: {warm_iterations}, {cold_iterations}");
-    let between = tick(&recording, 3).unwrap();
+    let between = explain(&recording, 3).unwrap();
     assert!(between.identical && between.warm.is_none() && between.path.is_empty());
-    let nearest = tick(&recording, between.nearest_solved.unwrap()).unwrap();
-    assert!(nearest.warm.is_some() && nearest.nearest_solved == Some(nearest.tick));
-    let refusal = tick(&recording, 99_999).unwrap_err().to_string();
-    assert!(refusal.contains("no tick 99999 that can be re-executed; there are 1 to"), "{refusal}");
+    let nearest = explain(&recording, between.nearest_solved.unwrap()).unwrap();
+    assert!(nearest.warm.is_some() && nearest.nearest_solved == Some(nearest.frame));
+    let refusal = explain(&recording, 99_999).unwrap_err().to_string();
+    assert!(refusal.contains("no frame 99999 that can be re-executed; there are 1 to"), "{refusal}");
 }
 
 #[test]
@@ -249,9 +249,16 @@ fn every_command_answers_for_a_flight_from_apogee() {
     let log = &LANDED.log;
     let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0"]));
     assert!(code == 0 && stdout.contains("open loop") && stdout.contains("POWERED"), "{stdout}{stderr}");
-    let (code, stdout, _) = run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0", "--csv"]));
-    assert!(code == 0 && stdout.starts_with("tick,time_s,recorded_phase"), "{stdout}");
-    assert!(stdout.lines().next().unwrap().contains("evaluated_gimbal_rad_1"), "{stdout}");
+    let directory = tempfile::tempdir().unwrap();
+    let table = directory.path().join("table.csv");
+    let (code, stdout, _) =
+        run(replay("evaluate", log).args(["--set", "powered.gimbal_deg=4.0", "--csv"]).arg(&table));
+    assert!(code == 0 && stdout.contains("open loop"), "{stdout}");
+    let written = std::fs::read_to_string(&table).unwrap();
+    assert!(written.starts_with("frame,time_s,recorded_phase"), "{written:.200}");
+    assert!(written.lines().next().unwrap().contains("evaluated_gimbal_rad_1"), "{written:.200}");
+    let (code, _, stderr) = run(replay("evaluate", log).arg("--csv").arg(&table));
+    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
     let (code, stdout, stderr) = run(replay("refly", log).args(["--plant", "truth.impulse_scale=0.7"]));
     assert!(code == 0 && stdout.contains("the verdict CHANGES"), "{stdout}{stderr}");
     assert!(stdout.contains("recorded frames identical") && stdout.contains("vertical speed"), "{stdout}");
@@ -259,14 +266,15 @@ fn every_command_answers_for_a_flight_from_apogee() {
     assert!(code == 0 && stdout.contains("flown by oscillating"), "{stdout}");
     // A plan in the middle of the burn.
     let recording = recording();
-    let in_burn = |tick: &&ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
-    let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|tick| tick.input.frame).collect();
+    let in_burn = |frame: &&ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
+    let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|frame| frame.input.frame).collect();
     let planning = burning[burning.len() / 2].next_multiple_of(10);
     let (code, stdout, _) = run(replay("verify", log).args(["--explain", &planning.to_string()]));
     assert!(code == 0 && stdout.contains("identical bit for bit") && stdout.contains("cold"), "{stdout}");
-    let (code, stdout, stderr) =
-        run(replay("refly", log).args(["--vary", "powered.weights.theta=80,100", "--csv", "--jobs", "2"]));
-    assert!(code == 0 && stdout.lines().count() == 3, "{stdout}{stderr}");
+    let table = directory.path().join("points.csv");
+    let vary = ["--vary", "powered.weights.theta=80,100", "--jobs", "2", "--csv"];
+    let (code, _, stderr) = run(replay("refly", log).args(vary).arg(&table));
+    assert!(code == 0 && std::fs::read_to_string(&table).unwrap().lines().count() == 3, "{stderr}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));
     assert!(code == 2 && stderr.contains("did you mean `powered.weights.theta`?"), "{stderr}");
 }
@@ -285,13 +293,13 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
     let mut writer = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
     writer.write(&Record::ComputerStart(Box::new(recording.start.unwrap())), 0).unwrap();
     let forged = recording.frames.len() / 2;
-    for (place, tick) in recording.frames.iter().enumerate() {
-        let mut tick = tick.clone();
+    for (place, frame) in recording.frames.iter().enumerate() {
+        let mut frame = frame.clone();
         if place == forged {
-            tick.output.gimbal_rad[1] += 0.1;
+            frame.output.gimbal_rad[1] += 0.1;
         }
-        let time_ns = tick.input.frame * 5_000_000;
-        writer.write(&Record::ComputerFrame(Box::new(tick)), time_ns).unwrap();
+        let time_ns = frame.input.frame * 5_000_000;
+        writer.write(&Record::ComputerFrame(Box::new(frame)), time_ns).unwrap();
     }
     writer.write(&Record::LandingVerdict(Box::new(recording.verdict.unwrap())), 15_000_000_000).unwrap();
     writer.finish().unwrap();
@@ -306,9 +314,9 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
 }
 
 /// Changes some number of a frame to arbitrary bits.
-fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
+fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
-    let (input, output) = (&mut tick.input, &mut tick.output);
+    let (input, output) = (&mut frame.input, &mut frame.output);
     match field {
         0 => input.time_s = number,
         1 => input.frame = bits,
@@ -341,21 +349,21 @@ proptest! {
     fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..60, 0_usize..14, any::<u64>()), 1..8)) {
         let mut recording = recording();
         // Around the ignition, where plans begin.
-        let lit = |tick: &ComputerFrame| tick.output.phase == u32::from(Phase::Powered.index());
+        let lit = |frame: &ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
         let landing = recording.frames.iter().position(lit).unwrap() - 20;
         recording.frames.truncate(landing + 60);
         for (place, field, bits) in spoilt {
             spoil(&mut recording.frames[landing + place], field, bits);
         }
         if let Ok(report) = evaluate(&recording, &settings(&["powered.gimbal_deg=4.0"])) {
-            prop_assert_eq!(report.ticks.len(), recording.frames.len());
+            prop_assert_eq!(report.frames.len(), recording.frames.len());
         }
         let last = recording.frames[recording.frames.len() - 1].input.frame;
-        if let Ok(report) = tick(&recording, last) {
-            prop_assert_eq!(report.tick, last);
+        if let Ok(report) = explain(&recording, last) {
+            prop_assert_eq!(report.frame, last);
         }
         if let Ok(report) = refly(&recording, &ReflyOptions::default()) {
-            prop_assert!(report.ticks > 0);
+            prop_assert!(report.frames > 0);
         }
     }
 }

@@ -31,7 +31,7 @@ fn a_setting_after_the_end_of_the_flight_is_refused() {
         let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", setting]));
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
         assert!(stderr.contains("takes effect after the end of"), "{stderr}");
-        assert!(stderr.contains("whose last tick is at T+"), "{stderr}");
+        assert!(stderr.contains("whose last frame is at T+"), "{stderr}");
     }
 }
 
@@ -44,7 +44,8 @@ fn info_takes_several_logs_and_standard_input() {
         code == 2 && stdout.contains("grade ") && stderr.contains("none.mcap: cannot be read"),
         "{stderr}"
     );
-    let mut child = replay("info", &"-".into()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut child =
+        replay("info", "-".as_ref()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(&std::fs::read(&MK2.log).unwrap()).unwrap();
     let output = child.wait_with_output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
@@ -62,7 +63,7 @@ fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
     let (ground, open) =
         (WITH_FRAMES.beside("swept.mcap"), || replay::log::FlightLog::open(&WITH_FRAMES.log));
     replay::export::export_tlog(&open, None, &telemetry).unwrap();
-    replay::export::import_tlog(&telemetry, &ground, &mut |_| {}).unwrap();
+    replay::log::import_tlog(&telemetry, &ground).unwrap();
     let (code, stdout, stderr) = run(replay("refly", &MK2.log).arg(&text).arg(&ground).args([
         "--vary",
         "powered.weights.theta=80,90",
@@ -114,7 +115,7 @@ fn a_key_that_a_profile_has_or_lacks_is_named() {
     {
         let path = directory.path().join(name);
         let recipe = Recipe { profile_toml: Some(text), with_frames: false };
-        std::fs::write(&path, write_log(&FLIGHT.ticks, &recipe).bytes).unwrap();
+        std::fs::write(&path, write_log(&FLIGHT.frames, &recipe).bytes).unwrap();
         let (_, info, _) = run(&mut replay("info", &path));
         let (code, _, refly) = run(&mut replay("refly", &path));
         let (_, verify, _) = run(&mut replay("verify", &path));

@@ -10,20 +10,20 @@ use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
-/// In Foxglove's terms: at any `log_time` the ticks, the truth and the transform describe the same moment.
+/// In Foxglove's terms: at any `log_time` the frames, the truth and the transform describe the same moment.
 #[test]
-fn ticks_truth_and_transforms_have_one_time_base() {
+fn frames_truth_and_transforms_have_one_time_base() {
     for log in [&MK2.log, &LANDED.log] {
         let mut entries = FlightLog::open(log).unwrap();
-        // By log time: the record's own time of ticks and of truth, and the height in truth and transform.
-        let mut ticks: BTreeMap<u64, f64> = BTreeMap::new();
+        // By log time: the record's own time of frames and of truth, and the height in truth and transform.
+        let mut frames: BTreeMap<u64, f64> = BTreeMap::new();
         let mut truth: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
         let mut transforms: BTreeMap<u64, f64> = BTreeMap::new();
         while let Some(stamped) = entries.next_entry().unwrap() {
             let at_ns = stamped.log_time_ns;
             match &stamped.entry {
                 Entry::ComputerFrame(frame) => {
-                    ticks.extend(frame.flight_time_s().map(|time_s| (at_ns, time_s)));
+                    frames.extend(frame.flight_time_s().map(|time_s| (at_ns, time_s)));
                 }
                 Entry::World(sample) => drop(truth.insert(at_ns, (sample.time_s, sample.state.position_m.z))),
                 _ if entries.channel(stamped.channel_id).is_some_and(|channel| channel.topic == "/tf") => {
@@ -36,13 +36,17 @@ fn ticks_truth_and_transforms_have_one_time_base() {
                 _ => {}
             }
         }
-        assert!(ticks.len() > 50 && truth.len() > 50 && transforms.len() == truth.len());
+        assert!(frames.len() > 50 && truth.len() > 50 && transforms.len() == truth.len());
         let mut both = 0;
         for (at_ns, (time_s, height_m)) in &truth {
             assert_eq!(transforms[at_ns].to_bits(), height_m.to_bits());
-            if let Some(tick_s) = ticks.get(at_ns) {
+            if let Some(frame_s) = frames.get(at_ns) {
                 both += 1;
-                assert!((tick_s - time_s).abs() < 1e-6, "{}: tick {tick_s}, truth {time_s}", log.display());
+                assert!(
+                    (frame_s - time_s).abs() < 1e-6,
+                    "{}: frame {frame_s}, truth {time_s}",
+                    log.display()
+                );
             }
         }
         assert!(both > 50, "{both}");
@@ -52,9 +56,10 @@ fn ticks_truth_and_transforms_have_one_time_base() {
 /// The same moment, asked for on each clock that `info` shows.
 #[test]
 fn a_flight_is_flown_again_from_a_time_of_any_clock() {
-    let clocks = MK2.recording().clocks;
+    let recording = MK2.recording();
+    let clocks = recording.clocks;
     let moment = ClockTime { clock: Clock::Flight, time_s: 12.0 };
-    let ticks: Vec<u64> = [Clock::Flight, Clock::Boot, Clock::Log]
+    let frames: Vec<u64> = [Clock::Flight, Clock::Boot, Clock::Log]
         .into_iter()
         .map(|clock| {
             let time_s = clocks.convert(moment, clock).unwrap().time_s;
@@ -68,10 +73,10 @@ fn a_flight_is_flown_again_from_a_time_of_any_clock() {
             let (code, stdout, stderr) = run(replay("refly", &MK2.log).args(["--at", &given, "--json"]));
             assert_eq!(code, 0, "{stderr}");
             let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-            report["start"]["tick"].as_u64().unwrap()
+            report["start"]["frame"].as_u64().unwrap()
         })
         .collect();
-    assert_eq!(ticks, [2400; 3]);
+    assert_eq!(frames, [recording.release_frame + 2400; 3]);
     let boot_s = clocks.convert(moment, Clock::Boot).unwrap().time_s;
     assert!(boot_s > 15.0, "the countdown and the rehearsal come before it: {boot_s}");
     // A campaign's log does not know when its computer was powered up.

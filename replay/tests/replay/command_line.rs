@@ -1,6 +1,6 @@
 //! Tests the command: exit codes, text, JSON, and the same bits on another processor.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use tempfile::TempDir;
@@ -24,7 +24,7 @@ impl Files {
     }
 }
 
-pub(crate) fn replay(question: &str, file: &PathBuf) -> Command {
+pub(crate) fn replay(question: &str, file: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_replay"));
     command.arg(question).arg(file);
     command
@@ -39,7 +39,7 @@ pub(crate) fn run(command: &mut Command) -> (i32, String, String) {
 fn an_identical_log_exits_0_with_the_count() {
     let files = Files::new();
     let (code, stdout, _) = run(&mut replay("verify", &files.file(&WHOLE.bytes)));
-    let count = FLIGHT.ticks.len();
+    let count = FLIGHT.frames.len();
     assert!(stdout.contains(&format!("{count} of {count} frames identical\n")), "{stdout}");
     assert_eq!(code, 0);
 }
@@ -59,12 +59,12 @@ fn the_log_is_identical_with_other_functions_of_the_c_library() {
 #[test]
 fn a_divergence_exits_1_with_both_values_and_bits() {
     let files = Files::new();
-    let mut ticks = FLIGHT.ticks[..8].to_vec();
-    let recorded_rad = &mut ticks[6].output.fins_rad[2];
+    let mut frames = FLIGHT.frames[..8].to_vec();
+    let recorded_rad = &mut frames[6].output.fins_rad[2];
     let recomputed_rad = *recorded_rad;
     *recorded_rad = f64::from_bits(recorded_rad.to_bits() ^ 1);
     let (recorded_rad, bits) = (*recorded_rad, recomputed_rad.to_bits());
-    let file = files.file(&write_log(&ticks, &Recipe::default()).bytes);
+    let file = files.file(&write_log(&frames, &Recipe::default()).bytes);
     let (code, stdout, _) = run(&mut replay("verify", &file));
     assert_eq!(code, 1, "{stdout}");
     for part in [
@@ -83,12 +83,12 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
 #[test]
 fn a_cut_log_exits_0_with_a_warning() {
     let files = Files::new();
-    let (at, ticks) = WHOLE.synced[4];
+    let (at, frames) = WHOLE.synced[4];
     let file = files.file(&WHOLE.bytes[..usize::try_from(at).unwrap() + 5]);
     let (code, stdout, stderr) = run(&mut replay("verify", &file));
     assert_eq!(code, 0);
     assert!(
-        stdout.contains(&format!("{ticks} of {ticks} frames identical of the readable part")),
+        stdout.contains(&format!("{frames} of {frames} frames identical of the readable part")),
         "{stdout}"
     );
     assert!(stderr.contains("warning"), "{stderr}");
@@ -103,12 +103,12 @@ fn a_cut_log_exits_0_with_a_warning() {
 #[test]
 fn a_log_broken_in_the_middle_says_what_span_is_lost() {
     let files = Files::new();
-    let (at, ticks) = WHOLE.synced[4];
+    let (at, frames) = WHOLE.synced[4];
     let mut bytes = WHOLE.bytes.clone();
     bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
     let (code, stdout, _) = run(&mut replay("info", &files.file(&bytes)));
-    let until_s = ticks as f64 * FRAME_S;
-    let lost_s = FLIGHT.ticks.len() as f64 * FRAME_S - until_s;
+    let until_s = frames as f64 * FRAME_S;
+    let lost_s = FLIGHT.frames.len() as f64 * FRAME_S - until_s;
     assert_eq!(code, 0);
     assert!(stdout.contains(&format!("readable until {until_s:.3} s")), "{stdout}");
     assert!(stdout.contains(&format!("{lost_s:.3} s after that are lost")), "{stdout}");
@@ -128,7 +128,7 @@ fn a_question_without_an_answer_exits_2_with_the_reason() {
     let (code, _, stderr) = run(&mut replay("info", &files.directory.path().join("none.mcap")));
     assert_eq!(code, 2);
     assert!(stderr.contains("none.mcap: cannot be read"), "{stderr}");
-    let (code, _, stderr) = run(&mut replay("info", &files.directory.path().to_owned()));
+    let (code, _, stderr) = run(&mut replay("info", files.directory.path()));
     assert_eq!(code, 2, "{stderr}");
     let (code, stdout, _) =
         run(&mut replay("verify", &files.file(&write_log(&[], &Recipe::default()).bytes)));
@@ -141,14 +141,14 @@ fn a_question_without_an_answer_exits_2_with_the_reason() {
 #[test]
 fn the_answers_are_json_too() {
     let files = Files::new();
-    let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[7].output.fins_rad[1] = f64::NAN;
-    let file = files.file(&write_log(&ticks, &Recipe::default()).bytes);
+    let mut frames = FLIGHT.frames[..8].to_vec();
+    frames[7].output.fins_rad[1] = f64::NAN;
+    let file = files.file(&write_log(&frames, &Recipe::default()).bytes);
     let (code, stdout, _) = run(replay("verify", &file).arg("--json"));
     assert_eq!(code, 1);
     let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!(report["outcome"], "diverged");
-    assert_eq!(report["first_divergence"]["tick"], 8);
+    assert_eq!(report["first_divergence"]["frame"], 8);
     assert_eq!(report["first_divergence"]["fields"][0]["recorded"]["value"], "NaN");
 
     let (code, stdout, _) = run(replay("info", &file).arg("--json"));

@@ -6,18 +6,18 @@ use replay::info::{GradeLevel, info_of};
 use replay::log::{Entry, FlightLog, LogError};
 use replay::verify::Verification;
 
-use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, idle_tick, verify_bytes, write_log};
+use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, idle_frame, verify_bytes, write_log};
 
-/// Every tick that can be read, and whether the log is damaged.
-fn read_ticks(bytes: &[u8]) -> Result<(Vec<ComputerFrame>, bool), LogError> {
+/// Every frame that can be read, and whether the log is damaged.
+fn read_frames(bytes: &[u8]) -> Result<(Vec<ComputerFrame>, bool), LogError> {
     let mut log = FlightLog::read("test.mcap".to_owned(), bytes)?;
-    let mut ticks = Vec::new();
+    let mut frames = Vec::new();
     while let Some(stamped) = log.next_entry()? {
         if let Entry::ComputerFrame(frame) = stamped.entry {
-            ticks.push(frame.record);
+            frames.push(frame.record);
         }
     }
-    Ok((ticks, log.damage().is_some()))
+    Ok((frames, log.damage().is_some()))
 }
 
 /// Where the data end and the summary begins.
@@ -35,11 +35,11 @@ fn a_log_cut_anywhere_yields_what_was_synced_before_the_cut() {
         let later = WHOLE.synced.partition_point(|(at, _)| *at <= cut as u64);
         let safe = later.checked_sub(1).map_or(0, |last| WHOLE.synced[last].1);
         // The messages of a sync are complete some bytes before it, and a full chunk ends before it, too.
-        let most = WHOLE.synced.get(later).map_or(safe, |(_, ticks)| *ticks);
-        match read_ticks(&bytes[..cut]) {
-            Ok((ticks, damaged)) => {
-                assert!((safe..=most).contains(&ticks.len()), "cut after {cut} bytes: {}", ticks.len());
-                assert!(FLIGHT.ticks.starts_with(&ticks), "cut after {cut} bytes");
+        let most = WHOLE.synced.get(later).map_or(safe, |(_, frames)| *frames);
+        match read_frames(&bytes[..cut]) {
+            Ok((frames, damaged)) => {
+                assert!((safe..=most).contains(&frames.len()), "cut after {cut} bytes: {}", frames.len());
+                assert!(FLIGHT.frames.starts_with(&frames), "cut after {cut} bytes");
                 assert!(damaged, "cut after {cut} bytes");
             }
             Err(error) => assert_eq!(safe, 0, "cut after {cut} bytes: {error}"),
@@ -50,25 +50,25 @@ fn a_log_cut_anywhere_yields_what_was_synced_before_the_cut() {
 #[test]
 fn the_readable_part_of_a_cut_log_is_verified() {
     for place in [0, 3, 7] {
-        let (at, ticks) = WHOLE.synced[place];
+        let (at, frames) = WHOLE.synced[place];
         let report = verify_bytes(&WHOLE.bytes[..usize::try_from(at).unwrap() + 11]).unwrap();
         assert_eq!(report.outcome, Verification::IdenticalReadablePart);
-        assert_eq!(report.frames_identical, ticks as u64);
+        assert_eq!(report.frames_identical, frames as u64);
         assert!(report.damage.unwrap().contains("without an end mark"));
     }
 }
 
 #[test]
 fn a_cut_log_is_described_up_to_the_cut() {
-    let (at, ticks) = WHOLE.synced[5];
+    let (at, frames) = WHOLE.synced[5];
     let cut = &WHOLE.bytes[..usize::try_from(at).unwrap() + 3];
     let mut log = FlightLog::read("test.mcap".to_owned(), cut).unwrap();
     let info = info_of(&mut log, || None).unwrap();
     assert_eq!(info.grade.level, GradeLevel::BitExact);
-    assert_eq!(info.frames.unwrap().last, ticks as u64);
+    assert_eq!(info.frames.unwrap().last, frames as u64);
     assert!(!info.completeness.complete);
     let until_s = info.completeness.readable_until_s.unwrap();
-    assert!((until_s - ticks as f64 * FRAME_S).abs() < 1e-6, "{until_s}");
+    assert!((until_s - frames as f64 * FRAME_S).abs() < 1e-6, "{until_s}");
 }
 
 /// Records shorter than their fields, of every known and unknown type, after a good beginning.
@@ -81,8 +81,8 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
             bytes.push(opcode);
             bytes.extend(u64::from(length).to_le_bytes());
             bytes.extend(std::iter::repeat_n(0, usize::from(length)));
-            let (ticks, damaged) = read_ticks(&bytes).unwrap();
-            assert_eq!(ticks.len(), WHOLE.synced[0].1, "type {opcode}, {length} bytes");
+            let (frames, damaged) = read_frames(&bytes).unwrap();
+            assert_eq!(frames.len(), WHOLE.synced[0].1, "type {opcode}, {length} bytes");
             // An end-of-data record of four bytes, without a checksum, is valid.
             assert!(damaged || opcode == mcap::records::op::DATA_END, "type {opcode}, {length} bytes");
         }
@@ -93,20 +93,20 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
 #[test]
 fn every_bit_pattern_survives_the_log() {
     let patterns = [0x7ff8_0000_0000_0001, 0xfff0_dead_beef_cafe, 0x8000_0000_0000_0000, 1, u64::MAX];
-    let ticks: Vec<ComputerFrame> = (1..)
+    let frames: Vec<ComputerFrame> = (1..)
         .zip(patterns)
         .map(|(number, bits)| {
-            let mut tick = idle_tick(number);
-            tick.input.time_s = f64::from_bits(bits);
-            tick.output.gimbal_rad[0] = f64::from_bits(bits);
-            tick
+            let mut frame = idle_frame(number);
+            frame.input.time_s = f64::from_bits(bits);
+            frame.output.gimbal_rad[0] = f64::from_bits(bits);
+            frame
         })
         .collect();
-    let (read, damaged) = read_ticks(&write_log(&ticks, &Recipe::default()).bytes).unwrap();
+    let (read, damaged) = read_frames(&write_log(&frames, &Recipe::default()).bytes).unwrap();
     assert!(!damaged);
-    for (tick, bits) in read.iter().zip(patterns) {
-        assert_eq!(tick.input.time_s.to_bits(), bits);
-        assert_eq!(tick.output.gimbal_rad[0].to_bits(), bits);
+    for (frame, bits) in read.iter().zip(patterns) {
+        assert_eq!(frame.input.time_s.to_bits(), bits);
+        assert_eq!(frame.output.gimbal_rad[0].to_bits(), bits);
     }
     assert_eq!(read.len(), patterns.len());
 }
@@ -115,24 +115,24 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
 
     /// Whichever bit of the data is flipped: either the file is refused, or the log is known to be damaged and every
-    /// tick that is read is an original tick.
+    /// frame that is read is an original frame.
     #[test]
     fn no_flipped_bit_goes_unnoticed(place in 0..data_end(), bit in 0_u32..8) {
         let mut bytes = WHOLE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
-        if let Ok((ticks, damaged)) = read_ticks(&bytes) {
+        if let Ok((frames, damaged)) = read_frames(&bytes) {
             prop_assert!(damaged);
-            prop_assert!(ticks.iter().all(|tick| FLIGHT.ticks.contains(tick)));
+            prop_assert!(frames.iter().all(|frame| FLIGHT.frames.contains(frame)));
         }
     }
 
     /// After the data there is only what this reader does not need, under a checksum of its own.
     #[test]
-    fn a_broken_summary_is_told_and_loses_no_tick(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
+    fn a_broken_summary_is_told_and_loses_no_frame(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
         let mut bytes = WHOLE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
-        let (ticks, damaged) = read_ticks(&bytes).unwrap();
-        prop_assert_eq!(ticks.len(), FLIGHT.ticks.len());
+        let (frames, damaged) = read_frames(&bytes).unwrap();
+        prop_assert_eq!(frames.len(), FLIGHT.frames.len());
         prop_assert!(damaged);
     }
 
@@ -144,8 +144,8 @@ proptest! {
         let mut bytes = WHOLE.bytes.clone();
         let end = (place + stretch.len()).min(bytes.len());
         bytes[place..end].copy_from_slice(&stretch[..end - place]);
-        if let Ok((ticks, _)) = read_ticks(&bytes) {
-            prop_assert!(ticks.iter().all(|tick| FLIGHT.ticks.contains(tick)));
+        if let Ok((frames, _)) = read_frames(&bytes) {
+            prop_assert!(frames.iter().all(|frame| FLIGHT.frames.contains(frame)));
         }
     }
 
@@ -153,7 +153,7 @@ proptest! {
     fn random_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..600), with_magic: bool) {
         let magic: &[u8] = if with_magic { b"\x89MCAP0\r\n" } else { b"" };
         let file = [magic, &bytes].concat();
-        prop_assert!(read_ticks(&file).is_err());
+        prop_assert!(read_frames(&file).is_err());
         prop_assert!(verify_bytes(&file).is_err());
     }
 }

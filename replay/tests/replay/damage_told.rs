@@ -33,7 +33,7 @@ fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String
 fn a_log_with_a_flipped_byte_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
     for log in [&LANDED.log, &MK2.log] {
-        let all = Held::read(log).ticks();
+        let all = Held::read(log).frames();
         let path = flipped(log, &directory);
         let (code, stdout, _) = run(&mut replay("verify", &path));
         assert_eq!(code, 0, "{stdout}");

@@ -1,10 +1,10 @@
-//! Tests that one changed bit in one recorded output is found at its tick and field.
+//! Tests that one changed bit in one recorded output is found at its frame and field.
 
 use proptest::prelude::*;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::verify::{FieldValue, Verification};
 
-use crate::flown::{FLIGHT, WHOLE, verify_bytes, verify_ticks};
+use crate::flown::{FLIGHT, WHOLE, verify_bytes, verify_frames};
 
 type Flip = fn(&mut ComputerFrame, u32);
 
@@ -18,49 +18,49 @@ fn flip_u32(number: &mut u32, bit: u32) {
 
 /// Every kind of field that is compared.
 const FIELDS: [(&str, Flip); 10] = [
-    ("output.gimbal_rad[0]", |tick, bit| flip_f64(&mut tick.output.gimbal_rad[0], bit)),
-    ("output.gimbal_rad[1]", |tick, bit| flip_f64(&mut tick.output.gimbal_rad[1], bit)),
-    ("output.fins_rad[3]", |tick, bit| flip_f64(&mut tick.output.fins_rad[3], bit)),
-    ("output.ignite", |tick, _| tick.output.ignite ^= true),
-    ("output.parachute", |tick, _| tick.output.parachute ^= true),
-    ("output.phase", |tick, bit| flip_u32(&mut tick.output.phase, bit)),
-    ("output.level", |tick, bit| flip_u32(&mut tick.output.level, bit)),
-    ("output.ignite_booster", |tick, _| tick.output.ignite_booster = true),
-    ("output.fins_rad.len", |tick, _| {
-        tick.output.fins_rad.pop();
+    ("output.gimbal_rad[0]", |frame, bit| flip_f64(&mut frame.output.gimbal_rad[0], bit)),
+    ("output.gimbal_rad[1]", |frame, bit| flip_f64(&mut frame.output.gimbal_rad[1], bit)),
+    ("output.fins_rad[3]", |frame, bit| flip_f64(&mut frame.output.fins_rad[3], bit)),
+    ("output.ignite", |frame, _| frame.output.ignite ^= true),
+    ("output.parachute", |frame, _| frame.output.parachute ^= true),
+    ("output.phase", |frame, bit| flip_u32(&mut frame.output.phase, bit)),
+    ("output.level", |frame, bit| flip_u32(&mut frame.output.level, bit)),
+    ("output.ignite_booster", |frame, _| frame.output.ignite_booster = true),
+    ("output.fins_rad.len", |frame, _| {
+        frame.output.fins_rad.pop();
     }),
-    ("state_digest", |tick, bit| tick.state_digest ^= 1 << (bit % 64)),
+    ("state_digest", |frame, bit| frame.state_digest ^= 1 << (bit % 64)),
 ];
 
 #[test]
 fn the_flight_is_identical() {
     let report = verify_bytes(&WHOLE.bytes).unwrap();
     assert_eq!(report.outcome, Verification::Identical, "{report:?}");
-    assert_eq!(report.frames_identical, FLIGHT.ticks.len() as u64);
+    assert_eq!(report.frames_identical, FLIGHT.frames.len() as u64);
     assert!(report.frames_compared > 50, "the whole flight is compared");
     assert_eq!(report.build.differences, []);
 }
 
 #[test]
 fn every_kind_of_field_is_compared() {
-    let mut ticks = FLIGHT.ticks[..=FIELDS.len()].to_vec();
-    for (tick, (_, flip)) in ticks.iter_mut().skip(1).zip(FIELDS) {
-        flip(tick, 0);
+    let mut frames = FLIGHT.frames[..=FIELDS.len()].to_vec();
+    for (frame, (_, flip)) in frames.iter_mut().skip(1).zip(FIELDS) {
+        flip(frame, 0);
     }
-    let report = verify_ticks(&ticks);
+    let report = verify_frames(&frames);
     assert_eq!(report.outcome, Verification::Diverged);
-    assert_eq!(report.frames_different, FIELDS.len() as u64, "one change in each tick, and none spreads");
+    assert_eq!(report.frames_different, FIELDS.len() as u64, "one change in each frame, and none spreads");
     assert_eq!(report.fields_different, FIELDS.len() as u64);
     assert_eq!(report.first_divergence.unwrap().frame, 2);
 }
 
 #[test]
 fn minus_zero_is_not_zero() {
-    let mut ticks = FLIGHT.ticks[..2].to_vec();
-    let gimbal_rad = &mut ticks[1].output.gimbal_rad[0];
+    let mut frames = FLIGHT.frames[..2].to_vec();
+    let gimbal_rad = &mut frames[1].output.gimbal_rad[0];
     assert_eq!(gimbal_rad.to_bits(), 0.0_f64.to_bits(), "straight before the burn");
     *gimbal_rad = -0.0;
-    let first = verify_ticks(&ticks).first_divergence.unwrap();
+    let first = verify_frames(&frames).first_divergence.unwrap();
     assert_eq!(first.fields[0].path, "output.gimbal_rad[0]");
     assert_eq!(first.fields[0].recorded, FieldValue::Float(-0.0));
     assert_eq!(first.fields[0].recomputed, FieldValue::Float(0.0));
@@ -71,9 +71,9 @@ fn minus_zero_is_not_zero() {
 #[test]
 fn an_input_that_is_not_a_number_is_replayed_like_any_other() {
     let payload = f64::from_bits(0x7ff8_dead_beef_0001);
-    let mut ticks = FLIGHT.ticks[..8].to_vec();
-    ticks[7].input.measured.as_mut().unwrap().imu.gyro_rad_s.x = payload;
-    let report = verify_ticks(&ticks);
+    let mut frames = FLIGHT.frames[..8].to_vec();
+    frames[7].input.measured.as_mut().unwrap().imu.gyro_rad_s.x = payload;
+    let report = verify_frames(&frames);
     assert_eq!(report.frames_compared, 8);
     assert_eq!(report.first_divergence.unwrap().frame, 8, "the recorded output belonged to another input");
 }
@@ -82,13 +82,13 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
     #[test]
-    fn one_flipped_bit_is_reported_at_its_tick_and_field(
+    fn one_flipped_bit_is_reported_at_its_frame_and_field(
         place in 0_usize..25, field in 0..FIELDS.len(), bit in 0_u32..64,
     ) {
         let (path, flip) = FIELDS[field];
-        let mut ticks = FLIGHT.ticks[..25].to_vec();
-        flip(&mut ticks[place], bit);
-        let report = verify_ticks(&ticks);
+        let mut frames = FLIGHT.frames[..25].to_vec();
+        flip(&mut frames[place], bit);
+        let report = verify_frames(&frames);
         prop_assert_eq!(report.outcome, Verification::Diverged);
         prop_assert_eq!((report.frames_different, report.fields_different), (1, 1));
         let first = report.first_divergence.unwrap();

@@ -26,7 +26,7 @@ const DEADLINE_S: f64 = 0.005;
 /// The beginning of a flight from apogee, with a verdict as if it had come down then.
 pub(crate) struct Flight {
     pub(crate) start: ComputerStart,
-    pub(crate) ticks: Vec<ComputerFrame>,
+    pub(crate) frames: Vec<ComputerFrame>,
     pub(crate) verdict: v1::LandingVerdict,
     /// What the pilot thought after each frame.
     thoughts: Vec<Record>,
@@ -38,10 +38,10 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
     let start = sortie::start(&flight);
-    let (mut ticks, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
-    while ticks.len() < FRAMES {
+    let (mut frames, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
+    while frames.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
-        ticks.push(*last.take().unwrap());
+        frames.push(*last.take().unwrap());
         let beside = sortie::thought_and_truth(&flight).into_iter();
         thoughts.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
     }
@@ -61,7 +61,7 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
             .into(),
         ..v1::LandingVerdict::default()
     };
-    Flight { start, ticks, verdict, thoughts, header: campaign_header(&recipe, NUMBER) }
+    Flight { start, frames, verdict, thoughts, header: campaign_header(&recipe, NUMBER) }
 });
 
 /// The mission of the flight.
@@ -89,24 +89,24 @@ pub(crate) struct Written {
 }
 
 /// A log of these frames, synced after every fifth. The start is left out if there are no frames.
-pub(crate) fn write_log(ticks: &[ComputerFrame], recipe: &Recipe) -> Written {
+pub(crate) fn write_log(frames: &[ComputerFrame], recipe: &Recipe) -> Written {
     let file = tempfile::tempfile().unwrap();
     let header = LogHeader { profile_toml: recipe.profile_toml.clone(), ..FLIGHT.header.clone() };
     let mut writer = LogWriter::new(file.try_clone().unwrap(), &header).unwrap();
     let mut synced = Vec::new();
     let size = |file: &File| file.metadata().unwrap().len();
-    if !ticks.is_empty() {
+    if !frames.is_empty() {
         writer.write(&Record::ComputerStart(Box::new(FLIGHT.start)), 0).unwrap();
     }
-    for (index, tick) in ticks.iter().enumerate() {
+    for (index, frame) in frames.iter().enumerate() {
         let time_ns = (index as u64 + 1) * FRAME_NS;
         if recipe.with_frames {
-            for record in around(tick) {
+            for record in around(frame) {
                 writer.write(&record, time_ns).unwrap();
             }
         }
-        writer.write(&Record::ComputerFrame(Box::new(tick.clone())), time_ns).unwrap();
-        let place = usize::try_from(tick.input.frame).ok().and_then(|number| number.checked_sub(1));
+        writer.write(&Record::ComputerFrame(Box::new(frame.clone())), time_ns).unwrap();
+        let place = usize::try_from(frame.input.frame).ok().and_then(|number| number.checked_sub(1));
         if let Some(thought) = place.and_then(|place| FLIGHT.thoughts.get(place)) {
             writer.write(thought, time_ns).unwrap();
         }
@@ -117,10 +117,10 @@ pub(crate) fn write_log(ticks: &[ComputerFrame], recipe: &Recipe) -> Written {
     }
     if recipe.with_frames {
         let verdict = Record::LandingVerdict(Box::new(FLIGHT.verdict.clone()));
-        writer.write(&verdict, ticks.len() as u64 * FRAME_NS).unwrap();
+        writer.write(&verdict, frames.len() as u64 * FRAME_NS).unwrap();
     }
     writer.flush().unwrap();
-    synced.push((size(&file), ticks.len()));
+    synced.push((size(&file), frames.len()));
     let mut file = writer.finish().unwrap();
     std::io::Seek::rewind(&mut file).unwrap();
     let mut bytes = Vec::new();
@@ -129,14 +129,14 @@ pub(crate) fn write_log(ticks: &[ComputerFrame], recipe: &Recipe) -> Written {
 }
 
 /// What else a vehicle records in a frame.
-fn around(tick: &ComputerFrame) -> [Record; 3] {
-    let frame = RawFrame {
+fn around(frame: &ComputerFrame) -> [Record; 3] {
+    let raw = RawFrame {
         direction: Direction::Tx,
         endpoint: "vehicle",
         link: "udpout:127.0.0.1:14550".to_owned(),
         bytes: vec![0xfd; 40],
     };
-    let ComputerFrame { input, .. } = tick;
+    let ComputerFrame { input, .. } = frame;
     let timing = PilotTiming {
         frame: input.frame,
         time_s: input.time_s,
@@ -144,11 +144,11 @@ fn around(tick: &ComputerFrame) -> [Record; 3] {
         deadline_s: DEADLINE_S,
     };
     let event = Event { level: EventLevel::Info, name: "vehicle".to_owned(), message: "frame".to_owned() };
-    [Record::RawFrame(frame), Record::PilotTiming(timing), Record::Event(event)]
+    [Record::RawFrame(raw), Record::PilotTiming(timing), Record::Event(event)]
 }
 
 /// A log of the whole flight.
-pub(crate) static WHOLE: LazyLock<Written> = LazyLock::new(|| write_log(&FLIGHT.ticks, &Recipe::default()));
+pub(crate) static WHOLE: LazyLock<Written> = LazyLock::new(|| write_log(&FLIGHT.frames, &Recipe::default()));
 
 /// The report on a log's only flight.
 pub(crate) fn only(mut reports: Vec<VerifyReport>) -> VerifyReport {
@@ -168,14 +168,14 @@ pub(crate) fn verify_bytes(bytes: &[u8]) -> Result<VerifyReport, LogError> {
 }
 
 /// Verifies a log of these frames.
-pub(crate) fn verify_ticks(ticks: &[ComputerFrame]) -> VerifyReport {
+pub(crate) fn verify_frames(frames: &[ComputerFrame]) -> VerifyReport {
     let recipe = Recipe { with_frames: false, ..Recipe::default() };
-    verify_bytes(&write_log(ticks, &recipe).bytes).unwrap()
+    verify_bytes(&write_log(frames, &recipe).bytes).unwrap()
 }
 
 /// A frame with this number; for tests that need no flight.
-pub(crate) fn idle_tick(number: u64) -> ComputerFrame {
-    let mut tick = FLIGHT.ticks[0].clone();
-    tick.input.frame = number;
-    tick
+pub(crate) fn idle_frame(number: u64) -> ComputerFrame {
+    let mut frame = FLIGHT.frames[0].clone();
+    frame.input.frame = number;
+    frame
 }

@@ -14,7 +14,7 @@ fn the_vehicle_is_where_the_estimate_was() {
     let at =
         |from| refly(&recording, &ReflyOptions { start: start.clone(), from, ..ReflyOptions::default() });
     let (true_one, believed) = (at(From::Truth).unwrap(), at(From::Estimate).unwrap());
-    assert_eq!((believed.start.from, believed.start.tick), (From::Estimate, true_one.start.tick));
+    assert_eq!((believed.start.from, believed.start.frame), (From::Estimate, true_one.start.frame));
     assert_eq!(believed.reached, true_one.reached);
     // The estimate has an error of plausible size.
     let off_m =
@@ -28,9 +28,9 @@ fn the_vehicle_is_where_the_estimate_was() {
 fn a_start_without_an_estimate_is_refused() {
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.frames.last().unwrap().input.frame;
-    for (tick, reason) in [(1, "estimated nothing yet"), (last, "already on the ground")] {
+    for (frame, reason) in [(1, "estimated nothing yet"), (last, "already on the ground")] {
         let options =
-            ReflyOptions { start: StartAt::Tick(tick), from: From::Estimate, ..ReflyOptions::default() };
+            ReflyOptions { start: StartAt::Frame(frame), from: From::Estimate, ..ReflyOptions::default() };
         let refusal = refly(&recording, &options).unwrap_err().to_string();
         assert!(refusal.contains("apogee.mcap") && refusal.contains(reason), "{refusal}");
     }

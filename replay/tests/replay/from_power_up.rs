@@ -296,7 +296,7 @@ fn a_request_removed_from_a_log_is_a_divergence_in_its_frame() {
     );
     assert_eq!(report.outcome, Verification::Diverged);
     let first = report.first_divergence.unwrap();
-    assert_eq!((first.frame, first.tick, first.phase), (1_201, None, "PAD_IDLE"));
+    assert_eq!((first.frame, first.in_flight, first.phase), (1_201, false, "PAD_IDLE"));
     assert!(first.fields.iter().any(|field| field.path == "output.phase"), "{first:?}");
 }
 

@@ -6,9 +6,9 @@ use std::sync::LazyLock;
 
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::export::import_tlog;
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::info::info;
+use replay::log::import_tlog;
 use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording};
 
 use crate::command_line::{replay, run};
@@ -28,7 +28,7 @@ fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> P
     let [tlog, imported] = ["tlog", "mcap"].map(|end| flight.beside(&format!("sent-{name}.{end}")));
     let open = || FlightLog::open(&flight.log);
     export_tlog(&open, None, &tlog).unwrap();
-    import_tlog(&tlog, &imported, &mut |_| {}).unwrap();
+    import_tlog(&tlog, &imported).unwrap();
     let path = flight.beside(&format!("{name}.mcap"));
     let header =
         LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };

@@ -13,7 +13,7 @@ use replay::log::Recording;
 use replay::refly::vary::{grid, sweep};
 use replay::refly::{ReflyOptions, StartAt, refly};
 use replay::report::report;
-use replay::verify::explain::tick;
+use replay::verify::explain::explain;
 
 use crate::flown::{FLIGHT, FRAME_NS, Recipe, WHOLE, write_log};
 
@@ -36,13 +36,13 @@ fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
 fn a_hollow_log_is_used_up_to_its_hole() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("hollow.mcap");
-    let (at, ticks) = WHOLE.synced[4];
+    let (at, frames) = WHOLE.synced[4];
     std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap()]).unwrap();
     let file = std::fs::File::options().write(true).open(&path).unwrap();
     file.set_len(10 << 30).unwrap();
     for (arguments, expected) in [
         (&["info"][..], "type 0, which does not exist".to_owned()),
-        (&["verify"], format!("{ticks} of {ticks} frames identical of the readable part")),
+        (&["verify"], format!("{frames} of {frames} frames identical of the readable part")),
         (&["evaluate"], "open loop".to_owned()),
         (&["refly", "--at", "frame:12"], "closed loop".to_owned()),
         (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
@@ -54,7 +54,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     let recovered = directory.path().join("recovered.mcap");
     let recovery = replay::recover::recover(&path, &recovered).unwrap();
     assert_eq!(recovery.lost[0].bytes, (10 << 30) - at);
-    assert_eq!(Recording::open(&recovered).unwrap().frames.len(), ticks);
+    assert_eq!(Recording::open(&recovered).unwrap().frames.len(), frames);
 
     file.set_len(0).unwrap();
     file.set_len(10 << 30).unwrap();
@@ -118,7 +118,7 @@ fn what_is_too_large_is_passed_over_by_its_length() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("sparse.mcap");
     let (data, ending) = data_and_ending();
-    let ticks = FLIGHT.ticks.len();
+    let frames = FLIGHT.frames.len();
     for opcode in [mcap::records::op::ATTACHMENT, mcap::records::op::CHUNK] {
         let first = usize::try_from(
             mcap::Summary::read(&WHOLE.bytes).unwrap().unwrap().chunk_indexes[0].chunk_start_offset,
@@ -136,7 +136,7 @@ fn what_is_too_large_is_passed_over_by_its_length() {
             assert_eq!(said.contains("was passed over"), opcode == mcap::records::op::CHUNK, "{said}");
         }
         let (_, said) = within(200, &["verify"], &path);
-        assert!(said.contains(&format!("{ticks} of {ticks} frames identical")), "{said}");
+        assert!(said.contains(&format!("{frames} of {frames} frames identical")), "{said}");
         assert!(said.contains("cannot be known"), "{said}");
     }
 }
@@ -220,18 +220,18 @@ fn write_long_log(path: &Path, bytes: u64) -> u64 {
     let mut writer = LogWriter::new(file, &LogHeader::default()).unwrap();
     let mut number = 0_u64;
     while std::fs::metadata(path).unwrap().len() < bytes {
-        for tick in &FLIGHT.ticks {
-            let mut tick = tick.clone();
+        for frame in &FLIGHT.frames {
+            let mut frame = frame.clone();
             number += 1;
-            tick.input.frame = number;
+            frame.input.frame = number;
             // Numbers that do not compress, as in a flight; many, so that the log grows fast.
             let mut noise = number;
-            tick.input.fins_rad = Vec::new();
+            frame.input.fins_rad = Vec::new();
             for _ in 0..150 {
                 noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                tick.input.fins_rad.push(noise as f64 / 1e18);
+                frame.input.fins_rad.push(noise as f64 / 1e18);
             }
-            writer.write(&Record::ComputerFrame(Box::new(tick)), number * FRAME_NS).unwrap();
+            writer.write(&Record::ComputerFrame(Box::new(frame)), number * FRAME_NS).unwrap();
         }
     }
     writer.finish().unwrap();
@@ -242,10 +242,10 @@ fn write_long_log(path: &Path, bytes: u64) -> u64 {
 fn assert_described_within(megabytes: u32, bytes: u64) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.mcap");
-    let ticks = write_long_log(&path, bytes);
+    let frames = write_long_log(&path, bytes);
     let (code, said) = within(megabytes, &["info"], &path);
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains(&format!("frames      1 to {ticks},")), "{said}");
+    assert!(said.contains(&format!("frames      1 to {frames},")), "{said}");
 }
 
 /// The same memory for one megabyte as for a hundred: what is held does not grow with the log.
@@ -260,13 +260,13 @@ fn a_hundred_megabytes_are_described_in_the_memory_of_one() {
 fn a_hundred_megabytes_are_exported_in_bounded_memory() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.mcap");
-    let ticks = write_long_log(&path, 100 << 20);
+    let frames = write_long_log(&path, 100 << 20);
     let tables = directory.path().join("tables");
     let arguments = ["export", "--to", "csv", "--output", tables.to_str().unwrap()];
     let (code, said) = within(64, &arguments, &path);
     assert_eq!(code, 0, "{said}");
     let table = std::fs::read_to_string(tables.join("computer_frame.csv")).unwrap();
-    assert_eq!(table.lines().count() as u64, ticks + 1);
+    assert_eq!(table.lines().count() as u64, frames + 1);
 }
 
 #[test]
@@ -276,9 +276,9 @@ fn a_gigabyte_is_described_within_200_megabytes() {
 }
 
 /// Changes some number of a frame to arbitrary bits.
-fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
+fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
-    let (input, output) = (&mut tick.input, &mut tick.output);
+    let (input, output) = (&mut frame.input, &mut frame.output);
     let measured = input.measured.as_mut().unwrap();
     match field {
         0 => input.time_s = number,
@@ -292,7 +292,7 @@ fn spoil(tick: &mut ComputerFrame, field: usize, bits: u64) {
         8 => output.gimbal_rad[0] = number,
         9 => output.level = bits as u32,
         10 => input.igniter_continuity = false,
-        11 => tick.state_digest = bits,
+        11 => frame.state_digest = bits,
         // An abort.
         12 => input.requests.push(Request { asked: 4, ..Request::default() }),
         13 => output.ignite = true,
@@ -306,23 +306,23 @@ proptest! {
     /// A log with correct checksums and nonsense numbers: every command gives an answer or a reason.
     #[test]
     fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..30, 0_usize..15, any::<u64>()), 1..12)) {
-        let mut ticks = FLIGHT.ticks[..30].to_vec();
+        let mut frames = FLIGHT.frames[..30].to_vec();
         for (place, field, bits) in spoilt {
-            spoil(&mut ticks[place], field, bits);
+            spoil(&mut frames[place], field, bits);
         }
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("nonsense.mcap");
-        std::fs::write(&path, write_log(&ticks, &Recipe::default()).bytes).unwrap();
+        std::fs::write(&path, write_log(&frames, &Recipe::default()).bytes).unwrap();
         let recording = Recording::open(&path).unwrap();
         prop_assert_eq!(recording.frames.len(), 30);
         let evaluated = evaluate(&recording, &["powered.weights.theta=90".parse().unwrap()]).unwrap();
-        let gimbal_rad = |tick: &replay::evaluate::EvaluatedTick| tick.evaluated.gimbal_rad.clone();
-        prop_assert!(evaluated.ticks.iter().flat_map(gimbal_rad).all(f64::is_finite));
-        prop_assert_eq!(tick(&recording, 20).unwrap().tick, 20);
-        for start in [StartAt::Landing, StartAt::Tick(12)] {
+        let gimbal_rad = |frame: &replay::evaluate::EvaluatedFrame| frame.evaluated.gimbal_rad.clone();
+        prop_assert!(evaluated.frames.iter().flat_map(gimbal_rad).all(f64::is_finite));
+        prop_assert_eq!(explain(&recording, 20).unwrap().frame, 20);
+        for start in [StartAt::Landing, StartAt::Frame(12)] {
             let options = ReflyOptions { start, ..ReflyOptions::default() };
             if let Ok(report) = refly(&recording, &options) {
-                prop_assert!(report.ticks > 0);
+                prop_assert!(report.frames > 0);
             }
         }
         prop_assert!(report(&path).unwrap().html.ends_with("</html>\n"));
@@ -332,7 +332,7 @@ proptest! {
         let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
         let points = grid(&["powered.weights.theta=50:90:2".parse().unwrap()], &[]).unwrap();
-        let options = ReflyOptions { start: StartAt::Tick(12), ..ReflyOptions::default() };
+        let options = ReflyOptions { start: StartAt::Frame(12), ..ReflyOptions::default() };
         if let Ok(swept) = sweep(&[recording], &points, &options, &|_, _| {}) {
             prop_assert_eq!(swept.points.len(), 2);
         }

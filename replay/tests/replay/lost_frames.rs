@@ -9,7 +9,7 @@ use replay::log::Recording;
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
-use replay::verify::explain::{TickError, tick};
+use replay::verify::explain::{ExplainError, explain};
 use replay::verify::{Obstacle, Verification, verify};
 
 use crate::command_line::{replay, run};
@@ -52,20 +52,20 @@ fn an_evaluation_ends_at_the_loss_and_says_so() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before, _) = around_the_loss(&recording);
     let evaluated = evaluate(&recording, &[]).unwrap();
-    assert_eq!(evaluated.ticks.last().unwrap().tick, after);
-    assert!(evaluated.ticks.iter().all(|tick| tick.recorded == tick.evaluated));
+    assert_eq!(evaluated.frames.last().unwrap().frame, after);
+    assert!(evaluated.frames.iter().all(|frame| frame.recorded == frame.evaluated));
     let (code, _, stderr) = run(&mut replay("evaluate", &RECOVERED));
-    let warning = format!("after tick {after} comes tick {before}; nothing after the gap was run again");
+    let warning = format!("after frame {after} comes frame {before}; nothing after the gap was run again");
     assert!(code == 0 && stderr.contains(&warning), "{stderr}");
 }
 
 #[test]
-fn a_tick_after_the_loss_is_refused() {
+fn a_frame_after_the_loss_is_refused() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before, _) = around_the_loss(&recording);
-    assert!(tick(&recording, after).unwrap().identical);
-    let refusal = tick(&recording, before).unwrap_err();
-    assert!(matches!(refusal, TickError::NoTick { last, .. } if last == after), "{refusal}");
+    assert!(explain(&recording, after).unwrap().identical);
+    let refusal = explain(&recording, before).unwrap_err();
+    assert!(matches!(refusal, ExplainError::NoFrame { last, .. } if last == after), "{refusal}");
 }
 
 #[test]

@@ -10,14 +10,14 @@ use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 use crate::tampered::Held;
 
-/// The log with every other tick and two thirds of the truth left out.
+/// The log with every other frame and two thirds of the truth left out.
 fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
-    let (mut ticks, mut truths) = (0, 0);
+    let (mut frames, mut truths) = (0, 0);
     held.keep(|message| match message.topic.as_str() {
         TOPIC_COMPUTER_FRAME => {
-            ticks += 1;
-            ticks % 2 == 0
+            frames += 1;
+            frames % 2 == 0
         }
         TOPIC_TRUTH_SAMPLE => {
             truths += 1;
@@ -31,7 +31,7 @@ fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
 }
 
 #[test]
-fn a_flight_that_lost_half_its_ticks_does_not_pass() {
+fn a_flight_that_lost_half_its_frames_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
     for log in [&MK2.log, &LANDED.log] {
         let truth = "vehicle_truth3d";

@@ -1,4 +1,4 @@
-//! Tests logs whose ticks cannot all be re-executed: the reason is named, and the other ticks are compared.
+//! Tests logs whose frames cannot all be re-executed: the reason is named, and the other frames are compared.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use replay::info::{GradeLevel, Info, info, info_of};
 use replay::log::{FlightLog, Recording};
 use replay::verify::{Obstacle, Verification, verify};
 
-use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_ticks, write_log};
+use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_frames, write_log};
 use crate::tampered::Held;
 
 fn info_of_bytes(bytes: &[u8]) -> Info {
@@ -18,16 +18,16 @@ fn info_of_bytes(bytes: &[u8]) -> Info {
 }
 
 #[test]
-fn a_log_without_ticks_is_refused() {
+fn a_log_without_frames_is_refused() {
     let bytes = write_log(&[], &Recipe::default()).bytes;
     let report = verify_bytes(&bytes).unwrap();
-    assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoTicks)));
+    assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoComputer)));
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::TelemetryOnly);
 }
 
 #[test]
 fn a_log_without_a_profile_is_refused() {
-    let bytes = write_log(&FLIGHT.ticks[..3], &Recipe { profile_toml: None, ..Recipe::default() }).bytes;
+    let bytes = write_log(&FLIGHT.frames[..3], &Recipe { profile_toml: None, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
     assert_eq!((report.outcome, report.obstacle), (Verification::NotReplayable, Some(Obstacle::NoProfile)));
     assert_eq!(report.frames_recorded, 3);
@@ -37,7 +37,7 @@ fn a_log_without_a_profile_is_refused() {
 #[test]
 fn a_profile_of_another_kind_is_refused() {
     let profile_toml = Some("name = \"x\"\nwings = 2\n".to_owned());
-    let bytes = write_log(&FLIGHT.ticks[..3], &Recipe { profile_toml, ..Recipe::default() }).bytes;
+    let bytes = write_log(&FLIGHT.frames[..3], &Recipe { profile_toml, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
     assert_eq!(report.outcome, Verification::NotReplayable);
     let reason = report.obstacle.unwrap().to_string();
@@ -46,13 +46,13 @@ fn a_profile_of_another_kind_is_refused() {
 }
 
 /// The log of these frames, which has lost some of them: the numbers of its records have a gap.
-fn lossy(ticks: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::TempDir, PathBuf) {
+fn lossy(frames: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("lossy.mcap");
-    std::fs::write(&path, write_log(ticks, &Recipe::default()).bytes).unwrap();
+    std::fs::write(&path, write_log(frames, &Recipe::default()).bytes).unwrap();
     let mut held = Held::read(&path);
     held.keep(|message| {
-        !message.is_tick() || kept(ComputerFrame::decode(message.data.as_slice()).unwrap().input.frame)
+        !message.is_frame() || kept(ComputerFrame::decode(message.data.as_slice()).unwrap().input.frame)
     });
     held.write(&path);
     (directory, path)
@@ -60,7 +60,7 @@ fn lossy(ticks: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::Temp
 
 #[test]
 fn a_log_without_its_first_frames_is_refused() {
-    let (_directory, path) = lossy(&FLIGHT.ticks[..5], |frame| frame > 2);
+    let (_directory, path) = lossy(&FLIGHT.frames[..5], |frame| frame > 2);
     let report = only(verify(&path).unwrap());
     assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing { first: 3 }));
     assert_eq!((report.outcome, report.frames_compared), (Verification::NotReplayable, 0));
@@ -68,9 +68,9 @@ fn a_log_without_its_first_frames_is_refused() {
 
 #[test]
 fn frames_before_a_gap_are_compared() {
-    let mut ticks = FLIGHT.ticks[..9].to_vec();
+    let mut frames = FLIGHT.frames[..9].to_vec();
     let kept = |frame| !(5..7).contains(&frame);
-    let (_directory, path) = lossy(&ticks, kept);
+    let (_directory, path) = lossy(&frames, kept);
     let report = only(verify(&path).unwrap());
     assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 4, before: 7 }));
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 4));
@@ -79,17 +79,17 @@ fn frames_before_a_gap_are_compared() {
     assert_eq!((info.completeness.complete, info.completeness.messages_lost), (false, 2));
     assert!(info.grade.reason.starts_with("up to frame 4"), "{}", info.grade.reason);
 
-    ticks[2].output.gimbal_rad[0] = 0.5;
-    let (_directory, path) = lossy(&ticks, kept);
+    frames[2].output.gimbal_rad[0] = 0.5;
+    let (_directory, path) = lossy(&frames, kept);
     let report = only(verify(&path).unwrap());
     assert_eq!(report.outcome, Verification::Diverged, "a difference before the gap is still a difference");
 }
 
 #[test]
 fn an_input_of_another_version_is_refused() {
-    let mut ticks = FLIGHT.ticks[..4].to_vec();
-    ticks[3].input.fins_rad.pop();
-    let report = verify_ticks(&ticks);
+    let mut frames = FLIGHT.frames[..4].to_vec();
+    frames[3].input.fins_rad.pop();
+    let report = verify_frames(&frames);
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 3));
     let reason = report.obstacle.unwrap().to_string();
     assert!(reason.contains("fin"), "{reason}");
@@ -132,7 +132,7 @@ fn the_whole_flight_is_described() {
     assert_eq!(info.profile.unwrap().name.as_deref(), Some(MISSION));
     assert_eq!(info.build_comparison.differences, []);
     let frames = info.frames.unwrap();
-    assert_eq!((frames.first, frames.last, frames.lost), (1, FLIGHT.ticks.len() as u64, 0));
+    assert_eq!((frames.first, frames.last, frames.lost), (1, FLIGHT.frames.len() as u64, 0));
     let solve_time = frames.solve_time.unwrap();
     assert!((solve_time.max_s - 0.007).abs() < 1e-12);
     assert!((solve_time.median_s - 0.004).abs() < 1e-12);
@@ -140,5 +140,5 @@ fn the_whole_flight_is_described() {
     assert_eq!(phases, ["DEPLOY", "AERO_DESCENT"]);
     assert_eq!(info.verdict.unwrap().limits.len(), 6);
     let frames = info.channels.iter().find(|channel| channel.topic == "/mavlink/tx/raw").unwrap();
-    assert_eq!((frames.messages, frames.lost), (FLIGHT.ticks.len() as u64, 0));
+    assert_eq!((frames.messages, frames.lost), (FLIGHT.frames.len() as u64, 0));
 }

@@ -8,7 +8,7 @@ use crate::from_apogee::{self, LANDED, Logged};
 use crate::simulated::MK2;
 
 /// The sentence of `info`, after checking that text and page say it, too.
-fn said_alike(log: &std::path::PathBuf) -> String {
+fn said_alike(log: &std::path::Path) -> String {
     let ending = info(log).unwrap().ending.unwrap();
     let (code, stdout, _) = run(&mut replay("info", log));
     assert!(code == 0 && stdout.contains(&format!("verdict     {ending}")), "{ending}: {stdout}");

@@ -23,7 +23,7 @@ fn the_same_flight_with_and_without_a_fault() {
     let broken = from_apogee::fly(&FAULTS);
     let (healthy, broken) = (Recording::open(&LANDED.log).unwrap(), Recording::open(&broken.log).unwrap());
     assert_ne!(healthy.verdict, broken.verdict);
-    for start in [StartAt::Landing, StartAt::Tick(1)] {
+    for start in [StartAt::Landing, StartAt::Frame(1)] {
         let without = ReflyOptions { start: start.clone(), ..changed(&[], &["weak-motor", "gnss-out@5"]) };
         let (report, flown) = refly_flight(&broken, &without).unwrap();
         assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
@@ -102,11 +102,12 @@ fn a_description_says_what_went_wrong_first_in_time() {
 fn findings_are_not_looked_for_where_the_decisions_are_not_made_again() {
     let path = LANDED.beside("otherwise.mcap");
     let mut held = crate::tampered::Held::read(&LANDED.log);
-    let tick = held.messages.iter_mut().rfind(|message| message.is_tick()).unwrap();
+    let message = held.messages.iter_mut().rfind(|message| message.is_frame()).unwrap();
     let mut frame =
-        <protocol::log::computer_v1::ComputerFrame as prost::Message>::decode(tick.data.as_slice()).unwrap();
+        <protocol::log::computer_v1::ComputerFrame as prost::Message>::decode(message.data.as_slice())
+            .unwrap();
     frame.output.fins_rad[0] += 0.1;
-    tick.data = prost::Message::encode_to_vec(&frame);
+    message.data = prost::Message::encode_to_vec(&frame);
     held.write(&path);
     assert_eq!(replay::info::info(&path).unwrap().findings, None);
     let (_, stdout, _) = run(&mut replay("info", &path));

@@ -76,7 +76,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
     assert!(page.matches("<svg").count() > 15);
 }
 
-/// Logs with ticks only, a cut log, a log without a flight, and names that contain markup.
+/// Logs with frames only, a cut log, a log without a flight, and names that contain markup.
 #[test]
 fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let directory = tempfile::tempdir().unwrap();
@@ -87,12 +87,12 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
         check(&page);
         page
     };
-    let ticks = write_log(&FLIGHT.ticks, &Recipe { with_frames: false, profile_toml: None }).bytes;
-    let page = page_of("ticks.mcap", &ticks);
+    let frames = write_log(&FLIGHT.frames, &Recipe { with_frames: false, profile_toml: None }).bytes;
+    let page = page_of("frames.mcap", &frames);
     assert!(page.contains("No verdict in this log") && page.contains("no profile"));
     assert!(page.contains("has no positions of the vehicle"));
-    let ticks = write_log(&FLIGHT.ticks, &Recipe { with_frames: false, ..Recipe::default() }).bytes;
-    assert!(page_of("estimate.mcap", &ticks).contains("estimate; the log has no truth"));
+    let frames = write_log(&FLIGHT.frames, &Recipe { with_frames: false, ..Recipe::default() }).bytes;
+    assert!(page_of("estimate.mcap", &frames).contains("estimate; the log has no truth"));
     let page = page_of("cut <b>&.mcap", &WHOLE.bytes[..WHOLE.bytes.len() / 2]);
     assert!(page.contains("without an end mark") && page.contains("cut &lt;b&gt;&amp;.mcap"));
     let page =
@@ -109,7 +109,7 @@ fn telemetry_alone_makes_a_page() {
     let (tlog, log) = (WITH_FRAMES.beside("page.tlog"), WITH_FRAMES.beside("page.mcap"));
     let open = || replay::log::FlightLog::open(&WITH_FRAMES.log);
     replay::export::export_tlog(&open, None, &tlog).unwrap();
-    replay::export::import_tlog(&tlog, &log, &mut |_| {}).unwrap();
+    replay::log::import_tlog(&tlog, &log).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
     assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED"));
@@ -158,7 +158,7 @@ fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
     let counted = recording
         .frames
         .iter()
-        .filter(|tick| tick.input.frame.is_multiple_of(10) && tick.input.time_s <= contact_s)
+        .filter(|frame| frame.input.frame.is_multiple_of(10) && frame.input.time_s <= contact_s)
         .count();
     assert!(section.contains(&format!("At {counted} planning frames")), "{counted}");
 }

@@ -28,7 +28,7 @@ const DEAD: std::ops::RangeInclusive<u64> = 120..=131;
 
 struct Fall {
     start: ComputerStart,
-    ticks: Vec<ComputerFrame>,
+    frames: Vec<ComputerFrame>,
 }
 
 fn mission_toml() -> &'static str {
@@ -46,7 +46,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         rate_rad_s: Vector3::zeros(),
     };
     let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
-    let mut ticks = Vec::new();
+    let mut frames = Vec::new();
     for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
         if frame == DEAD.end() + 1 {
             computer.restart((frame - 1) as f64 * 5.0 * 1e-3);
@@ -80,7 +80,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             rehearsed: None,
         };
         let output = computer.step(&input);
-        ticks.push(frame_to_log(&input, &output, &computer, false));
+        frames.push(frame_to_log(&input, &output, &computer, false));
     }
     let start = ComputerStart {
         frame: 0,
@@ -90,17 +90,17 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         gyro_bias_rad_s: None,
     };
-    Fall { start, ticks }
+    Fall { start, frames }
 });
 
-fn write(start: Option<&ComputerStart>, ticks: &[ComputerFrame], profile_toml: Option<&str>) -> Vec<u8> {
+fn write(start: Option<&ComputerStart>, frames: &[ComputerFrame], profile_toml: Option<&str>) -> Vec<u8> {
     let header = LogHeader { profile_toml: profile_toml.map(str::to_owned), ..LogHeader::default() };
     let mut writer = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     if let Some(start) = start {
         writer.write(&Record::ComputerStart(Box::new(*start)), 0).unwrap();
     }
-    for tick in ticks {
-        writer.write(&Record::ComputerFrame(Box::new(tick.clone())), tick.input.frame * FRAME_NS).unwrap();
+    for frame in frames {
+        writer.write(&Record::ComputerFrame(Box::new(frame.clone())), frame.input.frame * FRAME_NS).unwrap();
     }
     let mut written = writer.finish().unwrap();
     let mut bytes = Vec::new();
@@ -115,12 +115,12 @@ fn described(bytes: &[u8]) -> Info {
 
 #[test]
 fn frames_are_identical_over_a_restart() {
-    let bytes = write(Some(&FALL.start), &FALL.ticks, Some(mission_toml()));
+    let bytes = write(Some(&FALL.start), &FALL.frames, Some(mission_toml()));
     let report = verify_bytes(&bytes).unwrap();
     // Everything recorded was read, but the vehicle was still falling.
     assert_eq!((report.outcome, report.obstacle), (Verification::IdenticalReadablePart, None));
     assert!((report.cut.unwrap().time_s - 2.0).abs() < 1e-9);
-    assert_eq!(report.frames_identical, FALL.ticks.len() as u64);
+    assert_eq!(report.frames_identical, FALL.frames.len() as u64);
     assert_eq!(report.span, Some((1, 400)));
     let info = described(&bytes);
     assert_eq!(info.grade.level, GradeLevel::BitExact, "{}", info.grade.reason);
@@ -133,18 +133,18 @@ fn frames_are_identical_over_a_restart() {
 
 #[test]
 fn one_changed_bit_is_found_at_its_frame() {
-    let mut ticks = FALL.ticks.clone();
-    let place = ticks.iter().position(|tick| tick.input.frame == 200).unwrap();
-    let command_rad = &mut ticks[place].output.fins_rad[2];
+    let mut frames = FALL.frames.clone();
+    let place = frames.iter().position(|frame| frame.input.frame == 200).unwrap();
+    let command_rad = &mut frames[place].output.fins_rad[2];
     *command_rad = f64::from_bits(command_rad.to_bits() ^ 1);
-    let report = verify_bytes(&write(Some(&FALL.start), &ticks, Some(mission_toml()))).unwrap();
+    let report = verify_bytes(&write(Some(&FALL.start), &frames, Some(mission_toml()))).unwrap();
     assert_eq!((report.outcome, report.frames_different), (Verification::Diverged, 1));
     let first = report.first_divergence.unwrap();
     assert_eq!((first.frame, first.fields_different), (200, 1));
     assert_eq!(first.fields[0].path, "output.fins_rad[2]");
     assert_eq!(first.fields[0].ulps, Some(1));
     // A lost frame looks like a restart, and everything after it differs.
-    let mut lost = FALL.ticks.clone();
+    let mut lost = FALL.frames.clone();
     lost.remove(50);
     let report = verify_bytes(&write(Some(&FALL.start), &lost, Some(mission_toml()))).unwrap();
     assert_eq!(report.outcome, Verification::Diverged);
@@ -158,15 +158,15 @@ fn a_missing_record_is_named_in_the_report() {
         assert_eq!(report.outcome, Verification::NotReplayable);
         report.obstacle.unwrap()
     };
-    assert_eq!(refused(write(None, &FALL.ticks, Some(mission_toml()))), Obstacle::NoStart);
-    assert_eq!(refused(write(Some(&FALL.start), &FALL.ticks, None)), Obstacle::NoProfile);
+    assert_eq!(refused(write(None, &FALL.frames, Some(mission_toml()))), Obstacle::NoStart);
+    assert_eq!(refused(write(Some(&FALL.start), &FALL.frames, None)), Obstacle::NoProfile);
     let other = Some("name = \"x\"\n");
-    let reason = refused(write(Some(&FALL.start), &FALL.ticks, other)).to_string();
+    let reason = refused(write(Some(&FALL.start), &FALL.frames, other)).to_string();
     assert!(reason.contains("profile.toml"), "{reason}");
-    let mut twice = FALL.ticks.clone();
+    let mut twice = FALL.frames.clone();
     twice.push(twice[twice.len() - 1].clone());
     let reason = refused(write(Some(&FALL.start), &twice, Some(mission_toml()))).to_string();
     assert!(reason.contains("frame 400 comes after frame 400"), "{reason}");
-    let info = described(&write(None, &FALL.ticks, Some(mission_toml())));
+    let info = described(&write(None, &FALL.frames, Some(mission_toml())));
     assert_eq!(info.grade.level, GradeLevel::Numeric);
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use replay::export::import_tlog;
+use replay::log::import_tlog;
 use replay::log::{FlightLog, Recording};
 use replay::refly::{ReflyOptions, refly};
 
@@ -38,18 +38,18 @@ fn a_foreign_file_exports_to_no_folder() {
 fn telemetry_only() -> PathBuf {
     let (tlog, log) = (WITH_FRAMES.beside("only.tlog"), WITH_FRAMES.beside("only.mcap"));
     replay::export::export_tlog(&|| FlightLog::open(&WITH_FRAMES.log), None, &tlog).unwrap();
-    import_tlog(&tlog, &log, &mut |_| {}).unwrap();
+    import_tlog(&tlog, &log).unwrap();
     log
 }
 
 #[test]
-fn telemetry_alone_is_refused_because_it_has_no_ticks() {
+fn telemetry_alone_is_refused_because_it_has_no_frames() {
     let log = telemetry_only();
-    let mut tick = replay("verify", &log);
-    tick.args(["--explain", "3"]);
+    let mut frame = replay("verify", &log);
+    frame.args(["--explain", "3"]);
     let mut sweep = replay("refly", &log);
     sweep.args(["--vary", "powered.weights.theta=1,2"]);
-    for mut command in [replay("evaluate", &log), replay("refly", &log), tick, sweep] {
+    for mut command in [replay("evaluate", &log), replay("refly", &log), frame, sweep] {
         let (code, stdout, stderr) = run(&mut command);
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
         assert!(stderr.contains("has no frames of a flight computer"), "{stderr}");
@@ -61,18 +61,19 @@ fn telemetry_alone_is_refused_because_it_has_no_ticks() {
 fn a_cut_log_is_compared_up_to_its_end() {
     let mut recording = Recording::open(&LANDED.log).unwrap();
     let whole = refly(&recording, &ReflyOptions::default()).unwrap();
-    assert_eq!((whole.commands_recorded, whole.commands_identical), (whole.ticks, whole.ticks));
+    assert_eq!((whole.commands_recorded, whole.commands_identical), (whole.frames, whole.frames));
     recording.frames.truncate(recording.frames.len() - 700);
     let cut = refly(&recording, &ReflyOptions::default()).unwrap();
-    assert_eq!((cut.commands_recorded, cut.commands_identical), (whole.ticks - 700, whole.ticks - 700));
-    assert_eq!(cut.ticks, whole.ticks);
+    assert_eq!((cut.commands_recorded, cut.commands_identical), (whole.frames - 700, whole.frames - 700));
+    assert_eq!(cut.frames, whole.frames);
 }
 
 #[test]
-fn a_tick_without_a_solve_names_the_nearest_tick_with_one() {
-    let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", "1"]));
+fn a_frame_without_a_solve_names_the_nearest_frame_with_one() {
+    let first = (MK2.recording().release_frame + 1).to_string();
+    let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &first]));
     assert!(
-        code == 0 && stdout.contains("this tick solves no landing; the nearest that does is "),
+        code == 0 && stdout.contains("this frame solves no landing; the nearest that does is "),
         "{stdout}"
     );
 }

@@ -42,16 +42,16 @@ fn a_whole_log_recovers_whole() {
 #[test]
 fn a_cut_log_recovers_what_was_synced() {
     let directory = tempfile::tempdir().unwrap();
-    for (at, ticks) in &WHOLE.synced[..WHOLE.synced.len() - 1] {
+    for (at, frames) in &WHOLE.synced[..WHOLE.synced.len() - 1] {
         let cut = &WHOLE.bytes[..usize::try_from(*at).unwrap() + 3];
         let (recovery, again) = recovered(cut, directory.path()).unwrap();
-        assert_eq!(again.frames.len(), *ticks, "cut after {at}");
+        assert_eq!(again.frames.len(), *frames, "cut after {at}");
         assert!(!recovery.ended);
         assert!(again.damage.unwrap().contains("it had no end mark"), "the recovered log says so");
         let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
         // Data that was not yet on the disk is missing, although no checksum shows it any more.
         assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
-        assert_eq!((verified.frames_identical, verified.cut.unwrap().contact_s), (*ticks as u64, None));
+        assert_eq!((verified.frames_identical, verified.cut.unwrap().contact_s), (*frames as u64, None));
     }
 }
 
@@ -282,7 +282,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
 
-    /// Whatever is broken: no panic, and every tick kept is an original tick.
+    /// Whatever is broken: no panic, and every frame kept is an original frame.
     #[test]
     fn nothing_false_is_recovered(
         place in 8..WHOLE.bytes.len(),
@@ -295,11 +295,11 @@ proptest! {
         bytes[place..end].copy_from_slice(&stretch[..end - place]);
         bytes.truncate(bytes.len().max(cut + 1) - cut / 2);
         if let Some((_, again)) = recovered(&bytes, directory.path()) {
-            for tick in &again.frames {
-                let number = usize::try_from(tick.input.frame).unwrap() - 1;
-                let then = &crate::flown::FLIGHT.ticks[number];
-                prop_assert_eq!(&tick.input, &then.input);
-                prop_assert_eq!(tick.state_digest, then.state_digest);
+            for frame in &again.frames {
+                let number = usize::try_from(frame.input.frame).unwrap() - 1;
+                let then = &crate::flown::FLIGHT.frames[number];
+                prop_assert_eq!(&frame.input, &then.input);
+                prop_assert_eq!(frame.state_digest, then.state_digest);
             }
         }
     }

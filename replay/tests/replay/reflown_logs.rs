@@ -23,7 +23,7 @@ fn written(name: &str, recording: &Recording, options: &ReflyOptions) -> Recordi
 
 /// The frame numbers; none may be left out.
 fn assert_whole(again: &Recording) {
-    assert!(again.frames.iter().map(|tick| tick.input.frame).eq(1..=again.frames.len() as u64));
+    assert!(again.frames.iter().map(|frame| frame.input.frame).eq(1..=again.frames.len() as u64));
 }
 
 /// If another build flew differently before the start, its frames are not put before those of this build.
@@ -45,8 +45,11 @@ fn a_log_reflown_from_a_recovered_log_has_no_gap() {
     let recovered = Recording::open(&RECOVERED).unwrap();
     assert!(recovered.gap().is_some());
     let last = recovered.frames.last().unwrap().input.frame;
-    let again =
-        written("of_a_recovered.mcap", &recovered, &ReflyOptions { start: StartAt::Tick(last), ..with(&[]) });
+    let again = written(
+        "of_a_recovered.mcap",
+        &recovered,
+        &ReflyOptions { start: StartAt::Frame(last), ..with(&[]) },
+    );
     assert_whole(&again);
     assert_eq!(again.frames, Recording::open(&LANDED.log).unwrap().frames);
 }

@@ -18,7 +18,7 @@ fn the_solve_times_of_a_flown_rocket_are_read_from_its_log() {
     assert!(times_s.len() > 50 && times_s.iter().all(|time_s| *time_s > 0.0), "{times_s:?}");
     // Each belongs to a recorded planning frame.
     for timing in &recording.timings {
-        let place = recording.frames.binary_search_by_key(&timing.frame, |tick| tick.input.frame).unwrap();
+        let place = recording.frames.binary_search_by_key(&timing.frame, |frame| frame.input.frame).unwrap();
         let input = &recording.frames[place].input;
         assert_eq!(input.time_s.to_bits(), timing.time_s.to_bits());
         assert!(timing.frame.is_multiple_of(10) && timing.deadline_s.to_bits() == 0.005_f64.to_bits());

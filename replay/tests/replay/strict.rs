@@ -52,7 +52,7 @@ fn passes(report: &VerifyReport) -> bool {
 /// Changes the frames that are wanted.
 fn with_frames(mut change: impl FnMut(u64, &mut ComputerFrame)) -> Held {
     let mut held = pad();
-    for message in held.messages.iter_mut().filter(|message| message.is_tick()) {
+    for message in held.messages.iter_mut().filter(|message| message.is_frame()) {
         let mut frame = ComputerFrame::decode(message.data.as_slice()).unwrap();
         change(frame.input.frame, &mut frame);
         message.data = frame.encode_to_vec();
@@ -84,9 +84,9 @@ fn another_version_of_the_contents_is_no_excuse() {
         let mut held = with_frames(|_, frame| frame.state_digest = 0);
         held.metadata(METADATA_SCHEMA).insert("version".to_owned(), version.to_owned());
         on_disk(&held, |path| {
-            let (code, stdout, _) = run(replay("verify", &path.to_owned()).arg("--strict"));
+            let (code, stdout, _) = run(replay("verify", path).arg("--strict"));
             assert_ne!(code, 0, "{version}: {stdout}");
-            let (code, xml, _) = run(replay("verify", &path.to_owned()).arg("--junit"));
+            let (code, xml, _) = run(replay("verify", path).arg("--junit"));
             assert!(code != 0 && xml.contains("failures=\"1\""), "{version}: {xml}");
         });
         let mut held = pad();
@@ -142,7 +142,7 @@ fn a_verdict_that_contradicts_itself_is_damage() {
 #[test]
 fn inputs_that_cannot_be_are_named() {
     type Change = fn(&mut ComputerFrame);
-    let flies = pad().messages.iter().filter(|message| message.is_tick()).count() as u64 - 1_500;
+    let flies = pad().messages.iter().filter(|message| message.is_frame()).count() as u64 - 1_500;
     let changes: [(&str, Change); 4] = [
         ("battery", |frame| frame.input.battery_v = Some(1.5e20)),
         ("time", |frame| frame.input.time_s = f64::NAN),
@@ -174,21 +174,21 @@ fn frames_missing_behind_the_contact_are_missed() {
             .messages
             .iter()
             .position(|message| {
-                message.is_tick() && ComputerFrame::decode(message.data.as_slice()).unwrap().output.over
+                message.is_frame() && ComputerFrame::decode(message.data.as_slice()).unwrap().output.over
             })
             .unwrap();
         let last = held.messages[..=over]
             .iter()
             .enumerate()
             .rev()
-            .filter(|(_, message)| message.is_tick())
+            .filter(|(_, message)| message.is_frame())
             .nth(missing - 1)
             .unwrap()
             .0;
         let mut place = 0;
         held.keep(|message| {
             place += 1;
-            place <= last || !(message.is_tick() || message.topic == TOPIC_ESTIMATE)
+            place <= last || !(message.is_frame() || message.topic == TOPIC_ESTIMATE)
         });
         let report = loosely(&held);
         assert_eq!(report.outcome, Verification::IdenticalReadablePart, "{missing}: {:?}", report.parts);
@@ -223,9 +223,9 @@ fn without_a_summary_the_answer_says_what_cannot_be_known() {
         let bytes = [&whole[..usize::try_from(ends).unwrap()], &protocol::log::writer::ending()].concat();
         std::fs::write(path, bytes).unwrap();
         assert!(!only(verify(path).unwrap()).counted);
-        let (_, stdout, _) = run(&mut replay("verify", &path.to_owned()));
+        let (_, stdout, _) = run(&mut replay("verify", path));
         assert!(stdout.contains("cannot be known"), "{stdout}");
-        let (_, stdout, _) = run(&mut replay("info", &path.to_owned()));
+        let (_, stdout, _) = run(&mut replay("info", path));
         assert!(stdout.contains("as far as can be known") && !stdout.contains("every checksum"), "{stdout}");
     });
 }
@@ -242,7 +242,7 @@ fn control_characters_of_a_log_are_not_shown() {
         for arguments in
             [&["info"][..], &["info", "--json"], &["verify"], &["evaluate"], &["refly"], &["compare"]]
         {
-            let mut command = replay(arguments[0], &path.to_owned());
+            let mut command = replay(arguments[0], path);
             if arguments == ["compare"] {
                 command.arg(path);
             }

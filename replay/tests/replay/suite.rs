@@ -169,10 +169,10 @@ fn a_log_that_diverges_or_breaks_fails() {
     suite.gate(&["--accept"]);
     // A forged command: the recorded decisions are not those of this build.
     let mut held = Held::read(&MK2.log);
-    let forged = held.messages.iter_mut().filter(|message| message.is_tick()).nth(50).unwrap();
-    let mut tick = ComputerFrame::decode(forged.data.as_slice()).unwrap();
-    tick.output.fins_rad[0] += 0.01;
-    forged.data = tick.encode_to_vec();
+    let forged = held.messages.iter_mut().filter(|message| message.is_frame()).nth(50).unwrap();
+    let mut frame = ComputerFrame::decode(forged.data.as_slice()).unwrap();
+    frame.output.fins_rad[0] += 0.01;
+    forged.data = frame.encode_to_vec();
     held.write(&suite.logs().join("week-1/nominal.mcap"));
     std::fs::write(suite.logs().join("week-1/dispersed.mcap"), "no log").unwrap();
     let (code, stdout, _) = suite.gate(&[]);

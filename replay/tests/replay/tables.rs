@@ -5,13 +5,14 @@ use std::path::Path;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use proptest::prelude::*;
 use replay::compare::{Align, CompareError, Flown, Tolerances, compare};
-use replay::export::{ImportError, import_tlog};
 use replay::export::{TableFormat, export_tables, export_tlog};
 use replay::info::{GradeLevel, info};
 use replay::log::{FlightLog, Recording};
+use replay::log::{ImportError, import_tlog};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
+use crate::command_line::{replay, run};
 use crate::simulated::{DISPERSED, MK2, Simulated, WITH_FRAMES};
 
 fn read_text(path: &Path) -> String {
@@ -141,13 +142,13 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     // Frames outside the flight have no flight time, the last column.
     let lines = lines.filter(|line| !line.ends_with(','));
     let mut count = 0;
-    for (line, tick) in lines.zip(&recording.frames) {
+    for (line, frame) in lines.zip(&recording.frames) {
         let cells: Vec<&str> = line.split(',').collect();
         assert_eq!(cells.len(), names.len());
         let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
-        assert_eq!(number(gimbal), tick.output.gimbal_rad[1].to_bits());
-        assert_eq!(number(gyro), tick.input.measured.as_ref().unwrap().imu.gyro_rad_s.x.to_bits());
-        assert_eq!(number(fin), tick.output.fins_rad[3].to_bits());
+        assert_eq!(number(gimbal), frame.output.gimbal_rad[1].to_bits());
+        assert_eq!(number(gyro), frame.input.measured.as_ref().unwrap().imu.gyro_rad_s.x.to_bits());
+        assert_eq!(number(fin), frame.output.fins_rad[3].to_bits());
         count += 1;
     }
     assert_eq!(count, recording.frames.len());
@@ -188,7 +189,7 @@ fn tlog(flight: &Simulated, name: &str) -> std::path::PathBuf {
 fn a_tlog_goes_out_and_comes_in_again() {
     let path = tlog(&WITH_FRAMES, "out.tlog");
     let imported_path = WITH_FRAMES.beside("imported.mcap");
-    let imported = import_tlog(&path, &imported_path, &mut |_| {}).unwrap();
+    let imported = import_tlog(&path, &imported_path).unwrap();
     assert!(imported.frames > 100 && imported.telemetry > 20, "{imported:?}");
     assert_eq!((imported.not_understood, imported.mavlink1, imported.garbage_bytes), (0, 0, 0));
     let again = WITH_FRAMES.beside("again.tlog");
@@ -207,7 +208,34 @@ fn a_tlog_goes_out_and_comes_in_again() {
     }
     assert_eq!(verify(&imported_path).unwrap()[0].outcome, Verification::NotReplayable);
     // An existing file is not overwritten.
-    assert!(matches!(import_tlog(&path, &imported_path, &mut |_| {}), Err(ImportError::Write(_))));
+    assert!(matches!(import_tlog(&path, &imported_path), Err(ImportError::Write(_))));
+}
+
+/// Every command reads a `.tlog` as it reads the log made of it.
+#[test]
+fn a_tlog_is_read_like_the_log_made_of_it() {
+    let named_otherwise = WITH_FRAMES.beside("telemetry.bin");
+    std::fs::copy(tlog(&WITH_FRAMES, "read.tlog"), &named_otherwise).unwrap();
+    let imported = WITH_FRAMES.beside("read.mcap");
+    import_tlog(&named_otherwise, &imported).unwrap();
+    // Only their names and sizes differ.
+    let of_the_file = |line: &&str| line.contains("imported_from") || line.contains(" kB");
+    let answer = |command: &str, log: &Path| {
+        let (code, said, error) = run(&mut replay(command, log));
+        let lines = said.lines().filter(|line| !of_the_file(line));
+        (code, lines.collect::<Vec<_>>().join("\n"), error.replace(log.to_str().unwrap(), "LOG"))
+    };
+    for command in ["info", "evaluate"] {
+        assert_eq!(answer(command, &named_otherwise), answer(command, &imported), "{command}");
+    }
+    let rows = |log: &Path, name: &str| {
+        let directory = WITH_FRAMES.beside(name);
+        export_tables(&mut FlightLog::open(log).unwrap(), TableFormat::Csv, &directory).unwrap();
+        read_text(&directory.join("telemetry.csv"))
+    };
+    assert_eq!(rows(&named_otherwise, "of-tlog"), rows(&imported, "of-mcap"));
+    let (code, _, error) = run(replay("recover", &named_otherwise).arg(WITH_FRAMES.beside("none.mcap")));
+    assert!(code == 2 && error.contains("is a .tlog"), "{error}");
 }
 
 #[test]
@@ -218,10 +246,10 @@ fn a_tlog_is_found_between_garbage() {
     dirty.extend([0xfd; 5]);
     let path = WITH_FRAMES.beside("dirty.tlog");
     std::fs::write(&path, dirty).unwrap();
-    let imported = import_tlog(&path, &WITH_FRAMES.beside("dirty.mcap"), &mut |_| {}).unwrap();
+    let imported = import_tlog(&path, &WITH_FRAMES.beside("dirty.mcap")).unwrap();
     assert_eq!((imported.not_understood, imported.garbage_bytes), (0, 8));
     std::fs::write(&path, b"no frames here at all, only text").unwrap();
-    let refused = import_tlog(&path, &WITH_FRAMES.beside("none.mcap"), &mut |_| {}).unwrap_err();
+    let refused = import_tlog(&path, &WITH_FRAMES.beside("none.mcap")).unwrap_err();
     assert!(matches!(refused, ImportError::NoFrames { .. }));
     let error = export_tlog(&|| FlightLog::open(&MK2.log), None, &MK2.beside("no.tlog")).unwrap_err();
     assert!(error.to_string().contains("no raw MAVLink frames"), "{error}");
@@ -235,7 +263,7 @@ proptest! {
         let directory = tempfile::tempdir().unwrap();
         let (input, output) = (directory.path().join("in.tlog"), directory.path().join("out.mcap"));
         std::fs::write(&input, &bytes).unwrap();
-        if let Ok(imported) = import_tlog(&input, &output, &mut |_| {}) {
+        if let Ok(imported) = import_tlog(&input, &output) {
             prop_assert!(imported.frames > 0);
             prop_assert!(info(&output).is_ok());
         }

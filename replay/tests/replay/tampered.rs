@@ -26,7 +26,7 @@ impl Kept {
     }
 
     /// A frame of the flight computer.
-    pub(crate) fn is_tick(&self) -> bool {
+    pub(crate) fn is_frame(&self) -> bool {
         self.topic == TOPIC_COMPUTER_FRAME
     }
 }
@@ -65,9 +65,9 @@ impl Held {
         held
     }
 
-    /// How many ticks or frames there are.
-    pub(crate) fn ticks(&self) -> usize {
-        self.messages.iter().filter(|message| message.is_tick()).count()
+    /// How many frames or frames there are.
+    pub(crate) fn frames(&self) -> usize {
+        self.messages.iter().filter(|message| message.is_frame()).count()
     }
 
     /// Leaves out the messages that are not wanted.

@@ -23,15 +23,15 @@ fn written(held: &Held, directory: &tempfile::TempDir, name: &str) -> PathBuf {
     path
 }
 
-/// Turns a bit of what a tick decided.
+/// Turns a bit of what a frame decided.
 fn tamper(message: &mut Kept) {
     let turned = |number: f64| f64::from_bits(number.to_bits() ^ 1);
-    let mut tick = ComputerFrame::decode(message.data.as_slice()).unwrap();
-    tick.output.fins_rad[0] = turned(tick.output.fins_rad[0]);
-    message.data = tick.encode_to_vec();
+    let mut frame = ComputerFrame::decode(message.data.as_slice()).unwrap();
+    frame.output.fins_rad[0] = turned(frame.output.fins_rad[0]);
+    message.data = frame.encode_to_vec();
 }
 
-fn verify(path: &PathBuf, arguments: &[&str]) -> (i32, String, String) {
+fn verify(path: &Path, arguments: &[&str]) -> (i32, String, String) {
     run(replay("verify", path).args(arguments))
 }
 
@@ -41,7 +41,7 @@ fn a_whole_log_that_was_only_rewritten_is_identical() {
     for log in logs() {
         let held = Held::read(log);
         let (code, stdout, _) = verify(&written(&held, &directory, "same.mcap"), &["--strict"]);
-        let count = held.ticks();
+        let count = held.frames();
         assert_eq!(code, 0, "{stdout}");
         assert!(stdout.contains(&format!("{count} of {count} frames identical\n")), "{stdout}");
     }
@@ -59,9 +59,9 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
         honest.messages.push(start.at(last_ns));
         written(&honest, &directory, "honest.mcap")
     };
-    held.messages.iter_mut().filter(|message| message.is_tick()).for_each(tamper);
+    held.messages.iter_mut().filter(|message| message.is_frame()).for_each(tamper);
     held.messages.push(start.at(last_ns));
-    let count = held.ticks();
+    let count = held.frames();
     let (code, stdout, _) = verify(&written(&held, &directory, "tampered.mcap"), &[]);
     assert_eq!(code, 1, "{stdout}");
     assert!(stdout.contains(&format!("DIVERGED: {count} of {count} frames differ")), "{stdout}");
@@ -96,7 +96,7 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
     let directory = tempfile::tempdir().unwrap();
     for log in logs() {
         let (a, mut b) = (Held::read(log), Held::read(log));
-        let (count_a, count_b) = (a.ticks(), b.ticks());
+        let (count_a, count_b) = (a.frames(), b.frames());
         let both = |b: &Held, name: &str| {
             let mut both = a.clone();
             both.append(b, 100_000_000_000);
@@ -122,7 +122,7 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
             (reports[0]["flight"]["number"].as_u64(), reports[1]["flight"]["of"].as_u64()),
             (Some(1), Some(2))
         );
-        b.messages.iter_mut().filter(|message| message.is_tick()).skip(30).take(1).for_each(tamper);
+        b.messages.iter_mut().filter(|message| message.is_frame()).skip(30).take(1).for_each(tamper);
         let (code, stdout, _) = verify(&both(&b, "tampered.mcap"), &[]);
         assert_eq!(code, 1, "{stdout}");
         assert!(stdout.contains("flight 2 of 2: DIVERGED"), "{stdout}");
@@ -154,26 +154,26 @@ fn commands_for_one_flight_refuse_a_log_with_two() {
 
 /// A log rewritten without its last frames: with and without the verdict after them.
 #[test]
-fn a_log_without_its_last_ticks_is_not_complete() {
+fn a_log_without_its_last_frames_is_not_complete() {
     let directory = tempfile::tempdir().unwrap();
     for (log, lost) in logs().into_iter().zip([500, 600]) {
         let whole = Held::read(log);
-        let kept = whole.ticks() - lost;
+        let kept = whole.frames() - lost;
         let last_ns =
-            whole.messages.iter().filter(|message| message.is_tick()).nth(kept).unwrap().log_time_ns;
-        let mut ticks_only = whole.clone();
+            whole.messages.iter().filter(|message| message.is_frame()).nth(kept).unwrap().log_time_ns;
+        let mut frames_only = whole.clone();
         let mut seen = 0;
-        ticks_only.keep(|message| {
-            seen += usize::from(message.is_tick());
-            !message.is_tick() || seen <= kept
+        frames_only.keep(|message| {
+            seen += usize::from(message.is_frame());
+            !message.is_frame() || seen <= kept
         });
         let mut everything = whole.clone();
         everything.keep(|message| message.log_time_ns < last_ns);
         let mut no_verdict = whole.clone();
         no_verdict.keep(|message| message.topic != TOPIC_VERDICT);
-        for (held, name) in [(ticks_only, "ticks"), (everything, "all"), (no_verdict, "verdict")] {
+        for (held, name) in [(frames_only, "frames"), (everything, "all"), (no_verdict, "verdict")] {
             let path = written(&held, &directory, &format!("{name}.mcap"));
-            let count = held.ticks();
+            let count = held.frames();
             let (code, stdout, _) = verify(&path, &[]);
             assert_eq!(code, 0, "{name}: {stdout}");
             assert!(

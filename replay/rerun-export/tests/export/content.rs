@@ -6,7 +6,7 @@ use re_lenses::Selector;
 use replay_rerun::{BESIDE, FLIGHT_TIME, PLOTS, export};
 
 use crate::flown::MK2;
-use crate::logs::{START_UNIX_NS, TICKS, folder, forced, write_apogee_log, write_log, write_telemetry_log};
+use crate::logs::{FRAMES, START_UNIX_NS, folder, forced, write_apogee_log, write_log, write_telemetry_log};
 use crate::read_back::Recording;
 
 #[test]
@@ -15,7 +15,7 @@ fn a_flight_is_exported_whole() {
     write_log(&log, true);
     let exported = export(&log, None, (&rrd).into()).unwrap();
     let [own] = exported.as_slice() else { panic!("{exported:?}") };
-    assert_eq!((own.poses, own.events), (TICKS as usize, 1));
+    assert_eq!((own.poses, own.events), (FRAMES as usize, 1));
     assert_eq!((&own.damage, &own.mission_problem), (&None, &None));
 
     let recording = Recording::read(&rrd);
@@ -24,7 +24,7 @@ fn a_flight_is_exported_whole() {
     assert_eq!(recording.layouts, 1);
     assert!(recording.layout_chunks > 10);
     for topic in ["tf", "vehicle/truth3d", "computer/frame", "world/rocket", "world/followed"] {
-        assert_eq!(recording.rows(topic), TICKS as usize, "{topic}");
+        assert_eq!(recording.rows(topic), FRAMES as usize, "{topic}");
     }
     assert_eq!(recording.rows("verdict"), 1);
     for drawn in ["rocket/body", "rocket/legs", "rocket/bell", "pad", "pad/limit", "flown"] {
@@ -48,7 +48,7 @@ fn the_pose_and_the_events_are_what_a_viewer_draws() {
         .flatten()
         .copied()
         .collect();
-    assert_eq!(translations_m.len(), TICKS as usize);
+    assert_eq!(translations_m.len(), FRAMES as usize);
     assert_eq!((translations_m[0], translations_m[3]), ([3.0, -4.0, 100.0], [3.0, -4.0, 85.0]));
     let has = |entity: &str, component: &'static str| {
         recording.of(entity).any(|chunk| chunk.components().contains_key(&component.into()))

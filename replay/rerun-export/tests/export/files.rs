@@ -2,7 +2,7 @@
 
 use replay_rerun::export;
 
-use crate::logs::{TICKS, folder, forced, in_the_third_chunk, write_log};
+use crate::logs::{FRAMES, folder, forced, in_the_third_chunk, write_log};
 use crate::read_back::Recording;
 
 #[test]
@@ -24,8 +24,8 @@ fn the_readable_part_of_a_cut_log_is_exported() {
         };
         let poses = exported[0].poses;
         assert_eq!(Recording::read(&rrd).rows("world/rocket"), poses, "{cut}");
-        assert!(exported[0].damage.is_some() || poses == TICKS as usize, "{cut}");
-        partly += usize::from((1..TICKS as usize).contains(&poses));
+        assert!(exported[0].damage.is_some() || poses == FRAMES as usize, "{cut}");
+        partly += usize::from((1..FRAMES as usize).contains(&poses));
     }
     assert!(partly > 0);
 }

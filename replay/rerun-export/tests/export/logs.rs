@@ -16,7 +16,7 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 pub(crate) const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
-pub(crate) const TICKS: u64 = 4;
+pub(crate) const FRAMES: u64 = 4;
 const FRAME_S: f64 = 0.005;
 
 /// A log of the first frames of a flight from apogee, with a verdict as if it had come down then.
@@ -33,7 +33,7 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
         message: "landing motor commanded to light".to_owned(),
     };
     log.write(&Record::Event(event), 0).unwrap();
-    for _ in 0..TICKS {
+    for _ in 0..FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
         let phase = flight.computer().mode().phase;
         for record in frame_and_phase(&flight, &mut last, phase) {
@@ -51,7 +51,7 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
         unit: "m/s".to_owned(),
         passed: true,
     };
-    let time_s = TICKS as f64 * FRAME_S;
+    let time_s = FRAMES as f64 * FRAME_S;
     let verdict = v1::LandingVerdict { time_s, landed: true, limits: vec![limit], ..Default::default() };
     log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(time_s)).unwrap();
     log.finish().unwrap();
@@ -100,14 +100,14 @@ pub(crate) fn write_apogee_log(path: &Path) {
     };
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
     let half = f64::sqrt(0.5);
-    for frame in 0..TICKS {
+    for frame in 0..FRAMES {
         let time_s = 0.5 * frame as f64;
-        let mut tick = ComputerFrame::default();
+        let mut frame = ComputerFrame::default();
         // Frames have 5 ms.
-        tick.input.frame = (100 * frame).max(1);
-        tick.input.time_s = time_s;
-        tick.output.phase = u32::from(Phase::AeroDescent.index());
-        log.write(&Record::ComputerFrame(Box::new(tick)), nanoseconds(time_s)).unwrap();
+        frame.input.frame = (100 * frame).max(1);
+        frame.input.time_s = time_s;
+        frame.output.phase = u32::from(Phase::AeroDescent.index());
+        log.write(&Record::ComputerFrame(Box::new(frame)), nanoseconds(time_s)).unwrap();
         let truth = flight_v1::TruthSample {
             time_s,
             state: flight_v1::RigidState {

@@ -56,7 +56,7 @@ pub(super) fn tracking(flight: &Flight) -> String {
         }
     }
     let heads: Vec<String> = COMPONENTS.iter().map(|(name, unit, _)| format!("#{name}, {unit}")).collect();
-    let mut all = vec!["phase", "predicted ahead", "#ticks"];
+    let mut all = vec!["phase", "predicted ahead", "#frames"];
     all.extend(heads.iter().map(String::as_str));
     let [near, far] = distance;
     let lines = vec![
@@ -65,7 +65,7 @@ pub(super) fn tracking(flight: &Flight) -> String {
     ];
     let title = "Distance between the planned and the actual position, m";
     let chart = Chart { full: true, ..flight.over_time(title, lines) };
-    paragraph("Actual state minus the state planned at each tick, root mean square / largest.")
+    paragraph("Actual state minus the state planned at each frame, root mean square / largest.")
         + &across(flight)
         + &table(&all, &rows)
         + &charts(&[chart.svg()])

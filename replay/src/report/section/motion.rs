@@ -288,18 +288,18 @@ fn with_truth<'a>(
     flight: &'a Flight,
     world: &'a [&TruthSample],
 ) -> impl Iterator<Item = (&'a ComputerFrame, &'a TruthSample)> {
-    let frames = flight.recording.frames.iter().filter(|tick| flight.is_before_contact(tick.input.time_s));
-    frames.filter_map(|tick| {
-        let place = world.partition_point(|sample| sample.time_s < tick.input.time_s - 1e-4);
-        Some((tick, *world.get(place)?))
+    let frames = flight.recording.frames.iter().filter(|frame| flight.is_before_contact(frame.input.time_s));
+    frames.filter_map(|frame| {
+        let place = world.partition_point(|sample| sample.time_s < frame.input.time_s - 1e-4);
+        Some((frame, *world.get(place)?))
     })
 }
 
 fn sensed_heights(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
     let (mut barometer, mut lidar) = (Vec::new(), Vec::new());
-    for (tick, truth) in with_truth(flight, world) {
-        let Some(measured) = &tick.input.measured else { continue };
-        let at_s = flight.axis_s(tick.input.time_s);
+    for (frame, truth) in with_truth(flight, world) {
+        let Some(measured) = &frame.input.measured else { continue };
+        let at_s = flight.axis_s(frame.input.time_s);
         barometer
             .extend(measured.pressure_altitude_m.map(|sensed_m| (at_s, sensed_m - truth.state.position_m.z)));
         lidar.extend(measured.lidar_range_m.map(|sensed_m| (at_s, sensed_m - truth.height_m)));
@@ -312,11 +312,11 @@ fn sensed_heights(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
 
 fn sensed_places(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
     let mut places = [Vec::new(), Vec::new(), Vec::new()];
-    for (tick, truth) in with_truth(flight, world) {
-        let Some(fix) = tick.input.measured.as_ref().and_then(|measured| measured.gnss.as_ref()) else {
+    for (frame, truth) in with_truth(flight, world) {
+        let Some(fix) = frame.input.measured.as_ref().and_then(|measured| measured.gnss.as_ref()) else {
             continue;
         };
-        let at_s = flight.axis_s(tick.input.time_s);
+        let at_s = flight.axis_s(frame.input.time_s);
         let (sensed, actual) = (&fix.position_m, &truth.state.position_m);
         places[0].push((at_s, sensed.x - actual.x));
         places[1].push((at_s, actual.y - sensed.y));

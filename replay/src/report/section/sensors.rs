@@ -73,13 +73,13 @@ pub(super) fn battery_and_vibration(flight: &Flight) -> String {
         .recording
         .frames
         .iter()
-        .filter_map(|tick| Some((flight.axis_s(tick.input.time_s), tick.input.battery_v?)));
+        .filter_map(|frame| Some((flight.axis_s(frame.input.time_s), frame.input.battery_v?)));
     let volts = vec![Line { name: "", class: "a", points: volts.collect() }];
     let felt = |belongs: fn(Phase) -> bool| -> Vec<f64> {
-        let frames = flight.recording.frames.iter().filter(|tick| {
-            u8::try_from(tick.output.phase).ok().and_then(Phase::from_index).is_some_and(belongs)
+        let frames = flight.recording.frames.iter().filter(|frame| {
+            u8::try_from(frame.output.phase).ok().and_then(Phase::from_index).is_some_and(belongs)
         });
-        frames.filter_map(|tick| Some(tick.input.measured.as_ref()?.imu.specific_force_m_s2.x)).collect()
+        frames.filter_map(|frame| Some(frame.input.measured.as_ref()?.imu.specific_force_m_s2.x)).collect()
     };
     let line = |name, class, samples: &[f64]| Line { name, class, points: spectrum(samples) };
     let lines = vec![

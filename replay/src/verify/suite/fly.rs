@@ -44,8 +44,8 @@ fn log(path: &Path) -> FlightResult {
         // What cannot be read now may still be a flight.
         Err(error @ LogError::Read { .. }) => (Checked::Unverified, Some(words(error))),
         Err(error) => return no_flight(words(error)),
-        Ok(reports) if reports.iter().all(|report| report.obstacle == Some(Obstacle::NoTicks)) => {
-            return no_flight(Obstacle::NoTicks.to_string());
+        Ok(reports) if reports.iter().all(|report| report.obstacle == Some(Obstacle::NoComputer)) => {
+            return no_flight(Obstacle::NoComputer.to_string());
         }
         Ok(reports) => {
             let any = |wanted: Verification| reports.iter().any(|report| report.outcome == wanted);
@@ -68,7 +68,10 @@ fn log(path: &Path) -> FlightResult {
     };
     let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
         // From its first frame on, the whole flight is this build's.
-        let start = recording.frames.first().map_or(StartAt::Landing, |tick| StartAt::Tick(tick.input.frame));
+        let start = recording
+            .frames
+            .first()
+            .map_or(StartAt::Landing, |first| StartAt::Frame(recording.release_frame + first.input.frame));
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
     });
     let flown = match again {

@@ -37,7 +37,7 @@ pub enum Checked {
     Diverged,
     /// The log is damaged, or not all of it can be made again.
     Unverified,
-    /// The file holds no flight: no ticks and no frames, as an empty log or that of a ground station.
+    /// The file holds no flight: no frames and no frames, as an empty log or that of a ground station.
     NoFlight,
 }
 
