@@ -43,8 +43,8 @@ fn a_first_flight_goes_as_its_page_says() {
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
-    screen.wait_for("LANDED");
-    screen.wait_for("MAY BE APPROACHED");
+    screen.wait_for("LANDED inside every limit");
+    screen.wait_for("LANDED; may be approached");
     vehicle.signal(Signal::SIGINT);
     let flown = vehicle.wait();
     assert_eq!(flown.code, Some(0), "{}", flown.output);
