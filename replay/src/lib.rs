@@ -97,7 +97,7 @@ enum Command {
     /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
     #[command(
-        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 2040\n  replay verify logs --baseline baseline.json --junit=suite.xml\n  replay verify --book ground.mcap vehicle.mcap"
+        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json --junit=suite.xml\n  replay verify --book ground.mcap vehicle.mcap"
     )]
     Verify(verify::Args),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.

@@ -79,6 +79,8 @@ pub struct Recovery {
     pub undecodable: u64,
     /// Chunks that were there twice; one of each is kept.
     pub repeated: u64,
+    /// Chunks that the summary does not know: of another log, and left out.
+    pub foreign: u64,
     /// Chunks were not in the order of the summary; they are now.
     pub reordered: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
@@ -88,8 +90,11 @@ pub struct Recovery {
 impl Recovery {
     /// Whether the log was whole.
     pub fn was_whole(&self) -> bool {
-        let Self { lost, messages_lost, undecodable, repeated, reordered, ended, .. } = self;
-        lost.is_empty() && messages_lost.unwrap_or(0) + undecodable + repeated == 0 && !reordered && *ended
+        let Self { lost, messages_lost, undecodable, repeated, foreign, reordered, ended, .. } = self;
+        lost.is_empty()
+            && messages_lost.unwrap_or(0) + undecodable + repeated + foreign == 0
+            && !reordered
+            && *ended
     }
 
     /// What was wrong with the log, for the recovered one; `None` if it was whole.
@@ -111,6 +116,9 @@ impl Recovery {
         }
         if self.repeated > 0 {
             faults.push(format!("{} chunks were there twice", self.repeated));
+        }
+        if self.foreign > 0 {
+            faults.push(format!("{} chunks of another log were left out", self.foreign));
         }
         if self.reordered {
             faults.push("its chunks were out of order".to_owned());
@@ -146,6 +154,8 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     let (good, repeated) = without_repeats(contents.good);
     recovery.repeated = repeated;
     let missing = missing_chunks(&told.chunks, &good);
+    let (good, foreign) = without_foreign(good, &told.chunks, &missing);
+    recovery.foreign = foreign;
     let (good, reordered) = in_order(good, &told.chunks);
     recovery.reordered = reordered;
     let mut rescue = Rescue::create(destination, input, &told)?;
@@ -188,6 +198,30 @@ fn missing_chunks(told: &[(u64, u64, ChunkName)], good: &[Good]) -> Vec<(u64, u6
         _ => true,
     };
     told.iter().filter(is_missing).copied().collect()
+}
+
+/// The pieces without chunks that the summary does not know, and how many those were. If one of its chunks is missing, an unknown
+/// one of the same sizes is that chunk with changed times. Without a summary nothing tells them apart.
+fn without_foreign(
+    good: Vec<Good>,
+    told: &[(u64, u64, ChunkName)],
+    missing: &[(u64, u64, ChunkName)],
+) -> (Vec<Good>, u64) {
+    if told.is_empty() {
+        return (good, 0);
+    }
+    let known: std::collections::BTreeSet<ChunkName> = told.iter().map(|(.., name)| *name).collect();
+    let sizes = |name: &ChunkName| (name.uncompressed_bytes, name.compressed_bytes);
+    let mut missing: Vec<_> = missing.iter().map(|(.., name)| sizes(name)).collect();
+    let before = good.len();
+    let mut belongs = |name: &ChunkName| {
+        let changed = missing.iter().position(|missing| *missing == sizes(name));
+        known.contains(name) || changed.map(|place| missing.swap_remove(place)).is_some()
+    };
+    let kept: Vec<Good> =
+        good.into_iter().filter(|piece| piece.chunk.is_none_or(|(name, _)| belongs(&name))).collect();
+    let foreign = before - kept.len();
+    (kept, foreign as u64)
 }
 
 /// The pieces with the chunks in the order of the summary, and whether they were in another one. Without a summary, and
