@@ -5,6 +5,7 @@ mod architecture;
 mod board;
 mod demo;
 mod download;
+mod engineer;
 mod first_flight;
 mod ground_log;
 mod hold;
