@@ -229,16 +229,20 @@ impl Tally {
             return Err(reason);
         }
         let (frame, boot_s) = (recorded.input.frame, recorded.input.time_s);
+        if !same {
+            encode_into(recorded, &mut self.recorded);
+            if self.recorded == self.recomputed {
+                // A flag that is 3 instead of 1 reads as the same flag.
+                return Err(format!(
+                    "frame {frame} has the right values in other bytes than a recorder writes"
+                ));
+            }
+        }
         self.compared += 1;
         self.in_flight += u64::from(logged.since_release.is_some());
         self.first.get_or_insert((frame, boot_s));
         self.last = Some((frame, boot_s));
         if same {
-            return Ok(());
-        }
-        // Another writer may have put the same fields into other bytes.
-        encode_into(recorded, &mut self.recorded);
-        if self.recorded == self.recomputed {
             return Ok(());
         }
         let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
