@@ -115,9 +115,10 @@ fn its_tlog_tells_the_same(folder: &Path) {
         assert!(recorded.len() > 100, "{name}: {}", recorded.len());
         let mut equal = 0;
         for (time_s, value) in &recorded {
-            // Both record ten times a second, and not in the same moments; when nothing is heard, only the station does.
+            // Both record ten times a second, and not in the same moments, on a busy machine by half a second apart; when
+            // nothing is heard, only the station does.
             let same_moment =
-                made.iter().filter(|(at_s, _)| (at_s - time_s).abs() < 0.25).map(|(_, other)| *other);
+                made.iter().filter(|(at_s, _)| (at_s - time_s).abs() < 0.6).map(|(_, other)| *other);
             let values: Vec<f64> = same_moment.collect();
             let (least, most) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), other| {

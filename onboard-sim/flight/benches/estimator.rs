@@ -17,6 +17,7 @@ const VEHICLE: VehicleNow = VehicleNow {
     mass_kg: 3.0,
     air_density_kg_m3: 1.2,
     body_drag_area_m2: 0.0043,
+    leg_drag_area_m2: 0.0,
     fin_drag_area_m2: 0.031,
     fin_lift_area_m2: Vector2::new(0.0, 0.0),
     fin_ahead_of_cg_m: 0.11,

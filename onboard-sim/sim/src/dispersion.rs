@@ -75,8 +75,14 @@ pub struct Mismatch {
     pub fin_drag_share: f64,
     /// Drag across the body, as a fraction.
     pub crossflow_share: f64,
+    /// Drag of the legs, as a fraction of the airframe's.
+    pub leg_drag_share: f64,
+    /// Drag area of the legs that the airframe does not have, m^2.
+    pub leg_drag_m2: [f64; 2],
     /// Moments of inertia, as a fraction.
     pub inertia_share: f64,
+    /// How far the inertias about pitch and yaw lie from their mean, as a fraction, in either direction.
+    pub inertia_split_share: f64,
     /// Lean of the principal axis of inertia against the body's axis, each way, degrees.
     pub principal_axis_deg: f64,
     /// Centre of gravity along the axis, m.

@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use crate::world::wind::Wind;
 use crate::world::{AscentTruth, Hanging};
+use flight::vehicle::airframe::Legs;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -90,7 +91,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         gust_scale: sigma.gust_scale,
         ..nominal
     };
-    let truth = mismatched(&truth, &sigma.mismatch, seed, number);
+    let truth = mismatched(&truth, &mission.airframe.legs, &sigma.mismatch, seed, number);
     let ascent = ascended(mission, dispersion, seed, number);
     let hanging = hung(mission, dispersion, seed, number);
     Draw { truth, apogee, ascent, hanging, flight_seed }
@@ -145,7 +146,7 @@ const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
 /// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
 /// generator of their own: a set without them draws what it always drew.
-fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
+fn mismatched(truth: &Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
     let mut chance = Chance::of(seed ^ OF_MISMATCH, number);
@@ -177,9 +178,15 @@ fn mismatched(truth: &Truth, sigma: &Mismatch, seed: u64, number: u64) -> Truth 
     let principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
     let chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
     let thrust_rise_s = chance.between(sigma.thrust_rise_s);
+    let leg_drag_m2 = (legs.drag_area_m2 * sigma.leg_drag_share * chance.normal()
+        + chance.between(sigma.leg_drag_m2))
+    .max(-legs.drag_area_m2);
+    let inertia_split = (sigma.inertia_split_share * chance.normal()).clamp(-0.3, 0.3);
     Truth {
         chuff_s,
         thrust_rise_s,
+        leg_drag_m2,
+        inertia_split,
         thrust_offset_m,
         cg_offset_m,
         wind_exponent,

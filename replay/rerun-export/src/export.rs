@@ -83,7 +83,7 @@ pub fn export(log: &Path, beside: Option<&Path>, to: Destination<'_>) -> Result<
         .recording_id(format!("{}-{stem}", own.start_ns))
         .recording_name(stem)
         .memory()?;
-    recording.set_log_frame_enabled(false);
+    recording.set_log_tick_enabled(false);
     recording.set_log_time_enabled(false);
     own.draw(&recording, "", FLOWN)?;
     let mut exported = vec![own.import(&recording, log, "")?];

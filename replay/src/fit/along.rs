@@ -174,7 +174,8 @@ fn samples(
         let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
         let vehicle = VehicleNow::of(&mission.airframe, mass, density, fins_rad, false, 0.0);
         let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
-        let fins = VehicleNow { body_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
+        let fins =
+            VehicleNow { body_drag_area_m2: 0.0, leg_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
         let rate = frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s;
         let up = state.world_from_body.inverse_transform_vector(&nalgebra::Vector3::z());
         let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;

@@ -374,6 +374,7 @@ impl Day {
             ),
             set("airframe.fins.drag_coefficient", float(fins.drag_coefficient * drag_scale)),
             set("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
+            set("airframe.legs.drag_area_m2", float(mission.airframe.legs.drag_area_m2 * drag_scale)),
             set("ignition.delay_s", float(delay.mean)),
             set("motor.impulse_sigma", float(thrust.next_sigma())),
             set("motor.burn_time_sigma", float(burn_time.next_sigma())),

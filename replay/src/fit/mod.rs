@@ -391,6 +391,10 @@ pub fn patched(mission_toml: &str, fit: &Fit) -> Result<String, SettingError> {
     let (along, open) = (airframe.body.axial_drag_coefficient, airframe.fins.drag_coefficient);
     change("airframe.body.axial_drag_coefficient", &|scale| along * scale, body);
     change("airframe.fins.drag_coefficient", &|scale| open * scale, fins);
+    let legs_m2 = airframe.legs.drag_area_m2;
+    if legs_m2 > 0.0 {
+        change("airframe.legs.drag_area_m2", &|scale| legs_m2 * scale, body);
+    }
     change("airframe.gimbal.servo.delay_s", &|delay_s| delay_s, "gimbal_delay");
     change("airframe.gimbal.servo.rate_deg_s", &|rate_deg_s| rate_deg_s, "gimbal_rate");
     change("airframe.gimbal.servo.slop_deg", &|play_deg| play_deg.max(0.0), "gimbal_play");

@@ -17,6 +17,8 @@ LBM_PER_KG = 2.2046226218487757
 
 # Signs of the fins' roll, pitch and yaw moments, and the directions from the axis to the fins (y, z).
 ROLL, PITCH, YAW = [-1, 1, -1, 1], [1, -1, -1, 1], [1, 1, -1, -1]
+# Where the legs stand around the axis.
+RING = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
 OUTWARD = [(-yaw * math.cos(math.pi / 6), pitch * 0.5) for pitch, yaw in zip(PITCH, YAW)]
 STRIPS = 8
 
@@ -142,6 +144,32 @@ def aerodynamics(airframe, scale):
             lines.append(fcs(f"{name}/m{axis}", op("difference", op("product", *first), op("product", *second))))
             moments[axis].append(f"{name}/m{axis}")
 
+    legs = airframe["legs"]
+    if legs.get("drag_area_m2", 0.0):
+        radius_m = 0.5 * (0.5 * body["diameter_m"] + legs["foot_radius_m"])
+        station = number(legs["drag_station_m"])
+        x = op("difference", station, prop("air/cg"))
+        for i, (ring_y, ring_z) in enumerate(RING):
+            name, y, z = f"air/leg{i}", number(radius_m * ring_y), number(radius_m * ring_z)
+            for axis, base, plus, minus in (
+                ("u", u, (q, z), (r, y)), ("v", v, (r, x), (p, z)), ("w", w, (p, y), (q, x)),
+            ):
+                lines.append(
+                    fcs(f"{name}/{axis}", op("difference", op("sum", base, op("product", *plus)), op("product", *minus)))
+                )
+            local = [prop(f"{name}/{axis}") for axis in "uvw"]
+            lines.append(fcs(f"{name}/speed", length(*local)))
+            drag = number(-half * 0.25 * legs["drag_area_m2"])
+            for axis, along in zip("xyz", local):
+                lines.append(fcs(f"{name}/f{axis}", op("product", drag, rho, prop(f"{name}/speed"), along)))
+                forces[axis].append(f"{name}/f{axis}")
+            fx, fy, fz = (prop(f"{name}/f{axis}") for axis in "xyz")
+            for axis, first, second in (
+                ("x", (y, fz), (z, fy)), ("y", (z, fx), (station, fz)), ("z", (station, fy), (y, fx)),
+            ):
+                lines.append(fcs(f"{name}/m{axis}", op("difference", op("product", *first), op("product", *second))))
+                moments[axis].append(f"{name}/m{axis}")
+
     axes = []
     for axis, name in (("x", "X"), ("y", "Y"), ("z", "Z")):
         total = op("product", number(LBF_PER_N), op("sum", number(0.0), *map(prop, forces[axis])))
@@ -197,17 +225,16 @@ def write(folder, airframe_toml, motor_eng, truth):
     )
     isp_s = truth["impulse_scale"] * impulse / (propellant_kg * scale * G_M_S2)
     system, axes = aerodynamics(airframe, truth["drag_scale"])
-    ring = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
     radius = legs["foot_radius_m"]
     feet = [
         contact(f"leg{i}", legs["foot_station_m"], radius * y, radius * z, legs["stiffness_n_m"], legs["damping_n_s_m"],
                 legs["friction_coefficient"])
-        for i, (y, z) in enumerate(ring)
+        for i, (y, z) in enumerate(RING)
     ]
     hull = [
         contact(f"{part}{i}", station, 0.5 * body["diameter_m"] * y, 0.5 * body["diameter_m"] * z, 20000.0, 200.0, 0.6)
         for part, station in (("tail", 0.0), ("nose", body["length_m"]))
-        for i, (y, z) in enumerate(ring)
+        for i, (y, z) in enumerate(RING)
     ]
     fins, gimbal = airframe["fins"], airframe["gimbal"]
     stops = (-gimbal["limit_deg"], gimbal["limit_deg"])

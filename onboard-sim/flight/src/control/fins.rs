@@ -24,6 +24,9 @@ const ROUNDS: usize = 8;
 /// weak effect, and their lift can cancel the moment of their drag.
 const SLOPE_FLOOR: f64 = 0.2;
 
+/// The share of the room between the stops that pitch and yaw may fill: the rest is kept for the roll.
+const FOR_TILT: f64 = 0.85;
+
 /// Less dynamic pressure counts as no air, Pa, because the results would overflow.
 const LEAST_PRESSURE_PA: f64 = 1e-6;
 
@@ -75,9 +78,9 @@ impl Patterns {
         let room = highest - lowest;
         // The two patterns have every combination of signs, so together they spread by twice the sum.
         let spread = 2.0 * (self.pitch.abs() + self.yaw.abs());
-        if spread > room {
-            self.pitch *= room / spread;
-            self.yaw *= room / spread;
+        if spread > FOR_TILT * room {
+            self.pitch *= FOR_TILT * room / spread;
+            self.yaw *= FOR_TILT * room / spread;
         }
         let tilt = Self { mean: 0.0, roll: 0.0, ..self };
         let roll_max = largest_roll(&tilt.sines(), self.roll.signum(), room);

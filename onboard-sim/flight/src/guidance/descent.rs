@@ -28,8 +28,12 @@ pub struct DescentGains {
     pub lean_at_ignition_deg: f64,
     /// Time before the ignition from which the lean is reduced, s.
     pub lean_fades_s: f64,
-    /// Natural frequency of the attitude loop, rad/s.
+    /// Natural frequency of the attitude loop, rad/s, as long as the air is not faster than that.
     pub natural_frequency_rad_s: f64,
+    /// Stiffness of the attitude loop over the dynamic pressure, m^3, where that is stiffer: what the data say wrongly of the
+    /// air's moment grows with the dynamic pressure, and so does what the fins can set against it.
+    #[serde(default)]
+    pub stiffness_m3: f64,
     pub damping: f64,
     /// Decay rate of the roll rate, 1/s.
     pub roll_decay_per_s: f64,
@@ -45,13 +49,13 @@ pub struct DescentSituation {
     pub inertia_kg_m2: [f64; 2],
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
-    /// Drag area of body and fins along the wind, m^2.
+    /// Drag area of body, fins and legs along the wind, m^2.
     pub drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
-    /// Drag area of the fins, m^2, times their distance ahead of the centre of gravity, m: this turns the nose back
-    /// into the wind, m^3.
-    pub fin_restoring_m3: f64,
+    /// Drag area of the fins, m^2, times their distance ahead of the centre of gravity, m, less that of the legs times their
+    /// distance behind it: this turns the nose back into the wind, m^3.
+    pub restoring_m3: f64,
     /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and turns the nose away
     /// from the wind.
     pub body_behind_cg_m: f64,
@@ -106,15 +110,21 @@ impl DescentGains {
         // weathercock effect.
         let wanted_lean = error - turn_to_aim_rad(&state.world_from_body, &upstream);
         let held_n_m = dynamic_pressure_pa
-            * (situation.fin_restoring_m3
+            * (situation.restoring_m3
                 - situation.crossflow_area_m2 * situation.body_behind_cg_m * libm::sin(wanted_lean.norm()));
-        let frequency = self.natural_frequency_rad_s;
+        let frequency = self.frequency_rad_s(dynamic_pressure_pa, inertia);
         let turn = |error: f64, rate: f64| {
             inertia * (frequency * frequency * error - 2.0 * self.damping * frequency * rate)
         };
         let moment_n_m = Vector3::new(roll_n_m, turn(error.y, rate.y), turn(error.z, rate.z))
             + Vector3::new(0.0, wanted_lean.y, wanted_lean.z) * held_n_m;
         DescentDemand { moment_n_m, dynamic_pressure_pa, nose_in_world }
+    }
+
+    /// Natural frequency of the attitude loop at a dynamic pressure, rad/s.
+    fn frequency_rad_s(&self, dynamic_pressure_pa: f64, inertia_kg_m2: f64) -> f64 {
+        let least = self.natural_frequency_rad_s;
+        libm::sqrt((least * least).max(self.stiffness_m3 * dynamic_pressure_pa / inertia_kg_m2))
     }
 
     /// The lean of the nose out of the wind: the tangent of the angle of attack, along the wanted push.
@@ -161,6 +171,7 @@ mod tests {
             lean_at_ignition_deg: 6.0,
             lean_fades_s: 1.5,
             natural_frequency_rad_s: 3.0,
+            stiffness_m3: 0.0,
             damping: 0.8,
             roll_decay_per_s: 3.0,
             time_to_go_min_s: 2.5,
@@ -175,7 +186,7 @@ mod tests {
             wind_m_s: Vector3::zeros(),
             drag_area_m2: 0.031,
             crossflow_area_m2: 0.0622,
-            fin_restoring_m3: 0.0061,
+            restoring_m3: 0.0061,
             body_behind_cg_m: 0.05,
             time_to_go_s: Some(5.0),
         }
@@ -185,6 +196,64 @@ mod tests {
         let mut state = RigidState::upright(150.0);
         state.velocity_m_s = Vector3::new(0.0, 0.0, -38.0);
         state
+    }
+
+    /// Least phase margin, degrees, and gain margins upwards and downwards, dB, of the attitude loop in a plant whose air turns
+    /// the vehicle back by this more than the data say, 1/s^2, with a delay, s.
+    fn margins(natural: f64, damping: f64, stiffness_per_s2: f64, delay_s: f64) -> [f64; 3] {
+        use nalgebra::Complex;
+        let open_loop = |rad_s: f64| {
+            let s = Complex::new(0.0, rad_s);
+            let (sin, cos) = libm::sincos(rad_s * delay_s);
+            let late = Complex::new(cos, -sin);
+            late * (s * (2.0 * damping * natural) + natural * natural) / (s * s + stiffness_per_s2)
+        };
+        let size = |number: Complex<f64>| libm::hypot(number.re, number.im);
+        let decibels = |ratio: f64| 20.0 * libm::log10(ratio);
+        let (mut phase_deg, mut upwards_db) = (f64::INFINITY, f64::INFINITY);
+        // From above the plant's own frequency: below it a stiffer plant turns back by itself.
+        let first = 1.0 + libm::sqrt(stiffness_per_s2.max(0.0));
+        for step in 0..40_000 {
+            let rad_s = first + 0.002 * f64::from(step);
+            let [here, next] = [rad_s, rad_s + 0.002].map(open_loop);
+            if (size(here) > 1.0) != (size(next) > 1.0) {
+                // The angle beyond -180 degrees.
+                phase_deg = phase_deg.min(libm::atan2(-here.im, -here.re).to_degrees());
+            }
+            if (here.im < 0.0) != (next.im < 0.0) && here.re < 0.0 {
+                upwards_db = upwards_db.min(-decibels(size(here)));
+            }
+        }
+        // A plant that turns away needs more than its own stiffness from the loop.
+        let downwards_db = decibels(natural * natural / stiffness_per_s2.abs());
+        [phase_deg, upwards_db, downwards_db]
+    }
+
+    /// Legs of 0.010 m2 that the data do not have, or that they have and that are not there: 45 degrees and 6 dB at 36 m/s, and
+    /// as much where the air is slower and weaker in proportion.
+    #[test]
+    fn the_attitude_loop_has_margins_for_legs_that_nobody_measured() {
+        for name in ["mk2", "mk3"] {
+            let mission = crate::vehicles::mission::builtin(name).unwrap().unwrap();
+            let airframe = &mission.airframe;
+            let arm_m = airframe.mass.loaded_cg_station_m - 0.075;
+            let pressure_pa = 0.5 * 1.2 * 36.0 * 36.0;
+            let inertia_kg_m2 = airframe.mass.loaded_pitch_inertia_kg_m2;
+            let stiffness_per_s2 = pressure_pa * 0.010 * arm_m / inertia_kg_m2;
+            let (natural, damping) =
+                (mission.descent.frequency_rad_s(pressure_pa, inertia_kg_m2), mission.descent.damping);
+            // The servo, a frame, and half a frame for which a command is held.
+            let delay_s = airframe.fins.servo.delay_s + 1.5 * 0.005;
+            for error in [-stiffness_per_s2, stiffness_per_s2] {
+                let [phase_deg, upwards_db, downwards_db] = margins(natural, damping, error, delay_s);
+                assert!(phase_deg > 45.0 && upwards_db > 6.0, "{name} {error}: {phase_deg} {upwards_db}");
+                // mk2 has a lower inertia and a longer arm.
+                let least_db = if name == "mk3" { 6.0 } else { 4.5 };
+                assert!(downwards_db > least_db, "{name}: {downwards_db}");
+            }
+            // A loop half as stiff cannot hold such a vehicle.
+            assert!(margins(3.0, damping, -stiffness_per_s2, delay_s)[2] < 0.0);
+        }
     }
 
     #[test]

@@ -196,15 +196,14 @@ impl Column {
         let airframe = &mission.airframe;
         let body = &airframe.body;
         let scaled = |area_m2: f64| air_scale * area_m2;
-        let body_drag_area_m2 = airframe.drag_area_m2(0.0);
         let open_fins_m2 = airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]);
         let final_box = &mission.powered.final_box;
         Self {
             mass_at_ignition_kg,
             gravity_m_s2: mission.gravity_m_s2,
             air_density_kg_m3,
-            body_drag_area_m2: scaled(body_drag_area_m2),
-            burning_body_drag_area_m2: scaled(body_drag_area_m2 * (1.0 - mission.exhaust.body_loss)),
+            body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(0.0)),
+            burning_body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(mission.exhaust.body_loss)),
             crossflow_area_m2: body.crossflow_drag_coefficient * body.length_m * body.diameter_m,
             soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
             hard: Braking {

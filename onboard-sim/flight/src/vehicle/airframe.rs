@@ -62,8 +62,14 @@ impl Airframe {
 
     /// Drag area in a tail-first fall with all fins at one opening angle, m^2.
     pub fn drag_area_m2(&self, opening_rad: f64) -> f64 {
-        self.body.reference_area_m2
-            * (self.body.axial_drag_coefficient + 4.0 * self.fins.drag_coefficient * libm::sin(opening_rad))
+        self.unfinned_drag_area_m2(0.0) + self.fin_drag_area_m2(&[opening_rad; 4])
+    }
+
+    /// Drag area of body and legs in a tail-first fall, m^2, of which an exhaust takes a share of the body's: the legs stand
+    /// outside of it.
+    pub fn unfinned_drag_area_m2(&self, body_loss: f64) -> f64 {
+        let body = &self.body;
+        body.reference_area_m2 * body.axial_drag_coefficient * (1.0 - body_loss) + self.legs.drag_area_m2
     }
 
     /// Drag area of the fins together at their opening angles, m^2.
@@ -299,6 +305,12 @@ pub struct Legs {
     pub damping_n_s_m: f64,
     /// Friction coefficient between foot and ground.
     pub friction_coefficient: f64,
+    /// Drag area of the four together when they stand out, m^2.
+    #[serde(default)]
+    pub drag_area_m2: f64,
+    /// Station at which it acts, m above the nozzle.
+    #[serde(default)]
+    pub drag_station_m: f64,
     /// What gives way in each leg; without it the spring takes any load and has no end.
     pub crush: Option<Crush>,
 }
@@ -434,6 +446,14 @@ fn recovery(airframe: &Airframe) -> Check {
     )?;
     positive("legs.foot_radius_m", legs.foot_radius_m)?;
     positive("legs.stiffness_n_m", legs.stiffness_n_m)?;
+    not_negative("legs.drag_area_m2", legs.drag_area_m2)?;
+    let between = legs.foot_station_m..=airframe.body.length_m;
+    require(
+        between.contains(&legs.drag_station_m),
+        "legs.drag_station_m",
+        legs.drag_station_m,
+        "on foot or body",
+    )?;
     not_negative("legs.damping_n_s_m", legs.damping_n_s_m)?;
     not_negative("legs.friction_coefficient", legs.friction_coefficient)?;
     if let Some(crush) = &legs.crush {

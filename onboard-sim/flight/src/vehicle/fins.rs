@@ -253,16 +253,21 @@ mod tests {
         }
     }
 
+    /// Pitch takes its share of the room, roll what is left, and no drag is wanted.
     #[test]
     fn pitch_has_priority_over_roll_and_drag() {
         let allocation = allocation();
-        let moments = Moments { roll_n_m: 5.0, pitch_n_m: 40.0, yaw_n_m: 0.0 };
+        let moments = Moments { roll_n_m: 50.0, pitch_n_m: 40.0, yaw_n_m: 0.0 };
         let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2: 0.0 }, 900.0);
-        let closed_rad = 20.0_f64.to_radians();
-        for (found_rad, expected_rad) in
-            kappa_rad.into_iter().zip([closed_rad, FRAC_PI_2, FRAC_PI_2, closed_rad])
-        {
-            close(found_rad, expected_rad, "opening");
+        let room = 1.0 - libm::sin(20.0_f64.to_radians());
+        for (fin, found_rad) in kappa_rad.into_iter().enumerate() {
+            // Here the side force of the lifts pitches more than their drag, and the other way.
+            let sine = 1.0 - 0.5 * room + 0.5 * room * (0.15 * ROLL[fin] - 0.85 * PITCH[fin]);
+            // A little of the tilt's share goes against the yaw that unequal fins make.
+            assert!(
+                (found_rad - libm::asin(sine.min(1.0))).abs() < 0.005 || sine > 0.999,
+                "{fin}: {found_rad}"
+            );
         }
     }
 

@@ -3,7 +3,8 @@
 //! Rotation changes the wind at those places, so the model contains damping. It contains static stability, too: in a
 //! tail-first fall the fins drag behind the centre of gravity. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
 //! (coefficients, areas, radius), with the force turned into the local wind. The body follows the paper's Eq. 8 along
-//! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3).
+//! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3). The legs
+//! drag along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the tail away from it.
 
 use flight::vehicle::airframe::{Airframe, Parachute as ParachuteData};
 use flight::vehicle::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
@@ -27,6 +28,9 @@ pub(crate) struct Shape {
     /// Directions from the axis to the fins, in body axes.
     fin_directions: [Vector3<f64>; 4],
     nose_station_m: f64,
+    leg_drag_m2: f64,
+    /// Middles of the legs, from the nozzle.
+    legs_m: [Vector3<f64>; 4],
     fin_scale: f64,
     scale: f64,
 }
@@ -67,6 +71,8 @@ pub(crate) struct Flow {
 pub(crate) struct Configuration {
     /// Sines of the fins' opening angles.
     pub(crate) fin_sines: [f64; 4],
+    /// The legs stand out: on the booster they are folded.
+    pub(crate) legs_out: bool,
     /// Parachute's drag area, m^2.
     pub(crate) parachute_area_m2: f64,
     pub(crate) plume: Plume,
@@ -108,18 +114,23 @@ impl Shape {
             fin_station_m: airframe.fins.station_m,
             fin_directions: core::array::from_fn(|i| Vector3::new(0.0, -YAW[i] * COS_30, PITCH[i] * SIN_30)),
             nose_station_m: body.length_m,
+            leg_drag_m2: airframe.legs.drag_area_m2 + truth.leg_drag_m2,
+            legs_m: [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(y, z)| {
+                let radius_m = 0.5 * (0.5 * body.diameter_m + airframe.legs.foot_radius_m);
+                Vector3::new(airframe.legs.drag_station_m, radius_m * y, radius_m * z)
+            }),
             fin_scale: truth.fin_drag_scale,
             scale: truth.drag_scale,
         }
     }
 
-    /// Drag areas of a vehicle whose equally open fins have this sine: along the body, of the fins, and across the body,
+    /// Drag areas of a vehicle whose equally open fins have this sine: along the body, of fins and legs, and across the body,
     /// m^2.
     pub(crate) fn drag_areas_m2(&self, fin_sine: f64) -> [f64; 3] {
         let fins_m2 = 4.0 * self.fins.reference_area_m2 * self.fins.drag_coefficient * fin_sine;
         [
             self.scale * self.axial_area_m2,
-            self.scale * self.fin_scale * fins_m2,
+            self.scale * (self.fin_scale * fins_m2 + self.leg_drag_m2),
             self.scale * STRIPS as f64 * self.strip_area_m2,
         ]
     }
@@ -131,6 +142,9 @@ impl Shape {
         let mut load = Load::none();
         let Plume { body, fins } = configuration.plume;
         self.add_body(&mut load, flow, half_density, body, &axis_m);
+        if configuration.legs_out && self.leg_drag_m2 > 0.0 {
+            self.add_legs(&mut load, flow, half_density, &configuration.cg_m);
+        }
         self.add_fins(&mut load, flow, half_density * self.fin_scale * fins, configuration);
         if configuration.parachute_area_m2 > 0.0 {
             let place_m = axis_m(self.nose_station_m);
@@ -157,6 +171,15 @@ impl Shape {
             let mut across = velocity + flow.rate_rad_s.cross(&place_m);
             across.x = 0.0;
             load.add_at(&place_m, &(across * (-half_density * self.strip_area_m2 * length(&across))));
+        }
+    }
+
+    /// Tubes and struts in every direction: their drag is along the wind where each leg is.
+    fn add_legs(&self, load: &mut Load, flow: &Flow, half_density: f64, cg_m: &Vector3<f64>) {
+        for leg_m in &self.legs_m {
+            let place_m = leg_m - cg_m;
+            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
+            load.add_at(&place_m, &(local * (-half_density * 0.25 * self.leg_drag_m2 * length(&local))));
         }
     }
 
@@ -238,6 +261,43 @@ impl Parachute {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What legs of 0.01 m2 add at 30 m/s from the tail, 20 degrees from the side, and in a roll.
+    #[test]
+    fn val_hand_air_on_the_legs() {
+        let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let bare = Shape::new(&airframe, &Truth::default());
+        (airframe.legs.drag_area_m2, airframe.legs.drag_station_m) = (0.006, 0.05);
+        let legged = Shape::new(&airframe, &Truth { leg_drag_m2: 0.004, ..Truth::default() });
+        let configuration = |legs_out| Configuration {
+            fin_sines: [1.0; 4],
+            legs_out,
+            parachute_area_m2: 0.0,
+            plume: Plume { body: 1.0, fins: 1.0 },
+            cg_m: Vector3::new(0.4, 0.0, 0.0),
+        };
+        let added = |flow: &Flow| {
+            let [with, without] =
+                [legged.load(flow, &configuration(true)), bare.load(flow, &configuration(true))];
+            assert_eq!(legged.load(flow, &configuration(false)).force_n, without.force_n);
+            (with.force_n - without.force_n, with.moment_n_m - without.moment_n_m)
+        };
+        let (sin, cos) = libm::sincos(20.0_f64.to_radians());
+        let velocity_m_s = Vector3::new(-30.0 * cos, 0.0, 30.0 * sin);
+        let (force_n, moment_n_m) =
+            added(&Flow { density_kg_m3: 1.2, velocity_m_s, rate_rad_s: Vector3::zeros() });
+        // 540 Pa times 0.01 m2 against the velocity; its part across the axis is 0.35 m behind the centre of gravity.
+        assert!((force_n + velocity_m_s * (5.4 / 30.0)).norm() < 1e-12, "{force_n}");
+        assert!((moment_n_m - Vector3::new(0.0, -0.35 * 5.4 * sin, 0.0)).norm() < 1e-12, "{moment_n_m}");
+        // Rolling at 10 rad/s moves the middle of a leg across at 10 times its radius.
+        let velocity_m_s = Vector3::new(-30.0, 0.0, 0.0);
+        let (_, moment_n_m) =
+            added(&Flow { density_kg_m3: 1.2, velocity_m_s, rate_rad_s: Vector3::new(10.0, 0.0, 0.0) });
+        let radius_m = 0.5 * (0.5 * airframe.body.diameter_m + airframe.legs.foot_radius_m);
+        let across_m_s = 10.0 * radius_m;
+        let roll_n_m = 0.6 * 0.01 * libm::hypot(30.0, across_m_s) * across_m_s * radius_m;
+        assert!((moment_n_m.x + roll_n_m).abs() < 1e-9, "{moment_n_m} {roll_n_m}");
+    }
 
     #[test]
     fn the_canopy_opens_after_delay_and_distance() {

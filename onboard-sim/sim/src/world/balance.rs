@@ -46,6 +46,7 @@ impl Balance {
         };
         let configuration = Configuration {
             fin_sines: [libm::sin(opening_rad); 4],
+            legs_out: true,
             parachute_area_m2: 0.0,
             plume: Plume { body: 1.0, fins: 1.0 },
             // So moments are about the nozzle.

@@ -9,7 +9,8 @@ use crate::world::aero::Load;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Inertia {
     pub(crate) mass_kg: f64,
-    pub(crate) pitch_kg_m2: f64,
+    /// About pitch and about yaw.
+    pub(crate) across_kg_m2: [f64; 2],
     pub(crate) roll_kg_m2: f64,
     /// Lean of the principal axis against the body's, about body y and z, rad.
     pub(crate) principal_rad: [f64; 2],
@@ -93,7 +94,7 @@ fn moved(state: &RigidState, rates: &Rates, step_s: f64) -> RigidState {
     }
 }
 
-/// Euler's equations for a body symmetric about its principal axis.
+/// Euler's equations.
 fn angular_acceleration(inertia: &Inertia, rate: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
     if inertia.principal_rad.iter().all(|lean| *lean == 0.0) {
         return about_principal_axis(inertia, rate, moment);
@@ -105,11 +106,11 @@ fn angular_acceleration(inertia: &Inertia, rate: &Vector3<f64>, moment: &Vector3
 }
 
 fn about_principal_axis(inertia: &Inertia, rate: &Vector3<f64>, moment: &Vector3<f64>) -> Vector3<f64> {
-    let difference = inertia.pitch_kg_m2 - inertia.roll_kg_m2;
+    let ([pitch, yaw], roll) = (inertia.across_kg_m2, inertia.roll_kg_m2);
     Vector3::new(
-        moment.x / inertia.roll_kg_m2,
-        (moment.y + difference * rate.x * rate.z) / inertia.pitch_kg_m2,
-        (moment.z - difference * rate.x * rate.y) / inertia.pitch_kg_m2,
+        (moment.x + (pitch - yaw) * rate.y * rate.z) / roll,
+        (moment.y + (yaw - roll) * rate.x * rate.z) / pitch,
+        (moment.z - (pitch - roll) * rate.x * rate.y) / yaw,
     )
 }
 
@@ -128,7 +129,8 @@ mod tests {
     /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates rotate at (1 - I_x/I) p.
     #[test]
     fn val_euler_torque_free_precession() {
-        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
+        let inertia =
+            Inertia { mass_kg: 2.0, across_kg_m2: [0.12; 2], roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
         let mut state = RigidState::upright(50.0);
         state.rate_rad_s = Vector3::new(6.0, 0.4, 0.0);
         let momentum = |state: &RigidState| {
@@ -149,7 +151,8 @@ mod tests {
     #[test]
     fn val_euler_a_body_askew_keeps_its_momentum_and_its_energy() {
         let askew = [0.05, -0.03];
-        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: askew };
+        let inertia =
+            Inertia { mass_kg: 2.0, across_kg_m2: [0.12; 2], roll_kg_m2: 0.02, principal_rad: askew };
         let body_from_principal = Rotation3::from_scaled_axis(Vector3::new(0.0, askew[0], askew[1]));
         let diagonal = Vector3::new(0.02, 0.12, 0.12);
         let momentum = |rate: &Vector3<f64>| {
@@ -168,9 +171,30 @@ mod tests {
         assert!((state.rate_rad_s.x - 6.0).abs() > 1e-3, "{}", state.rate_rad_s);
     }
 
+    /// A body with three inertias that spins about the middle one turns over and back, and keeps momentum and energy.
+    #[test]
+    fn val_euler_three_inertias_keep_momentum_and_energy() {
+        let inertia =
+            Inertia { mass_kg: 2.0, across_kg_m2: [0.13, 0.11], roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
+        let diagonal = Vector3::new(0.02, 0.13, 0.11);
+        let mut state = RigidState::upright(50.0);
+        state.rate_rad_s = Vector3::new(0.05, 0.02, 5.0);
+        let momentum = |state: &RigidState| state.world_from_body * state.rate_rad_s.component_mul(&diagonal);
+        let energy_j = |state: &RigidState| state.rate_rad_s.dot(&state.rate_rad_s.component_mul(&diagonal));
+        let before = (momentum(&state), energy_j(&state));
+        let mut turned_over = false;
+        for _ in 0..4000 {
+            state = rk4_step(&state, &inertia, &Nothing, 0.0, 1e-3).0;
+            turned_over |= state.rate_rad_s.z < -4.9;
+        }
+        assert!(turned_over && (momentum(&state) - before.0).norm() < 1e-8);
+        assert!((energy_j(&state) - before.1).abs() < 1e-8);
+    }
+
     #[test]
     fn val_galilei_free_fall() {
-        let inertia = Inertia { mass_kg: 2.0, pitch_kg_m2: 0.12, roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
+        let inertia =
+            Inertia { mass_kg: 2.0, across_kg_m2: [0.12; 2], roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
         let mut state = RigidState::upright(50.0);
         state.velocity_m_s.x = 3.0;
         for _ in 0..1000 {

@@ -47,8 +47,12 @@ pub struct Truth {
     pub body_drag_scale: f64,
     pub fin_drag_scale: f64,
     pub crossflow_scale: f64,
+    /// Drag area of the legs beside the airframe's, m^2.
+    pub leg_drag_m2: f64,
     /// True moments of inertia over those of the data, beside `mass_scale`.
     pub inertia_scale: f64,
+    /// Inertia about pitch over that about yaw is one and this, over one less this.
+    pub inertia_split: f64,
     /// Lean of the principal axis of inertia against the body's axis, about body y and z, rad.
     pub principal_axis_rad: [f64; 2],
     /// Turn of the nozzle over the turn of its servo.
@@ -133,7 +137,9 @@ impl Default for Truth {
             body_drag_scale: 1.0,
             fin_drag_scale: 1.0,
             crossflow_scale: 1.0,
+            leg_drag_m2: 0.0,
             inertia_scale: 1.0,
+            inertia_split: 0.0,
             principal_axis_rad: [0.0; 2],
             gimbal_gain: 1.0,
             gimbal_slop_rad: 0.0,

@@ -118,6 +118,7 @@ impl Scene {
                     mass_kg: MASS_KG,
                     air_density_kg_m3: DENSITY_KG_M3,
                     body_drag_area_m2: 0.0,
+                    leg_drag_area_m2: 0.0,
                     fin_drag_area_m2: FIN_DRAG_AREA_M2,
                     fin_lift_area_m2: Vector2::zeros(),
                     fin_ahead_of_cg_m: 0.0,

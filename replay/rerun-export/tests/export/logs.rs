@@ -100,11 +100,11 @@ pub(crate) fn write_apogee_log(path: &Path) {
     };
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
     let half = f64::sqrt(0.5);
-    for frame in 0..FRAMES {
-        let time_s = 0.5 * frame as f64;
+    for number in 0..FRAMES {
+        let time_s = 0.5 * number as f64;
         let mut frame = ComputerFrame::default();
         // Frames have 5 ms.
-        frame.input.frame = (100 * frame).max(1);
+        frame.input.frame = (100 * number).max(1);
         frame.input.time_s = time_s;
         frame.output.phase = u32::from(Phase::AeroDescent.index());
         log.write(&Record::ComputerFrame(Box::new(frame)), nanoseconds(time_s)).unwrap();

@@ -531,6 +531,7 @@ impl Pilot {
             };
         }
         let largest_m2 = self.model.largest_fin_drag_area_m2();
+        let legs = &self.model.airframe().legs;
         let situation = DescentSituation {
             mass_kg: mass.mass_kg,
             inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
@@ -538,8 +539,8 @@ impl Pilot {
             wind_m_s: estimate.wind_m_s.push(0.0),
             drag_area_m2: self.model.body_drag_area_m2() + self.model.fin_drag_area_m2(&self.fins_rad),
             crossflow_area_m2: self.model.crossflow_area_m2(),
-            fin_restoring_m3: self.model.fin_drag_area_m2(&self.fins_rad)
-                * (fins.station_m - mass.cg_station_m),
+            restoring_m3: self.model.fin_drag_area_m2(&self.fins_rad) * (fins.station_m - mass.cg_station_m)
+                - legs.drag_area_m2 * (mass.cg_station_m - legs.drag_station_m),
             body_behind_cg_m: mass.cg_station_m - 0.5 * self.model.airframe().body.length_m,
             time_to_go_s: self.prediction.ignition.command_in_s,
         };

@@ -48,11 +48,11 @@ impl VehicleModel {
     }
 
     pub(super) fn body_drag_area_m2(&self) -> f64 {
-        self.airframe().drag_area_m2(0.0)
+        self.airframe().unfinned_drag_area_m2(0.0)
     }
 
     fn burning_body_drag_area_m2(&self) -> f64 {
-        self.body_drag_area_m2() * (1.0 - self.mission.exhaust.body_loss)
+        self.airframe().unfinned_drag_area_m2(self.mission.exhaust.body_loss)
     }
 
     /// What the exhaust leaves of a drag area of the fins, m^2.

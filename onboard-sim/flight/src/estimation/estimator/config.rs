@@ -25,6 +25,8 @@ pub struct EstimatorConfig {
     pub accelerometer_noise_mg_sqrt_hz: f64,
     /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
     pub burning_gyro_deg_s_sqrt_hz: f64,
+    /// How far the motor's vibration may shift the gyro's bias when it lights, each axis, deg/s.
+    pub burning_gyro_bias_deg_s: f64,
     /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
     pub burning_accelerometer_mg_sqrt_hz: f64,
     /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
@@ -101,6 +103,7 @@ impl Default for EstimatorConfig {
             gyro_bias_walk_deg_s_sqrt_s: 0.002,
             accelerometer_noise_mg_sqrt_hz: 0.65,
             burning_gyro_deg_s_sqrt_hz: 0.0,
+            burning_gyro_bias_deg_s: 0.0,
             burning_accelerometer_mg_sqrt_hz: 0.0,
             accelerometer_bias_walk_mg_sqrt_s: 0.4,
             barometer_m: 0.08,
@@ -177,6 +180,7 @@ impl EstimatorConfig {
             ("barometer_suction", self.barometer_suction),
             ("gnss_age_jitter_s", self.gnss_age_jitter_s),
             ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),
+            ("burning_gyro_bias_deg_s", self.burning_gyro_bias_deg_s),
             ("burning_accelerometer_mg_sqrt_hz", self.burning_accelerometer_mg_sqrt_hz),
             ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
             ("accelerometer_bias_walk_mg_sqrt_s", self.accelerometer_bias_walk_mg_sqrt_s),

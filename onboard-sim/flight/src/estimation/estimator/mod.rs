@@ -141,6 +141,8 @@ pub struct Estimator {
     surprise: Surprise,
     fix_age: FixAge,
     last_imu: ImuSample,
+    /// The landing motor has shaken the gyro.
+    is_shaken: bool,
     rate_rad_s: Vector3<f64>,
     specific_force_m_s2: Vector3<f64>,
     last_good: Nominal,
@@ -169,6 +171,7 @@ impl Estimator {
             aids: Aids::default(),
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
+            is_shaken: false,
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
             rate_rad_s: state.rate_rad_s,
             specific_force_m_s2: Vector3::zeros(),
@@ -196,6 +199,13 @@ impl Estimator {
     pub fn step(&mut self, measurements: &Measurements, vehicle: &VehicleNow) -> Estimate {
         self.frames += 1;
         self.aids.begin_frame();
+        if vehicle.motor_burning && !self.is_shaken {
+            self.is_shaken = true;
+            let shift_rad_s = self.config.burning_gyro_bias_deg_s.to_radians();
+            for axis in GYRO_BIAS..ACCELEROMETER_BIAS {
+                self.covariance.widen(axis, shift_rad_s * shift_rad_s);
+            }
+        }
         self.carry_forward(&measurements.imu, vehicle.motor_burning);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.take_barometer(altitude_m);

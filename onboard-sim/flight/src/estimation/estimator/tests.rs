@@ -9,6 +9,7 @@ pub(super) const VEHICLE: VehicleNow = VehicleNow {
     mass_kg: 3.0,
     air_density_kg_m3: 1.2,
     body_drag_area_m2: 0.0043,
+    leg_drag_area_m2: 0.0,
     fin_drag_area_m2: 0.031,
     fin_lift_area_m2: Vector2::new(0.0, 0.0),
     fin_ahead_of_cg_m: 0.11,
@@ -223,6 +224,22 @@ fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
     let (trusting_m, trusting_sigma_m) = height_error_with_a_late_lidar(0.0);
     assert!(trusting_m.abs() > 3.0 * trusting_sigma_m, "{trusting_m} m with {trusting_sigma_m} m");
     assert!(expecting_m.abs() < trusting_m.abs(), "{expecting_m} m, trusting {trusting_m} m");
+}
+
+/// The doubt of the gyro's bias grows once, when the motor lights.
+#[test]
+fn the_landing_motor_may_shift_the_gyros_bias() {
+    let config = EstimatorConfig { burning_gyro_bias_deg_s: 0.1, ..EstimatorConfig::default() };
+    let mut estimator =
+        Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &RigidState::upright(20.0));
+    let rest = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: Vector3::x() * 9.8 };
+    let burning = VehicleNow { motor_burning: true, ..VEHICLE };
+    let mut doubt = |vehicle: &VehicleNow| {
+        estimator.step(&Measurements::of_imu(rest), vehicle).sigmas.gyro_bias_rad_s.y.to_degrees()
+    };
+    let [falls, lights, burns] = [&VEHICLE, &burning, &burning].map(&mut doubt);
+    assert!((libm::hypot(falls, 0.1) - lights).abs() < 1e-4, "{falls} {lights}");
+    assert!((burns - lights).abs() < 1e-4, "{lights} {burns}");
 }
 
 fn any_number() -> impl Strategy<Value = f64> {

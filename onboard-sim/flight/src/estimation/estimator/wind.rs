@@ -153,6 +153,8 @@ pub struct VehicleNow {
     pub air_density_kg_m3: f64,
     /// Axial drag coefficient of the body times its area, m^2.
     pub body_drag_area_m2: f64,
+    /// Drag area of the legs, m^2. Their drag is along the relative wind, too; what turning adds to it is left out.
+    pub leg_drag_area_m2: f64,
     /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their drag is along the
     /// relative wind, so this counts sideways as well.
     pub fin_drag_area_m2: f64,
@@ -194,6 +196,7 @@ impl VehicleNow {
             mass_kg: mass.mass_kg,
             air_density_kg_m3,
             body_drag_area_m2: body.reference_area_m2 * body.axial_drag_coefficient,
+            leg_drag_area_m2: airframe.legs.drag_area_m2,
             fin_drag_area_m2: body.reference_area_m2
                 * airframe.fins.drag_coefficient
                 * sines.iter().sum::<f64>(),
@@ -228,7 +231,8 @@ impl VehicleNow {
             + sideways * (self.crossflow_area_m2 * sideways.norm());
         let lift = at_fins.cross(&self.fin_lift_area_m2.insert_row(0, 0.0)) * speed_at_fins;
         let fins = at_fins * (self.fin_drag_area_m2 * speed_at_fins) + lift;
-        (body + fins) * (-0.5 * self.air_density_kg_m3)
+        let legs = velocity * (self.leg_drag_area_m2 * speed);
+        (body + fins + legs) * (-0.5 * self.air_density_kg_m3)
     }
 }
 

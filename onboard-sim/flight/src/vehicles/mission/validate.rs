@@ -85,6 +85,7 @@ fn descent(gains: &DescentGains) -> Check {
     angle_below_right("descent.lean_at_ignition_deg", gains.lean_at_ignition_deg)?;
     positive("descent.lean_fades_s", gains.lean_fades_s)?;
     positive("descent.natural_frequency_rad_s", gains.natural_frequency_rad_s)?;
+    not_negative("descent.stiffness_m3", gains.stiffness_m3)?;
     positive("descent.damping", gains.damping)?;
     not_negative("descent.roll_decay_per_s", gains.roll_decay_per_s)?;
     positive("descent.time_to_go_min_s", gains.time_to_go_min_s)

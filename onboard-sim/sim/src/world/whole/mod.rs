@@ -240,6 +240,7 @@ impl World {
             shape: &self.shape,
             configuration: Configuration {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
+                legs_out: true,
                 parachute_area_m2: self.parachute.drag_area_m2(),
                 plume: self.plume(thrust_n[1], air.density_kg_m3),
                 cg_m,
@@ -257,7 +258,8 @@ impl World {
         };
         let inertia = Inertia {
             mass_kg: self.mass.mass_kg,
-            pitch_kg_m2: self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale,
+            across_kg_m2: [1.0 + self.truth.inertia_split, 1.0 - self.truth.inertia_split]
+                .map(|share| self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale * share),
             roll_kg_m2: self.mass.roll_inertia_kg_m2 * self.truth.inertia_scale,
             principal_rad: self.truth.principal_axis_rad,
         };

@@ -121,6 +121,7 @@ impl World {
             shape: &self.shape,
             configuration: Configuration {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
+                legs_out: false,
                 parachute_area_m2: self.parachute.drag_area_m2(),
                 plume: Plume { body: stack.drag_over(body.axial_drag_coefficient), fins: 1.0 },
                 cg_m,
@@ -282,7 +283,10 @@ impl Stack {
             .map(|(part_kg, at_m, own_kg_m2)| own_kg_m2 + part_kg * (at_m.x - cg_m.x) * (at_m.x - cg_m.x))
             .sum();
         let roll_kg_m2 = vehicle.roll_inertia_kg_m2 + booster.roll_inertia_kg_m2;
-        StackMass { inertia: Inertia { mass_kg, pitch_kg_m2, roll_kg_m2, principal_rad: [0.0; 2] }, cg_m }
+        StackMass {
+            inertia: Inertia { mass_kg, across_kg_m2: [pitch_kg_m2; 2], roll_kg_m2, principal_rad: [0.0; 2] },
+            cg_m,
+        }
     }
 
     /// Adds the forces of nose and fins.
