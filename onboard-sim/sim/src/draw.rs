@@ -185,8 +185,6 @@ fn mismatched(truth: &Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u
     Truth {
         chuff_s,
         thrust_rise_s,
-        leg_drag_m2,
-        inertia_split,
         thrust_offset_m,
         cg_offset_m,
         wind_exponent,
@@ -197,7 +195,9 @@ fn mismatched(truth: &Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u
         body_drag_scale,
         fin_drag_scale,
         crossflow_scale,
+        leg_drag_m2,
         inertia_scale,
+        inertia_split,
         principal_axis_rad,
         gimbal_gain,
         gimbal_slop_rad,
