@@ -29,7 +29,6 @@ fn commands(folder: &Path, radio: &SerialLine) -> Vec<Command> {
 const COUNTDOWN: Duration = Duration::from_secs(20);
 
 #[test]
-#[ignore = "a silent second of the radio on a busy machine holds its countdown: run it alone"]
 fn a_first_flight_goes_as_its_page_says() {
     let folder = tempfile::tempdir().unwrap();
     let radio = SerialLine::new(57_600);
@@ -50,7 +49,9 @@ fn a_first_flight_goes_as_its_page_says() {
     screen.type_until(b"SSTART\r", "START  commanded");
     // A busy machine may leave the radio silent for a second, which holds the countdown: then it is started again.
     while screen.wait_within(COUNTDOWN, |window| (!window.shows("On the pad")).then_some(())).is_none() {
-        screen.type_until(b"SSTART\r", "START  commanded");
+        screen.type_by_hand(b"SSTART\r");
+        // The words of the first start are still there: only the question whether a person typed is waited for.
+        screen.confirm_if_asked("LANDED inside every limit");
     }
     screen.wait_for("LANDED inside every limit");
     screen.wait_for("LANDED; may be approached");

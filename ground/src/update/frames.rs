@@ -174,13 +174,7 @@ fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
 }
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
-    // RFC 5424: 0 emergency to 7 debug.
-    let level = match text.severity {
-        0..=2 => EventLevel::Fatal,
-        3 => EventLevel::Error,
-        4 => EventLevel::Warning,
-        _ => EventLevel::Info,
-    };
+    let level = EventLevel::of_severity(text.severity);
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }
 

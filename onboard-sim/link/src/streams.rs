@@ -472,26 +472,50 @@ fn is_vital(message_id: u32) -> bool {
     matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
 }
 
-// Tells the stations what the check on the pad finds: one value after the other, again and again.
+// Tells the stations what the check on the pad finds, and what went wrong in the flight: one value after the other, again and
+// again.
 //
-// The values are requested messages, after all telemetry: on the pad there is room for them within a radio's budget.
+// The values are requested messages, after all telemetry: there is room for them on the pad within a radio's budget, and in
+// flight they wait.
 
 /// While a check runs, and until every value has been told twice after it, a value is told each so many seconds: 250 B/s
 /// when signed.
 const OFTEN_S: f64 = 0.2;
-/// Later: for a station that comes late.
+/// Later, and for what went wrong: for a station that comes late.
 const SELDOM_S: f64 = 1.0;
 
 /// Whose turn it is.
 #[derive(Debug, Default)]
+struct Turn {
+    place: usize,
+    /// How many values there were when the last one was told.
+    found: usize,
+    /// How often every value has been told.
+    rounds: u32,
+}
+
+impl Turn {
+    /// The place of the next of so many values: new ones first.
+    fn next(&mut self, found: usize) -> usize {
+        let is_new = found > self.found;
+        if is_new {
+            self.place = self.found;
+        } else if self.place >= found {
+            (self.place, self.rounds) = (0, self.rounds.saturating_add(1));
+        }
+        let place = self.place;
+        self.place += 1;
+        self.found = if is_new { place + 1 } else { found };
+        place
+    }
+}
+
+/// Tells the values of a check.
+#[derive(Debug, Default)]
 pub(super) struct CheckReporter {
     told: Option<(u16, CheckState)>,
-    place: usize,
-    /// How often every value has been told since the check changed.
-    rounds: u32,
+    turn: Turn,
     due_s: f64,
-    /// How many values had been found when the last one was told.
-    found: usize,
 }
 
 impl CheckReporter {
@@ -503,38 +527,25 @@ impl CheckReporter {
         if check.state() == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
             return None;
         }
-        let found = check.findings().len();
         if self.told != Some(now) {
             // At once: a new check, or its end.
-            (self.told, self.rounds, self.due_s) = (Some(now), 0, now_s);
+            (self.told, self.turn.rounds, self.due_s) = (Some(now), 0, now_s);
         }
         if now_s < self.due_s {
             return None;
         }
-        // New values first.
-        if found > self.found {
-            self.place = self.found;
-        } else if self.place >= found {
-            (self.place, self.rounds) = (0, self.rounds.saturating_add(1));
-        }
-        let place = self.place;
-        self.place += 1;
-        self.found = if found > self.found { place + 1 } else { found };
-        let often = check.is_running() || self.rounds < 2;
+        let place = self.turn.next(check.findings().len());
+        let often = check.is_running() || self.turn.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
         Some(telemetry::pad_check(check, place, vehicle.time_s))
     }
 }
 
-// Tells the stations what went wrong in the flight, in the same way.
-
-/// Whose turn it is.
+/// Tells what went wrong in the flight.
 #[derive(Debug, Default)]
 pub(super) struct FindingReporter {
-    place: usize,
+    turn: Turn,
     due_s: f64,
-    /// How many findings there were when the last one was told.
-    found: usize,
 }
 
 impl FindingReporter {
@@ -545,19 +556,11 @@ impl FindingReporter {
         let over =
             flew && (vehicle.input().contact || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed));
         // A new one does not wait.
-        let is_new = found > self.found;
-        if (found == 0 && !over) || (now_s < self.due_s && !is_new) {
+        if (found == 0 && !over) || (now_s < self.due_s && found <= self.turn.found) {
             return None;
         }
-        if is_new {
-            self.place = self.found;
-        } else if self.place >= found {
-            self.place = 0;
-        }
-        let place = self.place;
-        (self.place, self.due_s) = (place + 1, now_s + SELDOM_S);
-        self.found = self.found.max(found.min(place + 1));
-        Some(telemetry::finding(vehicle.findings, place, vehicle.time_s))
+        self.due_s = now_s + SELDOM_S;
+        Some(telemetry::finding(vehicle.findings, self.turn.next(found), vehicle.time_s))
     }
 }
 

@@ -135,6 +135,18 @@ pub(super) fn transform(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTr
     }
 }
 
+impl EventLevel {
+    /// Of a text with a severity of MAVLink, which is RFC 5424's: 0 emergency to 7 debug.
+    pub fn of_severity(severity: u8) -> Self {
+        match severity {
+            0..=2 => Self::Fatal,
+            3 => Self::Error,
+            4 => Self::Warning,
+            _ => Self::Info,
+        }
+    }
+}
+
 /// Converts an event into a Foxglove log message.
 pub(super) fn log_message(event: &Event, time_ns: u64) -> Log {
     let level = match event.level {

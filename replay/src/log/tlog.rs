@@ -14,7 +14,7 @@ use protocol::log::record::{
 };
 use protocol::log::tlog::{TlogFrame, TlogReader};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
-use protocol::text::Reassembler;
+use protocol::text::{Reassembler, Text};
 use protocol::told::Told;
 use serde::Serialize;
 
@@ -214,7 +214,12 @@ impl Station {
         if let MavMessage::STATUSTEXT(chunk) = &message {
             let now = Duration::from_secs_f64(time_s.max(0.0));
             let text = self.texts.push(frame.source(), chunk, now);
-            return text.into_iter().map(|text| Record::Event(event(text.severity, text.text))).collect();
+            let event = |text: Text| Event {
+                level: EventLevel::of_severity(text.severity),
+                name: "vehicle".to_owned(),
+                message: text.text,
+            };
+            return text.into_iter().map(|text| Record::Event(event(text))).collect();
         }
         self.changed |= self.told.hear(&message);
         let due = self.written_at_s.is_none_or(|at_s| time_s - at_s >= PERIOD_S);
@@ -225,15 +230,4 @@ impl Station {
         self.written_at_s = Some(time_s);
         vec![Record::Telemetry(Box::new(self.told.record(time_s)))]
     }
-}
-
-/// A text of the vehicle, of MAVLink's severity.
-fn event(severity: u8, message: String) -> Event {
-    let level = match severity {
-        0..=2 => EventLevel::Fatal,
-        3 => EventLevel::Error,
-        4 => EventLevel::Warning,
-        _ => EventLevel::Info,
-    };
-    Event { level, name: "vehicle".to_owned(), message }
 }

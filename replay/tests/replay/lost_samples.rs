@@ -81,13 +81,13 @@ fn tolerances_limit_what_may_be_missing() {
             .arg("--tolerances")
             .arg(&tolerances))
     };
-    let (code, stdout, stderr) = compared("missing = 10\nsamples_missing = 0.7\n");
+    let (code, stdout, stderr) = compared("missing = 2\nsamples_missing = 0.7\n");
     assert_eq!(code, 0, "{stdout}{stderr}");
     let (code, stdout, _) = compared("samples_missing = 0.6\n");
     assert_eq!(code, 1, "{stdout}");
     assert!(stdout.contains("vehicle_truth3d") && !stdout.contains("- computer_frame"), "{stdout}");
     let (code, stdout, _) = compared(
-        "missing = 10\nsamples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n",
+        "missing = 2\nsamples_missing = 0.6\n[signals.\"vehicle_truth3d.*\"]\nsamples_missing = 0.7\n",
     );
     assert_eq!(code, 0, "{stdout}");
     let (code, _, stderr) = compared("samples_missing = 1.5\n");

@@ -83,6 +83,27 @@ def aerodynamics(airframe, scale):
     forces = {"x": ["air/body/fx"], "y": [], "z": []}
     moments = {"x": [], "y": [], "z": []}
 
+    def local_wind(name, x, y, z):
+        """The wind at a place relative to the centre of gravity, and its speed."""
+        for axis, base, plus, minus in (
+            ("u", u, (q, z), (r, y)), ("v", v, (r, x), (p, z)), ("w", w, (p, y), (q, x)),
+        ):
+            lines.append(
+                fcs(f"{name}/{axis}", op("difference", op("sum", base, op("product", *plus)), op("product", *minus)))
+            )
+        local = [prop(f"{name}/{axis}") for axis in "uvw"]
+        lines.append(fcs(f"{name}/speed", length(*local)))
+        return local
+
+    def add_moments(name, station, y, z):
+        """The moments of a force about the nozzle exit."""
+        fx, fy, fz = (prop(f"{name}/f{axis}") for axis in "xyz")
+        for axis, first, second in (
+            ("x", (y, fz), (z, fy)), ("y", (z, fx), (station, fz)), ("z", (station, fy), (y, fx)),
+        ):
+            lines.append(fcs(f"{name}/m{axis}", op("difference", op("product", *first), op("product", *second))))
+            moments[axis].append(f"{name}/m{axis}")
+
     strip_m = body["length_m"] / STRIPS
     across = -half * body["crossflow_drag_coefficient"] * body["diameter_m"] * strip_m
     for i in range(STRIPS):
@@ -114,14 +135,7 @@ def aerodynamics(airframe, scale):
         lines.append(fcs(f"{name}/z", op("product", number(out_z), radius)))
         x = op("difference", number(fins["station_m"]), prop("air/cg"))
         y, z = prop(f"{name}/y"), prop(f"{name}/z")
-        for axis, base, plus, minus in (
-            ("u", u, (q, z), (r, y)), ("v", v, (r, x), (p, z)), ("w", w, (p, y), (q, x)),
-        ):
-            lines.append(
-                fcs(f"{name}/{axis}", op("difference", op("sum", base, op("product", *plus)), op("product", *minus)))
-            )
-        lu, lv, lw = (prop(f"{name}/{axis}") for axis in "uvw")
-        lines.append(fcs(f"{name}/speed", length(lu, lv, lw)))
+        lu, lv, lw = local_wind(name, x, y, z)
         lines.append(fcs(f"{name}/drag", op("product", number(drag), rho, prop(f"{name}/sine"), prop(f"{name}/speed"))))
         turned = lift * ROLL[i]
         lines.append(fcs(f"{name}/lift", op("product", number(turned), rho, prop(f"{name}/sine"), prop(f"{name}/speed"))))
@@ -136,39 +150,20 @@ def aerodynamics(airframe, scale):
             force = op("sum", op("product", d, along), op("product", l, cross[axis]))
             lines.append(fcs(f"{name}/f{axis}", force))
             forces[axis].append(f"{name}/f{axis}")
-        fx, fy, fz = (prop(f"{name}/f{axis}") for axis in "xyz")
-        station = number(fins["station_m"])
-        for axis, first, second in (
-            ("x", (y, fz), (z, fy)), ("y", (z, fx), (station, fz)), ("z", (station, fy), (y, fx)),
-        ):
-            lines.append(fcs(f"{name}/m{axis}", op("difference", op("product", *first), op("product", *second))))
-            moments[axis].append(f"{name}/m{axis}")
+        add_moments(name, number(fins["station_m"]), y, z)
 
     legs = airframe["legs"]
     if legs.get("drag_area_m2", 0.0):
         radius_m = 0.5 * (0.5 * body["diameter_m"] + legs["foot_radius_m"])
+        drag = number(-half * 0.25 * legs["drag_area_m2"])
         station = number(legs["drag_station_m"])
-        x = op("difference", station, prop("air/cg"))
         for i, (ring_y, ring_z) in enumerate(RING):
             name, y, z = f"air/leg{i}", number(radius_m * ring_y), number(radius_m * ring_z)
-            for axis, base, plus, minus in (
-                ("u", u, (q, z), (r, y)), ("v", v, (r, x), (p, z)), ("w", w, (p, y), (q, x)),
-            ):
-                lines.append(
-                    fcs(f"{name}/{axis}", op("difference", op("sum", base, op("product", *plus)), op("product", *minus)))
-                )
-            local = [prop(f"{name}/{axis}") for axis in "uvw"]
-            lines.append(fcs(f"{name}/speed", length(*local)))
-            drag = number(-half * 0.25 * legs["drag_area_m2"])
+            local = local_wind(name, op("difference", station, prop("air/cg")), y, z)
             for axis, along in zip("xyz", local):
                 lines.append(fcs(f"{name}/f{axis}", op("product", drag, rho, prop(f"{name}/speed"), along)))
                 forces[axis].append(f"{name}/f{axis}")
-            fx, fy, fz = (prop(f"{name}/f{axis}") for axis in "xyz")
-            for axis, first, second in (
-                ("x", (y, fz), (z, fy)), ("y", (z, fx), (station, fz)), ("z", (station, fy), (y, fx)),
-            ):
-                lines.append(fcs(f"{name}/m{axis}", op("difference", op("product", *first), op("product", *second))))
-                moments[axis].append(f"{name}/m{axis}")
+            add_moments(name, station, y, z)
 
     axes = []
     for axis, name in (("x", "X"), ("y", "Y"), ("z", "Z")):

@@ -28,10 +28,10 @@ pub struct DescentGains {
     pub lean_at_ignition_deg: f64,
     /// Time before the ignition from which the lean is reduced, s.
     pub lean_fades_s: f64,
-    /// Natural frequency of the attitude loop, rad/s, as long as the air is not faster than that.
+    /// Least natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Stiffness of the attitude loop over the dynamic pressure, m^3, where that is stiffer: what the data say wrongly of the
-    /// air's moment grows with the dynamic pressure, and so does what the fins can set against it.
+    /// Stiffness of the attitude loop over the dynamic pressure, m^3. It decides where it makes the loop stiffer than the least
+    /// natural frequency. An error in the air's moment grows with the dynamic pressure, and so does what the fins can do.
     #[serde(default)]
     pub stiffness_m3: f64,
     pub damping: f64,

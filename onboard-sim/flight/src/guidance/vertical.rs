@@ -44,7 +44,7 @@ pub struct Column {
     pub mass_at_ignition_kg: f64,
     pub gravity_m_s2: f64,
     pub air_density_kg_m3: f64,
-    /// Drag area of the body along its axis, m^2.
+    /// Drag area of body and legs along the axis, m^2.
     pub body_drag_area_m2: f64,
     /// The same while the motor burns, m^2.
     pub burning_body_drag_area_m2: f64,

@@ -1,4 +1,5 @@
-//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew and check on the pad.
+//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew, check on the pad,
+//! and what went wrong.
 
 use flight::computer::crew::People;
 use flight::computer::findings::Findings;

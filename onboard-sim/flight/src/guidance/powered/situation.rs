@@ -30,7 +30,7 @@ pub struct PoweredSituation<'a> {
     pub gravity_m_s2: f64,
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
-    /// Drag area of the body along its axis, m^2.
+    /// Drag area of body and legs along the axis, m^2.
     pub body_drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
