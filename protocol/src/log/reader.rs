@@ -81,8 +81,8 @@ pub enum Damage {
     /// The log can be read to its end, and its summary counts other messages or chunks.
     #[error("its summary counts {counted}, and {read} are there: a part was cut out or is there twice")]
     Miscounted { counted: String, read: String },
-    /// The log was recovered from one that lacked something.
-    #[error("it was recovered from a damaged log: {0}")]
+    /// The log was recovered, or made of a `.tlog`, and that lacked something.
+    #[error("it was made of a damaged log: {0}")]
     Recovered(String),
 }
 

@@ -222,7 +222,7 @@ fn a_recovery_is_reported_and_never_overwrites() {
     assert!(
         code == 0
             && stdout.contains(&format!("{frames} of {frames} frames identical of the readable part"))
-            && stdout.contains("it was recovered from a damaged log"),
+            && stdout.contains("it was made of a damaged log"),
         "{stdout}"
     );
     let (code, _, _) = run(replay("verify", &output).arg("--strict"));

@@ -452,7 +452,7 @@ fn recovery(airframe: &Airframe) -> Check {
         between.contains(&legs.drag_station_m),
         "legs.drag_station_m",
         legs.drag_station_m,
-        "on foot or body",
+        "legs.foot_station_m to body.length_m",
     )?;
     not_negative("legs.damping_n_s_m", legs.damping_n_s_m)?;
     not_negative("legs.friction_coefficient", legs.friction_coefficient)?;
