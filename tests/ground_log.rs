@@ -2,6 +2,11 @@
 
 use std::path::Path;
 
+use protocol::frame::Framer;
+use protocol::identity::VEHICLE;
+use protocol::log::tlog::TlogReader;
+use protocol::told::Told;
+
 use e2e::{Ended, Program, Running, auto_ground, expect_landing, program, vehicle};
 
 fn replay(folder: &Path, arguments: &[&str]) -> Ended {
@@ -87,47 +92,54 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     assert!(compared.output.contains("Compared while both recorded"), "{}", compared.output);
 }
 
-/// The times of a table's log and a column, s and its unit, where the column has a value.
-fn over_time(table: &Path, name: &str) -> Vec<(f64, f64)> {
-    let times =
-        column(table, "log_time_ns").into_iter().map(|time_ns| time_ns.parse().unwrap_or(f64::NAN) / 1e9);
-    let rows = times.zip(column(table, name));
-    rows.filter_map(|(time_s, value)| Some((time_s, value.parse().ok()?))).collect()
+/// What a station records ten times a second, of the vehicle's state: which of its moments it takes depends on the machine.
+const STATE: [&str; 8] =
+    ["phase", "altitude_m", "x_m", "pitch_rad", "u_m_s", "w_m_s", "q_rad_s", "gimbal_measured_rad"];
+
+/// The vehicle's state after each frame in a `.tlog` that tells of it, and once before the first.
+fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
+    let mut frames = TlogReader::new(std::fs::File::open(tlog).unwrap());
+    let mut told = Told::default();
+    let mut states = Vec::new();
+    loop {
+        let told_now = told.record(0.0);
+        states.push([
+            told_now.phase.map(f64::from),
+            told_now.altitude_m,
+            told_now.x_m,
+            told_now.pitch_rad,
+            told_now.u_m_s,
+            told_now.w_m_s,
+            told_now.q_rad_s,
+            told_now.gimbal_measured_rad,
+        ]);
+        let mut heard = std::iter::from_fn(|| frames.next_frame().unwrap()).filter_map(|frame| {
+            let mut framer = Framer::new();
+            framer.push_datagram(&frame.bytes);
+            framer.next_frame()
+        });
+        if !heard.any(|frame| frame.source() == VEHICLE && told.hear(&frame.decode().unwrap())) {
+            return states;
+        }
+    }
 }
 
-/// What `replay` makes of a station's `.tlog` is what the station recorded itself: of the vehicle's state, which rolls as it
-/// falls, each value that the station recorded is a value of the same moment there.
+/// What the station recorded, and what `replay` makes of its `.tlog`, is the vehicle's state after one of the frames that the
+/// station received, and the later record after the later frame. The vehicle rolls as it falls.
 fn its_tlog_tells_the_same(folder: &Path) {
     replay(folder, &["export", "ground.tlog", "--to", "csv", "--output", "tlog"]);
-    let of = |log: &str, name: &str| over_time(&folder.join(log).join("telemetry.csv"), name);
-    // How near a value is the same, and how far one may be that only the station's moment has, between two of the other's.
-    for (name, near, between) in [
-        ("phase", 0.0, 0.0),
-        ("altitude_m", 0.01, 1.0),
-        ("x_m", 0.01, 0.5),
-        ("pitch_rad", 0.001, 0.05),
-        ("u_m_s", 0.01, 1.0),
-        ("w_m_s", 0.01, 1.0),
-        ("q_rad_s", 0.001, 0.5),
-        ("gimbal_measured_rad", 0.001, 0.1),
-    ] {
-        let (recorded, made) = (of("ground", name), of("tlog", name));
-        assert!(recorded.len() > 100, "{name}: {}", recorded.len());
-        let mut equal = 0;
-        for (time_s, value) in &recorded {
-            // Both record ten times a second, and not in the same moments, on a busy machine by half a second apart; when
-            // nothing is heard, only the station does.
-            let same_moment =
-                made.iter().filter(|(at_s, _)| (at_s - time_s).abs() < 0.6).map(|(_, other)| *other);
-            let values: Vec<f64> = same_moment.collect();
-            let (least, most) =
-                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), other| {
-                    (least.min(*other), most.max(*other))
-                });
-            let within = values.is_empty() || (least - between..=most + between).contains(value);
-            assert!(within, "{name}: {value} at {time_s:.3}, and {values:?} in the .tlog");
-            equal += usize::from(values.iter().any(|other| (other - value).abs() <= near));
+    let told = told_by_each_frame(&folder.join("ground.tlog"));
+    for log in ["ground", "tlog"] {
+        let table = folder.join(log).join("telemetry.csv");
+        let columns = STATE.map(|name| column(&table, name));
+        let rows = columns[0].len();
+        assert!(rows > 100, "{log}: {rows}");
+        let mut first = 0;
+        for row in 0..rows {
+            let recorded = columns.each_ref().map(|column| column[row].parse::<f64>().ok());
+            let after = told[first..].iter().position(|state| *state == recorded);
+            // Several records may follow one frame.
+            first += after.unwrap_or_else(|| panic!("{log}, row {row}: {recorded:?} was told by no frame"));
         }
-        assert!(equal * 10 >= recorded.len() * 9, "{name}: {equal} of {} are equal", recorded.len());
     }
 }
