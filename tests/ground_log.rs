@@ -98,7 +98,7 @@ const STATE: [&str; 8] =
 
 /// The vehicle's state after each frame in a `.tlog` that tells of it, and once before the first.
 fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
-    let mut frames = TlogReader::new(std::fs::File::open(tlog).unwrap());
+    let mut frames = TlogReader::new(std::fs::File::open(tlog).expect("the station has written it"));
     let mut told = Told::default();
     let mut states = Vec::new();
     loop {
@@ -113,12 +113,15 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
             told_now.q_rad_s,
             told_now.gimbal_measured_rad,
         ]);
-        let mut heard = std::iter::from_fn(|| frames.next_frame().unwrap()).filter_map(|frame| {
-            let mut framer = Framer::new();
-            framer.push_datagram(&frame.bytes);
-            framer.next_frame()
-        });
-        if !heard.any(|frame| frame.source() == VEHICLE && told.hear(&frame.decode().unwrap())) {
+        let mut heard =
+            std::iter::from_fn(|| frames.next_frame().expect("a file can be read")).filter_map(|frame| {
+                let mut framer = Framer::new();
+                framer.push_datagram(&frame.bytes);
+                framer.next_frame()
+            });
+        if !heard.any(|frame| {
+            frame.source() == VEHICLE && told.hear(&frame.decode().expect("the vehicle is of this release"))
+        }) {
             return states;
         }
     }
