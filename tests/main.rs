@@ -3,9 +3,9 @@
 mod abort;
 mod architecture;
 mod board;
+mod crew;
 mod demo;
 mod download;
-mod engineer;
 mod first_flight;
 mod ground_log;
 mod hold;
@@ -16,6 +16,7 @@ mod meant;
 mod outside_clients;
 mod pad_check;
 mod pages;
+mod pages_run;
 mod rocket;
 mod signed;
 mod terminal;
