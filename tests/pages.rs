@@ -1,5 +1,6 @@
-//! No page shows a command that its program would refuse: every line of ours in a block of code is given to the program,
-//! with `--help` at its end, so that it is read and not run. And a figure that stands on two pages is the same on both.
+//! No page shows a command that its program would refuse: every command of ours, in a block of code or in a sentence, is given
+//! to the program with `--help` at its end, so that it is read and not run ([`crate::pages_run`] runs those in blocks). And a
+//! figure that stands on two pages is the same on both.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,6 +42,14 @@ pub(crate) fn lines_of_code(page: &str) -> Vec<String> {
     lines
 }
 
+/// What a page's sentences have in backticks.
+fn code_in_sentences(page: &str) -> Vec<String> {
+    let outside = page.split("```").step_by(2);
+    let spans = outside.flat_map(|text| text.split('`').skip(1).step_by(2));
+    // `onboard-sim …` on a page stands for all commands.
+    spans.filter(|span| !span.contains('…')).map(|span| span.replace('\n', " ")).collect()
+}
+
 /// The commands of a line: several after a semicolon or `&&`, one after a pipe, one in the quotes of `sbatch`.
 pub(crate) fn commands_of(line: &str) -> Vec<(Program, Vec<String>)> {
     let parts = line.split([';', '|', '\'']).flat_map(|part| part.split("&&"));
@@ -71,7 +80,7 @@ fn every_command_on_a_page_is_understood_by_its_program() {
     let (mut commands, mut refused) = (0, Vec::new());
     for page in found {
         let text = fs::read_to_string(&page).expect("a page");
-        for line in lines_of_code(&text) {
+        for line in lines_of_code(&text).into_iter().chain(code_in_sentences(&text)) {
             for (which, words) in commands_of(&line) {
                 commands += 1;
                 let answer = Running::to_end(program(which).args(&words).arg("--help"));
@@ -81,7 +90,7 @@ fn every_command_on_a_page_is_understood_by_its_program() {
             }
         }
     }
-    assert!(commands > 40, "only {commands} commands were found");
+    assert!(commands > 120, "only {commands} commands were found");
     assert!(refused.is_empty(), "{}", refused.join("\n"));
 }
 
