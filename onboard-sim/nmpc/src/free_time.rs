@@ -95,6 +95,11 @@ impl FreeTimeWorkspace {
         self.inner.allow(passes);
     }
 
+    /// Passes made since then.
+    pub fn passes(&self) -> usize {
+        self.inner.passes()
+    }
+
     /// Whether nothing is left of what was allowed.
     pub fn is_spent(&self) -> bool {
         self.inner.is_spent()

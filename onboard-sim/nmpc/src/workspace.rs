@@ -70,6 +70,10 @@ impl Workspace {
         self.solver.allow(passes);
     }
 
+    pub(crate) fn passes(&self) -> usize {
+        self.solver.passes()
+    }
+
     pub(crate) fn is_spent(&self) -> bool {
         self.solver.is_spent()
     }

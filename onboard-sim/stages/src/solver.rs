@@ -249,21 +249,22 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
 // How much a workspace may still work: a bound on the time of several solves together that no clock decides.
 
-/// Passes that are left. A pass is one interval evaluated with its derivatives, or eliminated by a backward sweep: nearly all
+/// Passes made and allowed. A pass is one interval evaluated with its derivatives, or eliminated by a backward sweep: nearly all
 /// of a solve's time is in these two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Allowance {
+    made: usize,
     /// `None` without a bound.
-    left: Option<usize>,
+    most: Option<usize>,
 }
 
 impl Allowance {
     pub(crate) fn spend(&mut self, passes: usize) {
-        self.left = self.left.map(|left| left.saturating_sub(passes));
+        self.made += passes;
     }
 
     pub(crate) fn is_spent(&self) -> bool {
-        self.left == Some(0)
+        self.most.is_some_and(|most| self.made >= most)
     }
 }
 
@@ -272,7 +273,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// eliminated by a backward sweep. An iteration that has begun is finished. A solve without passes ends
     /// at its iteration limit: cold with its first guess, warm with the start's inputs.
     pub fn allow(&mut self, passes: Option<usize>) {
-        self.allowance = Allowance { left: passes };
+        self.allowance = Allowance { made: 0, most: passes };
+    }
+
+    /// Passes made since [`allow`](Self::allow).
+    pub fn passes(&self) -> usize {
+        self.allowance.made
     }
 
     /// Whether nothing is left of what was allowed.

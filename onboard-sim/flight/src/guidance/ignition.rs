@@ -72,10 +72,11 @@ impl IgnitionSettings {
         vertical_m_s: f64,
         fin_drag_area_m2: f64,
     ) -> bool {
+        let Some(landings) = column.landings(&Burn::nominal(curve), 0.0) else { return false };
         (1..=AHEAD_STEPS).any(|step| {
             let after_s = self.delay_s + AHEAD_S * f64::from(step);
             let (onset_m, onset_m_s) = column.fallen(height_m, vertical_m_s, fin_drag_area_m2, after_s);
-            column.band(&Burn::nominal(curve), 0.0, onset_m_s).is_some_and(|band| onset_m >= band.low_m)
+            landings.band(onset_m_s).is_some_and(|band| onset_m >= band.low_m)
         })
     }
 

@@ -13,6 +13,8 @@
 //! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
 //! burn and the tilt late in it.
 
+use core::array::from_fn;
+
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use serde::Serialize;
@@ -93,20 +95,16 @@ impl Column {
     /// Heights from which a landing exists for a motor that has burnt for `burning_s` (0 for an ignition now) and a
     /// vertical velocity of `vertical_m_s` (up positive); `None` if there is no landing.
     pub fn band(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> Option<Band> {
+        self.landings(burn, burning_s)?.band(vertical_m_s)
+    }
+
+    /// The landings on a motor that has burnt for `burning_s`, at any velocity; `None` if the thrust never carries the
+    /// vehicle.
+    pub fn landings(&self, burn: &Burn<'_>, burning_s: f64) -> Option<Landings> {
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2)?;
         let soonest_s = carried_until_s.max(burning_s + 0.02);
-        let mut band: Option<Band> = None;
-        for i in 0..END_TIMES {
-            let end_s = soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64;
-            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
-            for height_m in fall.heights_m().into_iter().flatten() {
-                band = Some(band.map_or(Band { low_m: height_m, high_m: height_m }, |band| Band {
-                    low_m: band.low_m.min(height_m),
-                    high_m: band.high_m.max(height_m),
-                }));
-            }
-        }
-        band
+        let ends_s = from_fn(|i| soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64);
+        Some(Landings(Falls::new(self, burn, burning_s, ends_s)))
     }
 
     /// Height, m, and vertical velocity, m/s, after falling without thrust for a time.
@@ -160,8 +158,8 @@ impl Column {
         }
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
-            let fall = Fall::new(self, burn, burning_s, end_s, vertical_m_s);
-            fall.softest_m_s() > self.touchdown_m_s
+            let [softest] = Falls::new(self, burn, burning_s, [end_s]).along(Way::Even, vertical_m_s, [1.0]);
+            softest.vertical_m_s > self.touchdown_m_s
         })
     }
 
@@ -243,14 +241,6 @@ impl Share {
             + column.crossflow_area_m2 * sin * sin * sin;
         Self { thrust: cos, drag_per_v2: 0.5 * column.air_density_kg_m3 * area_m2 }
     }
-
-    /// A mixture of two ways of braking.
-    fn mixed(&self, share: f64, other: &Self) -> Self {
-        Self {
-            thrust: share * self.thrust + (1.0 - share) * other.thrust,
-            drag_per_v2: share * self.drag_per_v2 + (1.0 - share) * other.drag_per_v2,
-        }
-    }
 }
 
 /// A family of ways to brake, with one parameter between 0 (all hard) and 1 (all soft).
@@ -264,6 +254,19 @@ enum Way {
     Even,
 }
 
+impl Way {
+    /// The fraction of soft braking in interval `k`, before it is limited to 0 to 1: the first number times the parameter,
+    /// plus the second times `k`, plus the third.
+    fn softly(self) -> (f64, f64, f64) {
+        const ALL: f64 = INTERVALS as f64;
+        match self {
+            Self::SoftFirst => (ALL, -1.0, 0.0),
+            Self::HardFirst => (ALL, 1.0, 1.0 - ALL),
+            Self::Even => (1.0, 0.0, 0.0),
+        }
+    }
+}
+
 /// How a fall ends.
 #[derive(Clone, Copy)]
 struct Ended {
@@ -272,36 +275,60 @@ struct Ended {
     highest_m_s: f64,
 }
 
-/// The rest of the burn until a given end, in equal intervals.
-struct Fall {
-    step_s: f64,
+/// The landings on one motor from now on, at any velocity.
+pub struct Landings(Falls<END_TIMES>);
+
+impl Landings {
+    /// Heights from which a landing exists at a vertical velocity (up positive); `None` if there is no landing.
+    pub fn band(&self, vertical_m_s: f64) -> Option<Band> {
+        let heights_m = self.0.heights_m(vertical_m_s);
+        heights_m.iter().flatten().flatten().fold(None, |band: Option<Band>, &height_m| {
+            Some(band.map_or(Band { low_m: height_m, high_m: height_m }, |band| Band {
+                low_m: band.low_m.min(height_m),
+                high_m: band.high_m.max(height_m),
+            }))
+        })
+    }
+}
+
+/// The rest of the burn until `N` given ends, each in equal intervals. A step of a fall waits for the one before it, so the
+/// falls to all ends are computed side by side, in vectors.
+struct Falls<const N: usize> {
+    step_s: [f64; N],
     gravity_m_s2: f64,
-    vertical_m_s: f64,
     touchdown_m_s: f64,
     soft: Share,
     hard: Share,
     upright: Share,
-    /// Thrust over mass, m/s^2, one over the mass, 1/kg, and the fraction of the interval in which the vehicle may
-    /// lean.
-    ahead: [(f64, f64, f64); INTERVALS],
+    ahead: [Ahead<N>; INTERVALS],
 }
 
-impl Fall {
-    /// A fall from `from_s` to `to_s` of the burn that begins with a vertical velocity, m/s.
-    fn new(column: &Column, burn: &Burn<'_>, from_s: f64, to_s: f64, vertical_m_s: f64) -> Self {
-        let step_s = (to_s - from_s) / INTERVALS as f64;
-        let settled = column.settle_s / step_s;
-        let ahead = core::array::from_fn(|k| {
-            let at_s = from_s + k as f64 * step_s;
-            let per_kg = 1.0 / (column.mass_at_ignition_kg - burn.burnt_kg(at_s + 0.5 * step_s));
-            // The vehicle is upright once it settles.
-            let leaning = ((INTERVALS - k) as f64 - settled).clamp(0.0, 1.0);
-            (burn.mean_thrust_n(at_s, step_s) * per_kg, per_kg, leaning)
+/// An interval of each fall: thrust over mass, m/s^2, one over the mass, 1/kg, and the fraction in which the vehicle may lean.
+struct Ahead<const N: usize> {
+    thrust_m_s2: [f64; N],
+    per_kg: [f64; N],
+    leaning: [f64; N],
+}
+
+impl<const N: usize> Falls<N> {
+    /// Falls from `from_s` to `ends_s` of the burn.
+    fn new(column: &Column, burn: &Burn<'_>, from_s: f64, ends_s: [f64; N]) -> Self {
+        let step_s = ends_s.map(|to_s| (to_s - from_s) / INTERVALS as f64);
+        let ahead = from_fn(|k| {
+            let at_s = step_s.map(|step_s| from_s + k as f64 * step_s);
+            let middle_s: [f64; N] = from_fn(|i| at_s[i] + 0.5 * step_s[i]);
+            let per_kg = middle_s.map(|at_s| 1.0 / (column.mass_at_ignition_kg - burn.burnt_kg(at_s)));
+            Ahead {
+                thrust_m_s2: from_fn(|i| burn.mean_thrust_n(at_s[i], step_s[i]) * per_kg[i]),
+                per_kg,
+                // The vehicle is upright once it settles.
+                leaning: step_s
+                    .map(|step_s| ((INTERVALS - k) as f64 - column.settle_s / step_s).clamp(0.0, 1.0)),
+            }
         });
         Self {
             step_s,
             gravity_m_s2: column.gravity_m_s2,
-            vertical_m_s,
             touchdown_m_s: column.touchdown_m_s,
             soft: Share::new(column, &column.soft),
             hard: Share::new(column, &column.hard),
@@ -310,69 +337,87 @@ impl Fall {
         }
     }
 
-    /// Vertical velocity at the end with the softest braking, m/s.
-    fn softest_m_s(&self) -> f64 {
-        self.along(Way::Even, 1.0).vertical_m_s
-    }
-
-    /// The heights from which landings begin, one for each way of braking that reaches the touchdown speed without
-    /// rising before.
-    fn heights_m(&self) -> [Option<f64>; 3] {
+    /// The heights from which landings to each end begin, one for each way of braking that reaches the touchdown speed
+    /// without rising before.
+    fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; 3] {
         // All ways have the same two extremes.
-        let ends = [self.along(Way::Even, 0.0), self.along(Way::Even, 1.0)];
-        [Way::SoftFirst, Way::HardFirst, Way::Even].map(|way| self.height_m(way, ends))
+        let extremes = [0.0, 1.0].map(|parameter| self.along(Way::Even, vertical_m_s, [parameter; N]));
+        [Way::SoftFirst, Way::HardFirst, Way::Even].map(|way| self.heights_of_m(way, vertical_m_s, &extremes))
     }
 
-    /// Finds the parameter that gives the touchdown speed, by false position. The value of an end that stays twice is
-    /// halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
-    fn height_m(&self, way: Way, ends: [Ended; 2]) -> Option<f64> {
-        let missed = |ended: &Ended| ended.vertical_m_s - self.touchdown_m_s;
-        let [mut one, mut other] = [(0.0, missed(&ends[0])), (1.0, missed(&ends[1]))];
-        if one.1 * other.1 > 0.0 {
-            return None;
-        }
+    /// Finds for each end the parameter that gives the touchdown speed, by false position. The value of an end that stays
+    /// twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
+    fn heights_of_m(&self, way: Way, vertical_m_s: f64, extremes: &[[Ended; N]; 2]) -> [Option<f64>; N] {
+        let missed_m_s = |ended: &Ended| ended.vertical_m_s - self.touchdown_m_s;
+        let mut heights_m = [None; N];
+        let mut one: [_; N] = from_fn(|i| (0.0, missed_m_s(&extremes[0][i])));
+        // `other` is the newest point.
+        let mut other: [_; N] = from_fn(|i| (1.0, missed_m_s(&extremes[1][i])));
+        let mut sought: [bool; N] = from_fn(|i| one[i].1 * other[i].1 <= 0.0);
         for _ in 0..MOST_FALLS {
-            let span_m_s = other.1 - one.1;
-            let parameter =
-                if span_m_s.abs() > 0.0 { one.0 - one.1 * (other.0 - one.0) / span_m_s } else { other.0 };
-            let ended = self.along(way, parameter);
-            let miss_m_s = missed(&ended);
-            if miss_m_s.abs() < MET_M_S {
-                return (ended.highest_m_s <= RISING_M_S).then_some(ended.fallen_m);
+            if !sought.contains(&true) {
+                break;
             }
-            // `other` is the newest point.
-            if miss_m_s * other.1 < 0.0 {
-                one = other;
-            } else {
-                one.1 *= 0.5;
+            let parameters: [f64; N] = from_fn(|i| {
+                let span_m_s = other[i].1 - one[i].1;
+                if span_m_s.abs() > 0.0 {
+                    one[i].0 - one[i].1 * (other[i].0 - one[i].0) / span_m_s
+                } else {
+                    other[i].0
+                }
+            });
+            let ended = self.along(way, vertical_m_s, parameters);
+            for i in 0..N {
+                if !sought[i] {
+                    continue;
+                }
+                let miss_m_s = missed_m_s(&ended[i]);
+                if miss_m_s.abs() < MET_M_S {
+                    sought[i] = false;
+                    heights_m[i] = (ended[i].highest_m_s <= RISING_M_S).then_some(ended[i].fallen_m);
+                } else if miss_m_s * other[i].1 < 0.0 {
+                    one[i] = other[i];
+                } else {
+                    one[i].1 *= 0.5;
+                }
+                other[i] = (parameters[i], miss_m_s);
             }
-            other = (parameter, miss_m_s);
         }
-        None
+        heights_m
     }
 
-    fn along(&self, way: Way, parameter: f64) -> Ended {
-        let step_s = self.step_s;
-        let soft_intervals = parameter * INTERVALS as f64;
-        let mut end =
-            Ended { fallen_m: 0.0, vertical_m_s: self.vertical_m_s, highest_m_s: f64::NEG_INFINITY };
-        for (k, (thrust_m_s2, per_kg, leaning)) in self.ahead.iter().enumerate() {
-            let softly = match way {
-                Way::SoftFirst => (soft_intervals - k as f64).clamp(0.0, 1.0),
-                Way::HardFirst => (soft_intervals - (INTERVALS - 1 - k) as f64).clamp(0.0, 1.0),
-                Way::Even => parameter,
+    /// The falls from a vertical velocity, each with its parameter of a way.
+    fn along(&self, way: Way, vertical_m_s: f64, parameters: [f64; N]) -> [Ended; N] {
+        // Every line is one operation on all falls, which the compiler makes one on vectors.
+        let mixed = |share: &[f64; N], one: [f64; N], other: f64| -> [f64; N] {
+            from_fn(|i| share[i] * one[i] + (1.0 - share[i]) * other)
+        };
+        let (per_parameter, per_interval, at_first) = way.softly();
+        let mut fallen_m = [0.0; N];
+        let mut speeds_m_s = [vertical_m_s; N];
+        let mut highest_m_s = [f64::NEG_INFINITY; N];
+        for (k, Ahead { thrust_m_s2, per_kg, leaning }) in self.ahead.iter().enumerate() {
+            let before = per_interval * k as f64 + at_first;
+            let softly = parameters.map(|parameter| (parameter * per_parameter + before).clamp(0.0, 1.0));
+            let thrust = mixed(&softly, [self.soft.thrust; N], self.hard.thrust);
+            let drag_per_v2 = mixed(&softly, [self.soft.drag_per_v2; N], self.hard.drag_per_v2);
+            let thrust = mixed(leaning, thrust, self.upright.thrust);
+            let drag_per_v2 = mixed(leaning, drag_per_v2, self.upright.drag_per_v2);
+            let pushed_m_s2: [f64; N] = from_fn(|i| thrust_m_s2[i] * thrust[i] - self.gravity_m_s2);
+            let drag_per_m: [f64; N] = from_fn(|i| drag_per_v2[i] * per_kg[i]);
+            let acceleration = |speeds_m_s: &[f64; N]| -> [f64; N] {
+                from_fn(|i| pushed_m_s2[i] - drag_per_m[i] * speeds_m_s[i] * speeds_m_s[i].abs())
             };
-            let braking = self.soft.mixed(softly, &self.hard).mixed(*leaning, &self.upright);
-            let pushed_m_s2 = thrust_m_s2 * braking.thrust - self.gravity_m_s2;
-            let drag_per_m = braking.drag_per_v2 * per_kg;
-            let acceleration = |speed_m_s: f64| pushed_m_s2 - drag_per_m * speed_m_s * speed_m_s.abs();
             // Midpoint rule.
-            let midway_m_s = end.vertical_m_s + 0.5 * step_s * acceleration(end.vertical_m_s);
-            end.fallen_m -= step_s * midway_m_s;
-            end.vertical_m_s += step_s * acceleration(midway_m_s);
-            end.highest_m_s = end.highest_m_s.max(end.vertical_m_s);
+            let begins_m_s2 = acceleration(&speeds_m_s);
+            let midway_m_s = from_fn(|i| speeds_m_s[i] + 0.5 * self.step_s[i] * begins_m_s2[i]);
+            let midway_m_s2 = acceleration(&midway_m_s);
+            fallen_m = from_fn(|i| fallen_m[i] - self.step_s[i] * midway_m_s[i]);
+            speeds_m_s = from_fn(|i| speeds_m_s[i] + self.step_s[i] * midway_m_s2[i]);
+            let higher = |one: f64, other: f64| if one > other { one } else { other };
+            highest_m_s = from_fn(|i| higher(highest_m_s[i], speeds_m_s[i]));
         }
-        end
+        from_fn(|i| Ended { fallen_m: fallen_m[i], vertical_m_s: speeds_m_s[i], highest_m_s: highest_m_s[i] })
     }
 }
 
@@ -435,9 +480,9 @@ mod tests {
         let burn = Burn::nominal(&curve);
         let band = column.band(&burn, 1.0, -25.0).expect("a landing exists");
         let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("the thrust carries the vehicle");
-        let fall = Fall::new(&column, &burn, 1.0, end_s, -25.0);
+        let falls = Falls::new(&column, &burn, 1.0, [end_s]);
         let mut found = 0;
-        for height_m in fall.heights_m().into_iter().flatten() {
+        for height_m in falls.heights_m(-25.0).into_iter().flatten().flatten() {
             assert!(band.contains(height_m), "{height_m} in {band:?}");
             found += 1;
         }

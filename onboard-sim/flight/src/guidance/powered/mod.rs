@@ -282,6 +282,7 @@ impl PoweredGuidance {
             level,
             status: solution.status,
             iterations: solution.iterations,
+            passes: self.workspace.passes(),
             kkt_stationarity: solution.kkt_stationarity,
             kkt_feasibility: solution.kkt_feasibility,
             cost: solution.cost,

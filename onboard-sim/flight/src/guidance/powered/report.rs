@@ -86,6 +86,8 @@ pub struct PoweredReport {
     pub status: SolveStatus,
     /// Iterations over all final times tried.
     pub iterations: usize,
+    /// Work of the tick: the solver's passes over an interval, as in [`PoweredSettings::max_passes`].
+    pub passes: usize,
     /// Residuals of the optimality conditions.
     pub kkt_stationarity: f64,
     /// Largest defect or complementarity.
@@ -109,6 +111,7 @@ impl PoweredReport {
             level: ControlLevel::Idle,
             status: SolveStatus::NotRun,
             iterations: 0,
+            passes: 0,
             kkt_stationarity: 0.0,
             kkt_feasibility: 0.0,
             cost: 0.0,

@@ -99,6 +99,7 @@ impl SpaceGuidance {
             level,
             status: status(outcome.status),
             iterations: outcome.iterations,
+            passes: self.workspace.passes(),
             kkt_stationarity: outcome.stationarity,
             kkt_feasibility: outcome.feasibility,
             cost: outcome.cost,
