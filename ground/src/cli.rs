@@ -37,7 +37,7 @@ pub struct Cli {
     #[command(flatten)]
     pub station: StationArgs,
 
-    /// Show a recorded flight (MCAP; .tlog if the name ends so) on the same screens instead; `last` is the newest
+    /// Show a recorded flight (MCAP or .tlog) on the same screens instead; `last` is the newest
     /// touchdown-*.mcap in the current directory.
     #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
     pub replay: Option<PathBuf>,

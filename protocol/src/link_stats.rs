@@ -14,7 +14,7 @@ pub const WINDOW: Duration = Duration::from_secs(10);
 const REORDER_WINDOW: u8 = 32;
 /// At most this many sources are remembered, so that a flood of forged ids cannot fill the memory.
 const MAX_SOURCES: usize = 64;
-/// At most this many messages have their age remembered.
+/// At most this many messages have their age and rate remembered.
 const MAX_MESSAGES: usize = 256;
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -85,6 +85,14 @@ struct SourceStats {
     counts: FrameCounts,
 }
 
+/// One message of one component.
+#[derive(Debug, Clone)]
+struct MessageStats {
+    first_seen: Duration,
+    last_seen: Duration,
+    buckets: Buckets,
+}
+
 /// How many frames of a component arrived, and how many were lost, since it was first heard.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FrameCounts {
@@ -96,7 +104,7 @@ pub struct FrameCounts {
 #[derive(Debug, Default)]
 pub struct LinkStats {
     sources: BTreeMap<Address, SourceStats>,
-    messages: BTreeMap<(Address, u32), Duration>,
+    messages: BTreeMap<(Address, u32), MessageStats>,
     buckets: Buckets,
     first_activity: Option<Duration>,
 }
@@ -109,6 +117,16 @@ pub struct LinkFigures {
     pub rx_frames_s: f64,
     /// Share of frames that were lost, 0 to 1, from the gaps in the sequence numbers.
     pub loss: f64,
+}
+
+/// When a message of a component came last, and how often it comes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MessageFigures {
+    pub source: Address,
+    pub message_id: u32,
+    /// Time since the last one.
+    pub age: Duration,
+    pub rx_frames_s: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -164,7 +182,10 @@ impl LinkStats {
         }
         let message = (address, frame.message_id());
         if self.messages.len() < MAX_MESSAGES || self.messages.contains_key(&message) {
-            self.messages.insert(message, now);
+            let new = MessageStats { first_seen: now, last_seen: now, buckets: Buckets::default() };
+            let message = self.messages.entry(message).or_insert(new);
+            message.last_seen = now;
+            message.buckets.on_frame(0, false, now);
         }
         self.first_activity.get_or_insert(now);
         self.buckets.on_frame(lost, late, now);
@@ -180,9 +201,14 @@ impl LinkStats {
         self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
     }
 
-    /// Returns the source, the message id and the time since the last frame of every message that was heard.
-    pub fn messages(&self, now: Duration) -> impl Iterator<Item = (Address, u32, Duration)> {
-        self.messages.iter().map(move |((source, id), at)| (*source, *id, now.saturating_sub(*at)))
+    /// Returns the age and the rate of every message that was heard.
+    pub fn messages(&self, now: Duration) -> impl Iterator<Item = MessageFigures> {
+        self.messages.iter().map(move |((source, message_id), message)| MessageFigures {
+            source: *source,
+            message_id: *message_id,
+            age: now.saturating_sub(message.last_seen),
+            rx_frames_s: message.buckets.sum(now).received as f64 / span_s(message.first_seen, now),
+        })
     }
 
     /// Returns the rate and the loss of every component that was heard.

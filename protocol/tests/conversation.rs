@@ -162,7 +162,7 @@ fn loss_and_rate_are_those_of_the_last_ten_seconds() {
 }
 
 #[test]
-fn each_component_has_its_own_loss_and_each_message_its_age() {
+fn each_component_has_its_own_loss_and_each_message_its_age_and_rate() {
     let mut stats = LinkStats::new();
     let (vehicle, ground) =
         (heartbeats(&mut Encoder::new(VEHICLE), 100), heartbeats(&mut Encoder::new(GROUND), 100));
@@ -178,7 +178,13 @@ fn each_component_has_its_own_loss_and_each_message_its_age() {
     assert!((sources[0].loss - 0.25).abs() < 0.02 && sources[1].loss.abs() < f64::EPSILON, "{sources:?}");
     assert!((sources[1].rx_frames_s - 10.0).abs() < 0.5, "{sources:?}");
     let messages: Vec<_> = stats.messages(ms(10_900)).collect();
-    assert!(messages.contains(&(VEHICLE, 0, ms(1_000))) && messages.len() == 2, "{messages:?}");
+    assert_eq!(messages.iter().map(|figures| figures.source).collect::<Vec<_>>(), [VEHICLE, GROUND]);
+    let ages: Vec<_> = messages.iter().map(|figures| (figures.message_id, figures.age)).collect();
+    assert_eq!(ages, [(0, ms(1_000)); 2]);
+    // Nine seconds of the last ten: three of four, and all.
+    for (figures, sent) in messages.iter().zip([67.5, 90.0]) {
+        assert!((figures.rx_frames_s - sent / 9.9).abs() < 0.3, "{figures:?}");
+    }
 }
 
 #[test]

@@ -147,7 +147,14 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
     let mut actions = match msg {
         Msg::Key(key) => player.on_key(*key),
         Msg::Keys(keys) => {
-            keys.iter().filter(|key| key.scrolls()).flat_map(|key| player.on_key(*key)).collect()
+            let mut actions = Vec::new();
+            for key in keys {
+                // What is typed as a text may come faster.
+                if key.scrolls() || player.model.pages.entry.is_some() {
+                    actions.extend(player.on_key(*key));
+                }
+            }
+            actions
         }
         _ => Vec::new(),
     };

@@ -139,6 +139,12 @@ pub struct Pages {
 pub enum TextEntry {
     /// The filter of the shown list.
     Filter,
+    /// A time or a phase to jump to in a replay.
+    Jump {
+        typed: String,
+        /// The recording has no such time or phase.
+        refused: bool,
+    },
     Palette {
         typed: String,
         /// The place of the marked entry among those found.

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
-use std::io::{BufReader, Read, Seek as _};
+use std::io::{BufReader, Seek as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
-use protocol::log::tlog::frame_length;
+use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 
@@ -47,7 +47,6 @@ pub struct Progress {
 /// A recorded flight.
 #[derive(Debug)]
 pub struct Recording {
-    path: PathBuf,
     /// Kept open, because the file may be renamed while it is played.
     file: File,
     side: Side,
@@ -63,8 +62,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a log once for the flight of this vehicle (`None`: the first that was heard). A name that ends in
-    /// `.tlog` is read as such, everything else as MCAP.
+    /// Reads a log once for the flight of this vehicle (`None`: the first that was heard). What has the
+    /// content of a `.tlog` is read as such, everything else as MCAP.
     ///
     /// # Errors
     /// The file cannot be read, or holds nothing to show.
@@ -76,7 +75,7 @@ impl Recording {
         let read = |source| RecordingError::Read { path: path.to_owned(), source };
         let file = File::open(path).map_err(read)?;
         let total = file.metadata().map_err(read)?.len();
-        let mut events = LogEvents::begin(&file, path, vehicle).map_err(read)?;
+        let mut events = LogEvents::begin(&file, vehicle).map_err(read)?;
         // What the ground received; if that is missing, what the vehicle sent.
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
         let mut told = 0;
@@ -96,7 +95,6 @@ impl Recording {
             return Err(RecordingError::Empty { path: path.to_owned() });
         };
         Ok(Self {
-            path: path.to_owned(),
             damage: events.damage(),
             vehicle: events.vehicle(),
             file,
@@ -122,7 +120,7 @@ impl Recording {
     /// # Errors
     /// The file can no longer be read.
     pub fn reader(&self) -> io::Result<Reader> {
-        let events = LogEvents::begin(&self.file, &self.path, self.vehicle)?;
+        let events = LogEvents::begin(&self.file, self.vehicle)?;
         Ok(Reader { events, side: self.side, clock: RecordingClock::default(), left: self.events })
     }
 }
@@ -212,10 +210,6 @@ fn phase_of(frame: &Frame) -> Option<TdPhase> {
 
 /// The size of the read buffer: some thousand frames.
 const BUFFER_BYTES: usize = 256 * 1024;
-/// Bytes of a time stamp in a `.tlog`, and of the start of a frame that contains its length.
-const TLOG_TIME_BYTES: usize = 8;
-const LENGTH_BYTES: usize = 3;
-
 /// An event of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RecordedEvent {
@@ -267,20 +261,21 @@ impl Sides {
 
 enum Format {
     Mcap { reader: Box<LogReader<BufReader<File>>>, waiting: VecDeque<Stamped> },
-    Tlog { file: BufReader<File>, damage: Option<String> },
+    Tlog(TlogReader<File>),
 }
 
 impl LogEvents {
-    /// Starts at the beginning of an open file, for this vehicle or the first that is heard. A name that ends in
+    /// Starts at the beginning of an open file, for this vehicle or the first that is heard. What has the content of a
     /// `.tlog` is read as such, everything else as MCAP.
-    pub(super) fn begin(file: &File, path: &Path, vehicle: Option<Address>) -> io::Result<Self> {
+    pub(super) fn begin(file: &File, vehicle: Option<Address>) -> io::Result<Self> {
         let mut file = file.try_clone()?;
         file.rewind()?;
-        let file = BufReader::with_capacity(BUFFER_BYTES, file);
-        let is_tlog = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tlog"));
+        let is_tlog = is_tlog(&file)?;
+        file.rewind()?;
         let format = if is_tlog {
-            Format::Tlog { file, damage: None }
+            Format::Tlog(TlogReader::new(file))
         } else {
+            let file = BufReader::with_capacity(BUFFER_BYTES, file);
             Format::Mcap { reader: Box::new(LogReader::new(file)), waiting: VecDeque::new() }
         };
         Ok(Self { format, sides: Sides { vehicle, ground: None }, bytes_read: 0 })
@@ -300,7 +295,10 @@ impl LogEvents {
     pub(super) fn damage(&self) -> Option<String> {
         match &self.format {
             Format::Mcap { reader, .. } => reader.damage().map(ToString::to_string),
-            Format::Tlog { damage, .. } => damage.clone(),
+            Format::Tlog(reader) => {
+                let bytes = reader.garbage_bytes();
+                (bytes > 0).then(|| format!("{bytes} bytes belong to no frame"))
+            }
         }
     }
 
@@ -325,52 +323,17 @@ impl LogEvents {
                     waiting.extend(events.map(|event| Stamped { side, stamp_ns: log_time_ns, event }));
                 }
             },
-            Format::Tlog { file, damage } => loop {
-                match next_of_tlog(file, &mut self.bytes_read)? {
-                    TlogPiece::End => return Ok(None),
-                    TlogPiece::Unreadable { bytes } => {
-                        *damage = Some(format!("unreadable {bytes} bytes before the end"));
-                        return Ok(None);
-                    }
-                    TlogPiece::Frame { stamp_us, bytes } => {
-                        // MAVLink 1 frames and frames with a wrong checksum are skipped.
-                        if let Some(event) = frames(&bytes).pop().and_then(|frame| event(frame, sides)) {
-                            let stamp_ns = stamp_us.saturating_mul(1_000);
-                            return Ok(Some(Stamped { side: Side::Ground, stamp_ns, event }));
-                        }
-                    }
+            Format::Tlog(reader) => loop {
+                let Some(TlogFrame { time_us, bytes }) = reader.next_frame()? else { return Ok(None) };
+                self.bytes_read = reader.bytes_read();
+                // Frames with a wrong checksum are skipped.
+                if let Some(event) = frames(&bytes).pop().and_then(|frame| event(frame, sides)) {
+                    let stamp_ns = time_us.saturating_mul(1_000);
+                    return Ok(Some(Stamped { side: Side::Ground, stamp_ns, event }));
                 }
             },
         }
     }
-}
-
-enum TlogPiece {
-    End,
-    Frame { stamp_us: u64, bytes: Vec<u8> },
-    Unreadable { bytes: u64 },
-}
-
-/// Reads one entry of a `.tlog`: microseconds since the Unix epoch, big-endian, then a frame.
-fn next_of_tlog(file: &mut impl Read, bytes_read: &mut u64) -> io::Result<TlogPiece> {
-    let mut head = Vec::with_capacity(TLOG_TIME_BYTES + LENGTH_BYTES);
-    file.by_ref().take((TLOG_TIME_BYTES + LENGTH_BYTES) as u64).read_to_end(&mut head)?;
-    if head.is_empty() {
-        return Ok(TlogPiece::End);
-    }
-    let stamp_us = head.first_chunk().map(|stamp| u64::from_be_bytes(*stamp));
-    let mut bytes = head.get(TLOG_TIME_BYTES..).unwrap_or_default().to_vec();
-    let length = frame_length(&bytes).filter(|_| bytes.len() == LENGTH_BYTES);
-    if let Some(length) = length {
-        file.by_ref().take(length.saturating_sub(LENGTH_BYTES) as u64).read_to_end(&mut bytes)?;
-    }
-    if let (Some(stamp_us), true) = (stamp_us, length == Some(bytes.len())) {
-        *bytes_read += (TLOG_TIME_BYTES + bytes.len()) as u64;
-        return Ok(TlogPiece::Frame { stamp_us, bytes });
-    }
-    let read = head.len().min(TLOG_TIME_BYTES) + bytes.len();
-    let rest = io::copy(file, &mut io::sink())?;
-    Ok(TlogPiece::Unreadable { bytes: read as u64 + rest })
 }
 
 fn frames(bytes: &[u8]) -> Vec<Frame> {

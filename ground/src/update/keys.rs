@@ -604,7 +604,8 @@ pub(super) fn open_palette(model: &mut Model) {
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
 pub(super) fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
     match model.pages.entry.take() {
-        None => {}
+        // Only a replay asks where to jump, and takes those keys itself.
+        None | Some(TextEntry::Jump { .. }) => {}
         Some(TextEntry::Filter) => on_filter_key(model, key),
         Some(TextEntry::Palette { typed, chosen }) => on_palette_key(model, (typed, chosen), key, now),
     }
@@ -671,7 +672,7 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
     }
 }
 
-fn edit(text: &mut String, key: Key) {
+pub(crate) fn edit(text: &mut String, key: Key) {
     match key {
         Key::Backspace => drop(text.pop()),
         Key::Char(letter) if text.chars().count() < TYPED_MAX => text.push(letter),

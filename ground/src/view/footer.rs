@@ -181,7 +181,7 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let [left, right] = side_by_side(area, [Fill(1), Length(pages.width() as u16)]);
     draw_line(frame, right, pages);
     if let Some(playing) = &model.playing {
-        return draw_line(frame, left, replay_line(playing, theme));
+        return draw_line(frame, left, replay_line(playing, model.pages.entry.as_ref(), theme));
     }
     let keys = &model.settings.keys;
     let rings = model.alarms.unacknowledged() > 0;

@@ -178,7 +178,8 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     }
     lines.extend(top_lines::hands_off(model, theme, now));
     lines.extend(status_lines::next_event_line(model, theme, now));
-    lines.extend(model.playing.as_ref().map(|playing| status_lines::replay_line(playing, theme)));
+    let entry = model.pages.entry.as_ref();
+    lines.extend(model.playing.as_ref().map(|playing| status_lines::replay_line(playing, entry, theme)));
     if model.playing.is_none() {
         lines.extend(status_lines::alarm_text(model, theme, now, usize::from(area.width)));
     }

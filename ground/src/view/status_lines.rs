@@ -6,7 +6,9 @@ use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
 use ratatui::text::{Line, Span};
 
 use super::{STALE_MARK, TextRole, Theme, age_mark, fixed, shortest};
-use crate::model::{Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, Vehicle, latch_cause};
+use crate::model::{
+    Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, TextEntry, Vehicle, latch_cause,
+};
 
 /// How long until the next event is shown large, so that the line needs not say it.
 fn is_large(page: Page, phase: TdPhase) -> bool {
@@ -261,7 +263,11 @@ const KEY_FROM_COLUMNS: usize = 40;
 const TEXT_COLUMNS_MIN: usize = 12;
 
 /// The position of a replay, and its keys.
-pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
+pub fn replay_line(playing: &Playback, entry: Option<&TextEntry>, theme: Theme) -> Line<'static> {
+    if let Some(TextEntry::Jump { typed, refused }) = entry {
+        let words = if *refused { "  not in it" } else { "  seconds, T+12 or a phase" };
+        return Line::from(vec![theme.key(format!(" JUMP TO {typed}_")), theme.label(words)]);
+    }
     let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
     let state = if playing.paused { "PAUSED" } else { "plays" };
     theme.line(

@@ -31,6 +31,8 @@ fn beat(custom_mode: u32) -> HEARTBEAT_DATA {
 }
 
 const S: fn(u64) -> Duration = Duration::from_secs;
+/// When the recordings here begin, us since the Unix epoch.
+const START_US: u64 = 1_760_000_000_000_000;
 
 /// One heartbeat per second for a minute: on the pad, descending from second 20, under thrust from 40, landed at 50.
 static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
@@ -44,7 +46,7 @@ static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
             _ => TdPhase::TD_PHASE_TOUCHDOWN,
         };
         let heartbeat = beat(phase as u32);
-        bytes.extend((1_000_000 * second).to_be_bytes());
+        bytes.extend((START_US + 1_000_000 * second).to_be_bytes());
         bytes.extend(encoder.encode(&MavMessage::HEARTBEAT(heartbeat)).as_bytes());
     }
     let directory = tempfile::tempdir().expect("a directory for the log");
@@ -170,26 +172,65 @@ fn recorded_commands_are_shown() {
     assert_eq!(model.commands.tracks[0].attempts, 1);
 }
 
+fn shown(player: &Player) -> String {
+    drawn(player).backend().to_string()
+}
+
+/// The keys of a text, then Enter.
+fn types(player: &mut Player, text: &str) {
+    for key in text.chars().map(Key::Char).chain([Key::Enter]) {
+        player.on_key(key);
+    }
+}
+
 #[test]
-fn a_tlog_is_played_up_to_its_damage() {
+fn a_typed_time_or_phase_is_jumped_to() {
+    let mut player = player();
+    player.on_key(Key::Char('j'));
+    player.on_key(Key::Char('4'));
+    assert!(shown(&player).contains("JUMP TO 4_"), "{}", shown(&player));
+    types(&mut player, "5.5");
+    assert_eq!(
+        (player.position(), phase(&player)),
+        (Duration::from_millis(45_500), TdPhase::TD_PHASE_POWERED)
+    );
+    // The release is where the fall begins: second 20. No key of the page counts while a time is typed.
+    types(&mut player, "jT+12");
+    assert_eq!((player.position(), player.model.page()), (S(32), Page::Descent));
+    types(&mut player, "jtouchdown");
+    assert_eq!(phase(&player), TdPhase::TD_PHASE_TOUCHDOWN);
+    for typed in ["jsoon", "jBOOST", "jT+BOOST", "j"] {
+        let before = player.position();
+        types(&mut player, typed);
+        assert_eq!(player.position(), before);
+        assert!(shown(&player).contains("not in it"), "{typed}: {}", shown(&player));
+        player.on_key(Key::Escape);
+        assert!(!shown(&player).contains("JUMP TO"), "{typed}");
+    }
+}
+
+#[test]
+fn a_tlog_is_known_by_its_content_and_played_around_its_damage() {
     let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("flight.tlog");
+    let path = directory.path().join("flight.mcap");
     let (mut vehicle, mut ground) = (Encoder::new(VEHICLE), Encoder::new(GROUND));
     let heartbeat = MavMessage::HEARTBEAT(beat(9));
     let mut bytes = Vec::new();
     for (stamp_us, ours) in [(7_000_000_u64, false), (7_400_000, true), (9_000_000, false)] {
         let encoder = if ours { &mut ground } else { &mut vehicle };
-        bytes.extend(stamp_us.to_be_bytes());
+        bytes.extend((START_US + stamp_us).to_be_bytes());
         bytes.extend(encoder.encode(&heartbeat).as_bytes());
+        if bytes.len() < 40 {
+            bytes.extend([1, 2, 3]);
+        }
     }
-    bytes.extend([1, 2, 3]);
     std::fs::write(&path, &bytes).unwrap();
     let recording = load(&path).unwrap();
     let at_400_ms = Duration::from_millis(400);
     let events = events(&recording);
     assert_eq!(events.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [S(0), at_400_ms, S(2)]);
     assert!(matches!(events[1].1, RecordedEvent::Sent(21)), "our own heartbeat: {:?}", events[1]);
-    assert_eq!(recording.damage.as_deref(), Some("unreadable 3 bytes before the end"));
+    assert_eq!(recording.damage.as_deref(), Some("3 bytes belong to no frame"));
     assert_eq!(recording.begin_of(TdPhase::TD_PHASE_POWERED), Some(S(0)));
 }
 
@@ -223,7 +264,7 @@ fn a_long_tlog_is_played_in_bounded_memory() {
     let frames: Vec<_> = (0..=u8::MAX).map(|_| encoder.encode(&MavMessage::HEARTBEAT(beat(9)))).collect();
     let mut bytes = Vec::new();
     for (number, frame) in (0..1_240_000_u64).zip(frames.iter().cycle()) {
-        bytes.extend((1_760_000_000_000_000 + 10_000 * number).to_be_bytes());
+        bytes.extend((START_US + 10_000 * number).to_be_bytes());
         bytes.extend(frame.as_bytes());
     }
     assert!(bytes.len() > 35_000_000, "{}", bytes.len());

@@ -20,6 +20,33 @@ const FRAME_MAX_BYTES: usize = 280;
 /// Times outside the years 2000 to 2100 are treated as garbage.
 const PLAUSIBLE_US: std::ops::Range<u64> = 946_684_800_000_000..4_102_444_800_000_000;
 
+/// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one whose beginning is damaged.
+const RECOGNISED_WITHIN_BYTES: u64 = 1 << 16;
+
+/// Whether a file has the content of a `.tlog`, whatever its name is; reads its first bytes.
+///
+/// # Errors
+/// The input cannot be read.
+pub fn is_tlog(input: impl Read) -> io::Result<bool> {
+    let mut start = Vec::new();
+    input.take(RECOGNISED_WITHIN_BYTES).read_to_end(&mut start)?;
+    if start.starts_with(mcap::MAGIC) {
+        return Ok(false);
+    }
+    let is_all = (start.len() as u64) < RECOGNISED_WITHIN_BYTES;
+    let mut reader = TlogReader::new(start.as_slice());
+    let mut garbage_before = None;
+    while reader.next_frame()?.is_some() {
+        let garbage = Some(reader.garbage_bytes());
+        if garbage_before == garbage {
+            return Ok(true);
+        }
+        garbage_before = garbage;
+    }
+    // One frame alone may be all that was received.
+    Ok(is_all && garbage_before == Some(0) && reader.garbage_bytes() == 0)
+}
+
 /// A frame and the time at which it was logged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TlogFrame {
@@ -108,7 +135,7 @@ impl<R: Read> TlogReader<R> {
 }
 
 /// Returns the length of the MAVLink 1 or 2 frame that these bytes begin with, as its header says.
-pub fn frame_length(frame: &[u8]) -> Option<usize> {
+fn frame_length(frame: &[u8]) -> Option<usize> {
     let payload = usize::from(*frame.get(1)?);
     match *frame.first()? {
         MAGIC_2 if frame.get(2)? & SIGNED != 0 => Some(payload + 25),

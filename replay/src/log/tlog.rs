@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, Read as _, Seek, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -12,20 +12,18 @@ use protocol::identity::Address;
 use protocol::log::record::{
     Direction, Event, EventLevel, METADATA_RECOVERY, METADATA_RUN, RECOVERY_FAULT_ENTRY, RawFrame, Record,
 };
-use protocol::log::tlog::{TlogFrame, TlogReader};
+use protocol::log::tlog::{self, TlogFrame, TlogReader};
 use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
 use protocol::text::{Reassembler, Text};
 use protocol::told::Told;
 use serde::Serialize;
 
+use super::open_regular;
 use super::verdict::frame_of;
-use super::{MCAP_MAGIC, open_regular};
 use crate::output::{Destination, NewFile, WriteError};
 
 /// System id of a ground station, by convention.
 const GROUND_SYSTEM: u8 = 255;
-/// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one whose beginning is damaged.
-const RECOGNISED_WITHIN_BYTES: u64 = 1 << 16;
 
 /// Why a `.tlog` could not be imported.
 #[derive(Debug, thiserror::Error)]
@@ -82,23 +80,7 @@ pub(crate) fn open_log(path: &Path) -> io::Result<File> {
 
 /// Whether a file has the content of a `.tlog`, whatever its name is.
 pub(crate) fn is_tlog(path: &Path) -> io::Result<bool> {
-    let mut start = Vec::new();
-    open_regular(path)?.take(RECOGNISED_WITHIN_BYTES).read_to_end(&mut start)?;
-    if start.starts_with(&MCAP_MAGIC) {
-        return Ok(false);
-    }
-    let is_all = (start.len() as u64) < RECOGNISED_WITHIN_BYTES;
-    let mut reader = TlogReader::new(start.as_slice());
-    let mut garbage_before = None;
-    while reader.next_frame()?.is_some() {
-        let garbage = Some(reader.garbage_bytes());
-        if garbage_before == garbage {
-            return Ok(true);
-        }
-        garbage_before = garbage;
-    }
-    // One frame alone may be all that was received.
-    Ok(is_all && garbage_before == Some(0) && reader.garbage_bytes() == 0)
+    tlog::is_tlog(open_regular(path)?)
 }
 
 /// Imports a `.tlog` into a new flight log. Memory does not grow with its size.

@@ -1,10 +1,10 @@
-//! The link page: rates and losses, rejected frames, and the age of every message.
+//! The link page: rates and losses, rejected frames, and age and rate of every message.
 
 use std::time::Duration;
 
 use protocol::dialect::message_name;
 use protocol::identity::Address;
-use protocol::link_stats::{LinkFigures, SourceFigures};
+use protocol::link_stats::{LinkFigures, MessageFigures, SourceFigures};
 use ratatui::text::{Line, Span};
 
 use super::window;
@@ -17,8 +17,8 @@ const LOSS_MARKED: f64 = 0.05;
 /// From this width on the values are in columns.
 const TABLE_COLUMNS: usize = 76;
 const NAME_WIDTH: usize = 27;
-/// The width of a message name with its age.
-const AGE_CELL_WIDTH: usize = 35;
+/// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
+const MESSAGE_CELL_WIDTH: usize = 40;
 /// The messages that the vehicle sends regularly.
 const REGULAR: [&str; 13] = [
     "HEARTBEAT",
@@ -36,7 +36,7 @@ const REGULAR: [&str; 13] = [
     "TD_PREDICTED_PATH",
 ];
 
-/// The rates of all links together, of each link and of each component; then the age of every message.
+/// The rates of all links together, of each link and of each component; then age and rate of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let mut lines = vec![link_line(model, theme, now, columns)];
     lines.push(directions(model, theme, now));
@@ -49,11 +49,11 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         );
     }
     lines.push(theme.line(
-        format!(" Age of what the vehicle said last; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
+        format!(" Age and rate of what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
         TextRole::Title,
     ));
     lines.extend(lists::filter_line(model, theme));
-    lines.extend(age_lines(model, theme, now, columns));
+    lines.extend(message_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
     window(lines, start, rows)
@@ -208,43 +208,46 @@ fn loss_role(loss: Option<f64>) -> TextRole {
     if loss.is_some_and(|loss| loss > LOSS_MARKED) { TextRole::Caution } else { TextRole::Plain }
 }
 
-/// The ages in as many columns as fit.
-fn age_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let ages = ages(model, now);
-    let across = (columns / AGE_CELL_WIDTH).max(1);
-    let rows = ages.len().div_ceil(across);
+/// Age and rate of each message, in as many columns as fit.
+fn message_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let messages = messages(model, now);
+    let across = (columns / MESSAGE_CELL_WIDTH).max(1);
+    let rows = messages.len().div_ceil(across);
     (0..rows)
         .map(|row| {
-            let cells = (0..across).filter_map(|column| ages.get(row + column * rows));
-            Line::from(cells.flat_map(|(name, age)| age_cell(name, *age, theme)).collect::<Vec<_>>())
+            let cells = (0..across).filter_map(|column| messages.get(row + column * rows));
+            Line::from(cells.flat_map(|(name, heard)| message_cell(name, *heard, theme)).collect::<Vec<_>>())
         })
         .collect()
 }
 
-fn age_cell(name: &str, age: Option<Duration>, theme: Theme) -> [Span<'static>; 2] {
-    let (text, role) = match age {
-        None => (" never".to_owned(), TextRole::Label),
-        Some(age) if age > STALE_AFTER => (format!("{STALE_MARK}{}", seconds(age)), TextRole::Stale),
-        Some(age) => (format!(" {}", seconds(age)), TextRole::Plain),
+fn message_cell(name: &str, heard: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
+    let (text, role) = match heard {
+        None => ("   never".to_owned(), TextRole::Label),
+        Some(MessageFigures { age, rx_frames_s, .. }) => {
+            let (mark, role) =
+                if age > STALE_AFTER { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) };
+            (format!("{:>8}{rx_frames_s:>6.1}/s", format!("{mark}{}", seconds(age))), role)
+        }
     };
-    [theme.label(format!(" {name:<24.24}")), theme.span(format!("{text:<10}"), role)]
+    [theme.label(format!(" {name:<23.23}")), theme.span(format!("{text:<16}"), role)]
 }
 
 /// The regular messages, received or not; then every other message that was received, by its id.
-fn ages(model: &Model, now: Duration) -> Vec<(&'static str, Option<Duration>)> {
-    let heard: Vec<(&'static str, Duration)> = model
+fn messages(model: &Model, now: Duration) -> Vec<(&'static str, Option<MessageFigures>)> {
+    let heard: Vec<(&'static str, MessageFigures)> = model
         .link
         .stats
         .messages(now)
-        .filter(|(source, ..)| *source == model.settings.vehicle)
-        .filter_map(|(_, id, age)| Some((message_name(id)?, age)))
+        .filter(|figures| figures.source == model.settings.vehicle)
+        .filter_map(|figures| Some((message_name(figures.message_id)?, figures)))
         .collect();
-    let age = |name| heard.iter().find(|(known, _)| *known == name).map(|(_, age)| *age);
+    let figures = |name| heard.iter().find(|(known, _)| *known == name).map(|(_, figures)| *figures);
     let others = heard.iter().filter(|(name, _)| !REGULAR.contains(name));
     REGULAR
         .iter()
-        .map(|name| (*name, age(*name)))
-        .chain(others.map(|(name, age)| (*name, Some(*age))))
+        .map(|name| (*name, figures(*name)))
+        .chain(others.map(|(name, figures)| (*name, Some(*figures))))
         .filter(|(name, _)| model.pages.lets_pass(name))
         .collect()
 }

@@ -171,9 +171,10 @@ const KEY_COLUMNS: usize = 13;
 /// Columns for the names of pages, on the smallest whole screen.
 const PAGES_COLUMNS: usize = 80 - KEY_COLUMNS - 1;
 
-const REPLAY: [(&str, &str); 4] = [
+const REPLAY: [(&str, &str); 5] = [
     ("Space", "pause, or go on"),
     ("Left Right", "5 s back or forward"),
+    ("j", "jump to a time or a phase: seconds, T+12 or POWERED, then Enter"),
     ("[ ]", "to the phase before or after; g G to the begin or end"),
     ("+ -", "faster or slower"),
 ];
