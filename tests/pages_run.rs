@@ -63,13 +63,15 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 14] = [
+const SAID: [(&str, &str); 16] = [
     ("onboard-sim fly --profile mk2 --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "attainable_low_m"),
     ("replay info flight.mcap", "verdict"),
     ("replay verify flight.mcap ", "frames identical"),
     ("replay verify flight.mcap --explain", "identical bit for bit"),
     ("replay recover cut.mcap", "whole.mcap"),
+    ("replay cut flight.mcap", "`replay verify` runs the flight computer again"),
+    ("replay compare mk2 mk3", "mk3 differs from mk2 in"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
     ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
     ("replay export flight.mcap --to parquet", "tables"),

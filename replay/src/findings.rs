@@ -35,6 +35,15 @@ pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Optio
         }
         findings.note(computer.computer());
     }
+    Some(facts(recording, verdict, &findings))
+}
+
+/// The findings of a computer that was run again with the recorded decisions, and the limits that were broken.
+pub(crate) fn facts(
+    recording: &Recording,
+    verdict: Option<&VerdictFacts>,
+    findings: &Findings,
+) -> Vec<FindingFacts> {
     let mut facts: Vec<FindingFacts> = findings
         .found()
         .iter()
@@ -45,11 +54,11 @@ pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Optio
             section: section(finding.sign),
         })
         .collect();
-    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings)) {
+    if let Some(words) = verdict.and_then(|verdict| broken(verdict, findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
         facts.push(FindingFacts { since_s, lasted_s: 0.0, words, section: "findings" });
     }
-    Some(facts)
+    facts
 }
 
 fn section(sign: Sign) -> &'static str {

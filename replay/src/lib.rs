@@ -19,13 +19,15 @@
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
+//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log;
+//!   [`cut`](mod@cut): makes a shorter one.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
 //! * [`print`](mod@print): what answers have in common: text without control characters, JSON, JUnit XML.
 
 pub mod cli;
 pub mod compare;
 pub mod controller;
+pub mod cut;
 mod digest;
 pub mod evaluate;
 pub mod export;
@@ -117,8 +119,11 @@ enum Command {
     /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words, what the air lost.
     ///
     /// Signals are named as in an export. Of the vehicle's and a station's log of one flight it counts the messages that one end
-    /// sent and the other did not hear. Exit code 1 if a tolerance is exceeded or the verdicts differ.
-    #[command(after_help = "Example: replay compare old.mcap new.mcap")]
+    /// sent and the other did not hear. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
+    /// setting by setting; exit code 1 if one differs.
+    #[command(
+        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk2 day/mission.toml"
+    )]
     Compare(compare::Args),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     #[command(after_help = "Example: replay report flight.mcap")]
@@ -131,6 +136,11 @@ enum Command {
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
+    /// Cuts a log by time and topic, and says what of it can still be verified.
+    #[command(
+        after_help = "Example: replay cut flight.mcap burn.mcap --from POWERED --until TOUCHDOWN '/computer/*' /events"
+    )]
+    Cut(cut::Args),
     /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
     ///
     /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
@@ -171,6 +181,7 @@ impl Cli {
             Command::Report(args) => args.run(),
             Command::Export(args) => args.run(),
             Command::Recover(args) => args.run(),
+            Command::Cut(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Completions { shell } => {
                 let mut script = Vec::new();

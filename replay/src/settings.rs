@@ -106,6 +106,21 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
     Ok(settings)
 }
 
+/// Every setting of a mission with those of its airframe; `origin` is used in messages only. A whole number is the same as
+/// with a decimal point.
+///
+/// # Errors
+/// The text is not TOML.
+pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
+    let mut table = parsed_table(text, origin)?;
+    expand_airframe(&mut table);
+    let mut settings = Vec::new();
+    collect_leaves("", &table, &mut |path, value| {
+        settings.push(Setting { path, value: as_whole(value), at_s: None });
+    });
+    Ok(settings)
+}
+
 fn listed(settings: &[Setting]) -> String {
     settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }

@@ -13,6 +13,7 @@
 //! messages that both have, while both recorded, and what the air lost is counted frame by frame.
 
 mod air;
+mod missions;
 mod print;
 mod series;
 mod tolerance;
@@ -21,8 +22,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 pub use air::{OverTheAir, Stream};
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
+pub use missions::{MissionComparison, SettingDifference};
+use missions::{compare_missions, is_mission, print_missions};
 pub use print::{compare_cases, print_compare};
 use serde::Serialize;
 pub use series::{Align, Anchors, Flown, Samples, Series};
@@ -238,9 +241,9 @@ fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Ve
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The flight to compare with.
+    /// The flight to compare with, or a mission (built-in or a TOML file).
     baseline: PathBuf,
-    /// The other flights.
+    /// The other flights, or missions.
     #[arg(required = true)]
     others: Vec<PathBuf>,
     /// The event on which the flights are aligned [default: ignition if both flights have one, else vehicle time].
@@ -275,6 +278,9 @@ enum AlignOn {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
+        if is_mission(&self.baseline) {
+            return self.missions();
+        }
         let tolerances = self.tolerances.as_deref().map(read).transpose()?.unwrap_or_default();
         let baseline = open(&self.baseline)?;
         let mut comparisons = Vec::new();
@@ -299,6 +305,23 @@ impl Args {
         })?;
         let within = |comparison: &Comparison| comparison.failures.is_empty();
         Ok(Outcome::Decided { yes: comparisons.iter().all(within) })
+    }
+}
+
+impl Args {
+    fn missions(&self) -> Result<Outcome> {
+        ensure!(
+            !self.junit && self.tolerances.is_none(),
+            "missions are compared without tolerances and JUnit"
+        );
+        let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
+        let compared = compare_missions(&self.baseline, &others)?;
+        answer(
+            |output| {
+                if self.json { print_json(&compared, output) } else { print_missions(&compared, output) }
+            },
+        )?;
+        Ok(Outcome::Decided { yes: compared.iter().all(|one| one.differences.is_empty()) })
     }
 }
 

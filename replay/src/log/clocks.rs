@@ -6,6 +6,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use flight::rules::phase::Phase;
 use protocol::dialect::MavMessage;
 use serde::Serialize;
 
@@ -49,6 +50,50 @@ pub struct ClockTime {
 #[error("`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7")]
 pub struct ClockTimeError {
     given: String,
+}
+
+/// A moment of a flight, as a person names it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Moment {
+    /// A frame of the flight computer, by its number in the log.
+    Frame(u64),
+    Time(ClockTime),
+    /// The beginning of a phase.
+    Phase(Phase),
+}
+
+/// Why a text is no moment.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MomentError {
+    #[error("`{given}`: a frame is a whole number")]
+    Frame { given: String },
+    #[error("{time}, a phase ({}), or frame:NUMBER", Phase::ALL.map(Phase::name).join(", "))]
+    Other { time: ClockTimeError },
+}
+
+impl FromStr for Moment {
+    type Err = MomentError;
+
+    fn from_str(given: &str) -> Result<Self, MomentError> {
+        if let Some(number) = given.strip_prefix("frame:") {
+            let wrong = |_| MomentError::Frame { given: given.to_owned() };
+            return number.parse().map(Self::Frame).map_err(wrong);
+        }
+        if let Some(phase) = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given)) {
+            return Ok(Self::Phase(phase));
+        }
+        given.parse().map(Self::Time).map_err(|time| MomentError::Other { time })
+    }
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Frame(number) => write!(out, "frame {number}"),
+            Self::Time(time) => write!(out, "{time}"),
+            Self::Phase(phase) => write!(out, "{}", phase.name()),
+        }
+    }
 }
 
 impl FromStr for ClockTime {

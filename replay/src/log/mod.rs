@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
-pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks};
+pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks, Moment, MomentError};
 use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, FrameRanges, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};

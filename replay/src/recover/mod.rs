@@ -5,15 +5,16 @@
 //! chunks and messages that its summary counts. The report lists what is lost, and so does the recovered log itself
 //! ([`METADATA_RECOVERY`]). Nothing is invented: a message is kept unchanged or not at all.
 
-mod scan;
-mod write;
+pub(crate) mod scan;
+pub(crate) mod write;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use mcap::records::op;
+use mcap::records::{Metadata, op};
+use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 use scan::{ChunkName, Good, Records};
 use serde::Serialize;
 use write::Rescue;
@@ -97,6 +98,20 @@ impl Recovery {
             && *ended
     }
 
+    /// What the recovered log says of itself.
+    fn about(&self) -> Metadata {
+        let lost = self.lost.iter().map(|lost| {
+            format!("bytes {} to {}: {}", lost.from_byte, lost.from_byte + lost.bytes, lost.reason)
+        });
+        let facts = BTreeMap::from([
+            ("from".to_owned(), self.input.clone()),
+            ("ended".to_owned(), self.ended.to_string()),
+            ("lost".to_owned(), lost.collect::<Vec<_>>().join("; ")),
+            (RECOVERY_FAULT_ENTRY.to_owned(), self.fault().unwrap_or_default()),
+        ]);
+        Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts }
+    }
+
     /// What was wrong with the log, for the recovered one; `None` if it was whole.
     pub fn fault(&self) -> Option<String> {
         let mut faults = Vec::new();
@@ -158,19 +173,26 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     recovery.foreign = foreign;
     let (good, reordered) = in_order(good, &told.chunks);
     recovery.reordered = reordered;
-    let mut rescue = Rescue::create(destination, input, &told)?;
+    let mut keeps_all = |_: &str, _: u64| true;
+    let mut rescue = Rescue::create(destination, input, &told, &mut keeps_all)?;
     for piece in good {
         let body = records.body(piece.at)?;
         rescue.keep(piece.opcode, &body)?;
     }
-    if rescue.first_ns().is_none() {
+    let kept = rescue.kept();
+    let Some((first_ns, last_ns)) = kept.span_ns else {
         return Err(RecoverError::Nothing { name: recovery.input, reason: first_reason });
-    }
-    recovery.messages_lost = told.messages.map(|told| told.saturating_sub(rescue.messages()));
+    };
+    recovery.messages = kept.messages;
+    recovery.chunks = kept.chunks;
+    recovery.records_about = kept.records_about;
+    recovery.undecodable = kept.undecodable;
+    recovery.kept_s = Some(last_ns.saturating_sub(first_ns) as f64 / 1e9);
+    recovery.messages_lost = told.messages.map(|told| told.saturating_sub(kept.messages));
     // With every message kept, a chunk that the summary does not know is one whose head was changed.
     let missing = if recovery.messages_lost == Some(0) { Vec::new() } else { missing };
-    recovery.lost = lost_of(&contents.lost, &missing, rescue.first_ns());
-    rescue.finish(&mut recovery)?;
+    recovery.lost = lost_of(&contents.lost, &missing, Some(first_ns));
+    rescue.finish(&recovery.about())?;
     Ok(recovery)
 }
 

@@ -30,58 +30,58 @@ const FOOTER_CHECKED_BYTES: usize = 16;
 
 /// What tells one chunk from another, in its own head and in the summary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct ChunkName {
-    pub(super) first_ns: u64,
-    pub(super) last_ns: u64,
-    pub(super) uncompressed_bytes: u64,
-    pub(super) compressed_bytes: u64,
+pub(crate) struct ChunkName {
+    pub(crate) first_ns: u64,
+    pub(crate) last_ns: u64,
+    pub(crate) uncompressed_bytes: u64,
+    pub(crate) compressed_bytes: u64,
 }
 
 /// A good record, or a chunk whose checksum is right.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Good {
+pub(crate) struct Good {
     /// Its first byte in the file.
-    pub(super) at: u64,
-    pub(super) opcode: u8,
+    pub(crate) at: u64,
+    pub(crate) opcode: u8,
     /// Name and checksum of a chunk.
-    pub(super) chunk: Option<(ChunkName, u32)>,
+    pub(crate) chunk: Option<(ChunkName, u32)>,
 }
 
 /// A stretch of the file that cannot be kept.
 #[derive(Debug, Clone)]
-pub(super) struct LostStretch {
-    pub(super) from_byte: u64,
-    pub(super) bytes: u64,
-    pub(super) span_ns: Option<(u64, u64)>,
-    pub(super) reason: String,
+pub(crate) struct LostStretch {
+    pub(crate) from_byte: u64,
+    pub(crate) bytes: u64,
+    pub(crate) span_ns: Option<(u64, u64)>,
+    pub(crate) reason: String,
 }
 
 /// What a file consists of.
 #[derive(Debug, Default)]
-pub(super) struct Contents {
-    pub(super) good: Vec<Good>,
-    pub(super) lost: Vec<LostStretch>,
+pub(crate) struct Contents {
+    pub(crate) good: Vec<Good>,
+    pub(crate) lost: Vec<LostStretch>,
     /// The end mark is there.
-    pub(super) ended: bool,
-    pub(super) told: WriterReport,
+    pub(crate) ended: bool,
+    pub(crate) told: WriterReport,
 }
 
 /// What the summary behind the end mark tells, as far as it can be read. Its own index is not used: bytes that were lost
 /// have shifted it.
 #[derive(Debug, Default)]
-pub(super) struct WriterReport {
-    pub(super) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
-    pub(super) channels: BTreeMap<u16, Channel>,
+pub(crate) struct WriterReport {
+    pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
+    pub(crate) channels: BTreeMap<u16, Channel>,
     /// Where each chunk began, its length and its name.
-    pub(super) chunks: Vec<(u64, u64, ChunkName)>,
+    pub(crate) chunks: Vec<(u64, u64, ChunkName)>,
     /// How many messages there were; `None` if it is not told.
-    pub(super) messages: Option<u64>,
+    pub(crate) messages: Option<u64>,
     /// Its checksum does not fit.
     is_changed: bool,
 }
 
 /// A file being read record by record.
-pub(super) struct Records {
+pub(crate) struct Records {
     name: String,
     input: BufReader<File>,
     size: u64,
@@ -89,7 +89,7 @@ pub(super) struct Records {
 
 impl Records {
     /// Opens a file that begins as an MCAP file does.
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
         let read = |source| LogError::Read { name: name.clone(), source };
         let file = open_regular(path).map_err(read)?;
@@ -107,7 +107,7 @@ impl Records {
     }
 
     /// The body of the record that begins at this byte.
-    pub(super) fn body(&mut self, at: u64) -> Result<Vec<u8>, LogError> {
+    pub(crate) fn body(&mut self, at: u64) -> Result<Vec<u8>, LogError> {
         match self.head(at)? {
             Some((_, length)) => self.read(at + HEAD_BYTES as u64, length),
             None => Ok(Vec::new()),
@@ -115,7 +115,7 @@ impl Records {
     }
 
     /// Reads the whole file.
-    pub(super) fn contents(&mut self) -> Result<Contents, LogError> {
+    pub(crate) fn contents(&mut self) -> Result<Contents, LogError> {
         let mut contents = Contents::default();
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(mcap::MAGIC);
@@ -326,6 +326,12 @@ impl Records {
 }
 
 impl Contents {
+    /// What is wrong with the file, if something is.
+    pub(crate) fn fault(&self) -> Option<String> {
+        let lost = self.lost.first().map(|lost| format!("byte {}: {}", lost.from_byte, lost.reason));
+        lost.or_else(|| (!self.ended).then(|| "it has no end mark".to_owned()))
+    }
+
     /// Notes a lost stretch; one that continues the last is part of it.
     fn lose(&mut self, from_byte: u64, bytes: u64, span_ns: Option<(u64, u64)>, reason: &str) {
         let full = self.lost.len() >= LOST_MAX;

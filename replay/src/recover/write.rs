@@ -1,4 +1,4 @@
-//! Writes the recovered records as a whole log.
+//! Writes the records that are kept as a whole log.
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
-use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 
-use super::Recovery;
 use super::scan::WriterReport;
 use crate::output::{Destination, NewFile, WriteError};
 
@@ -17,21 +15,31 @@ const CHUNK_BYTES: u64 = 64 * 1024;
 
 type Writer = mcap::Writer<BufWriter<NewFile>>;
 
-pub(super) struct Rescue<'a> {
+pub(crate) struct Rescue<'a> {
     path: PathBuf,
+    /// Whether a message of this topic and time is kept.
+    keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     /// What the file's own summary tells of its channels, for messages whose channel record is lost.
     told: &'a WriterReport,
     /// Created when the library's name is known, which is the first record of a file.
     state: State,
     /// The file's schemas and channels by their numbers there.
     schemas: BTreeMap<u16, u16>,
-    channels: BTreeMap<u16, u16>,
-    span_ns: Option<(u64, u64)>,
-    messages: u64,
-    chunks: u64,
-    records_about: u64,
+    channels: BTreeMap<u16, (u16, String)>,
+    kept: Kept,
+}
+
+/// What was kept.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Kept {
+    pub(crate) span_ns: Option<(u64, u64)>,
+    pub(crate) messages: u64,
+    /// Messages that were not wanted.
+    pub(crate) left_out: u64,
+    pub(crate) chunks: u64,
+    pub(crate) records_about: u64,
     /// Messages whose channel nothing describes.
-    undecodable: u64,
+    pub(crate) undecodable: u64,
 }
 
 enum State {
@@ -41,37 +49,32 @@ enum State {
 }
 
 impl<'a> Rescue<'a> {
-    pub(super) fn create(
+    pub(crate) fn create(
         destination: Destination,
         input: &Path,
         told: &'a WriterReport,
+        keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     ) -> Result<Self, WriteError> {
         Ok(Self {
             path: destination.path.to_owned(),
+            keeps,
             told,
             state: State::Waiting(NewFile::create(destination, input)?),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            span_ns: None,
-            messages: 0,
-            chunks: 0,
-            records_about: 0,
-            undecodable: 0,
+            kept: Kept::default(),
         })
     }
 
-    pub(super) fn first_ns(&self) -> Option<u64> {
-        self.span_ns.map(|(first, _)| first)
-    }
-
-    pub(super) fn messages(&self) -> u64 {
-        self.messages
+    /// What was kept so far.
+    pub(crate) fn kept(&self) -> Kept {
+        self.kept
     }
 
     /// Keeps a record, or every record of a chunk.
-    pub(super) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
+    pub(crate) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
         let kept = if opcode == op::CHUNK {
-            self.chunks += 1;
+            self.kept.chunks += 1;
             // It was read before without an error; a file that has changed since then is lost here.
             records_of_chunk(body, |record| self.keep_record(record)).map_err(RecordError::into_mcap)
         } else {
@@ -98,15 +101,15 @@ impl<'a> Rescue<'a> {
                     &channel.message_encoding,
                     &channel.metadata,
                 )?;
-                self.channels.insert(channel.id, id);
+                self.channels.insert(channel.id, (id, channel.topic));
             }
             Record::Message { header, data } => self.message(header, &data)?,
             Record::Metadata(metadata) => {
-                self.records_about += 1;
+                self.kept.records_about += 1;
                 self.writer("")?.write_metadata(&metadata)?;
             }
             Record::Attachment { header, data, .. } => {
-                self.records_about += 1;
+                self.kept.records_about += 1;
                 self.writer("")?.attach(&mcap::Attachment {
                     log_time: header.log_time,
                     create_time: header.create_time,
@@ -121,31 +124,37 @@ impl<'a> Rescue<'a> {
     }
 
     fn message(&mut self, header: MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
-        let Some(channel_id) = self.channel(header.channel_id)? else {
-            self.undecodable += 1;
+        if !self.find_channel(header.channel_id)? {
+            self.kept.undecodable += 1;
             return Ok(());
-        };
-        self.writer("")?.write_to_known_channel(&MessageHeader { channel_id, ..header }, data)?;
-        self.messages += 1;
-        let (first, last) = self.span_ns.unwrap_or((header.log_time, header.log_time));
-        self.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
+        }
+        let (channel_id, topic) = &self.channels[&header.channel_id];
+        if !(self.keeps)(topic, header.log_time) {
+            self.kept.left_out += 1;
+            return Ok(());
+        }
+        let header = MessageHeader { channel_id: *channel_id, ..header };
+        self.writer("")?.write_to_known_channel(&header, data)?;
+        self.kept.messages += 1;
+        let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
+        self.kept.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
         Ok(())
     }
 
-    /// The new number of a channel; of one whose record is lost, from the summary.
-    fn channel(&mut self, id: u16) -> mcap::McapResult<Option<u16>> {
-        if let Some(known) = self.channels.get(&id) {
-            return Ok(Some(*known));
+    /// Whether a channel is known; one whose record is lost is made from the summary.
+    fn find_channel(&mut self, id: u16) -> mcap::McapResult<bool> {
+        if self.channels.contains_key(&id) {
+            return Ok(true);
         }
-        let Some(told) = self.told.channels.get(&id) else { return Ok(None) };
+        let Some(told) = self.told.channels.get(&id) else { return Ok(false) };
         let schema = match self.told.schemas.get(&told.schema_id) {
             Some((schema, data)) => self.writer("")?.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
         };
         let new =
             self.writer("")?.add_channel(schema, &told.topic, &told.message_encoding, &told.metadata)?;
-        self.channels.insert(id, new);
-        Ok(Some(new))
+        self.channels.insert(id, (new, told.topic.clone()));
+        Ok(true)
     }
 
     /// The writer; created with this library's name if necessary.
@@ -167,27 +176,14 @@ impl<'a> Rescue<'a> {
         }
     }
 
-    pub(super) fn finish(mut self, recovery: &mut Recovery) -> Result<(), WriteError> {
-        recovery.messages = self.messages;
-        recovery.chunks = self.chunks;
-        recovery.records_about = self.records_about;
-        recovery.undecodable = self.undecodable;
-        recovery.kept_s = self.span_ns.map(|(first, last)| last.saturating_sub(first) as f64 / 1e9);
-        self.close(recovery).map_err(|source| self.failed(source))
+    /// Completes the log with what it is.
+    pub(crate) fn finish(mut self, about: &Metadata) -> Result<(), WriteError> {
+        self.close(about).map_err(|source| self.failed(source))
     }
 
-    fn close(&mut self, recovery: &Recovery) -> mcap::McapResult<()> {
-        let lost = recovery.lost.iter().map(|lost| {
-            format!("bytes {} to {}: {}", lost.from_byte, lost.from_byte + lost.bytes, lost.reason)
-        });
-        let facts = BTreeMap::from([
-            ("from".to_owned(), recovery.input.clone()),
-            ("ended".to_owned(), recovery.ended.to_string()),
-            ("lost".to_owned(), lost.collect::<Vec<_>>().join("; ")),
-            (RECOVERY_FAULT_ENTRY.to_owned(), recovery.fault().unwrap_or_default()),
-        ]);
+    fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
         let writer = self.writer("")?;
-        writer.write_metadata(&Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts })?;
+        writer.write_metadata(about)?;
         writer.finish()?;
         if let State::Writing(writer) = std::mem::replace(&mut self.state, State::Gone) {
             let file = writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;

@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::ValueEnum;
 use flight::rules::phase::Phase;
 pub use prepared::Prepared;
@@ -36,7 +36,7 @@ use sim::world::whole::WorldError;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
 use crate::controller::{REFLOWN_AT, REFLOWN_BY};
 use crate::log::VerdictFacts;
-use crate::log::{Clock, ClockTime, NewLog, Recording, RecordingError};
+use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
 use crate::settings::{Setting, SettingArguments, SettingError};
@@ -474,7 +474,7 @@ pub(crate) struct Args {
     ///
     /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8 (since power-up),
     /// log:19.7 (since the first record). A frame has its number in the log. Without this, it is the landing's first frame.
-    #[arg(long, value_name = "WHERE", value_parser = moment_named, conflicts_with_all = ["vary", "vary_plant"])]
+    #[arg(long, value_name = "WHERE", conflicts_with_all = ["vary", "vary_plant"])]
     at: Option<Moment>,
     /// Write the flight as a new log.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["vary", "vary_plant"])]
@@ -568,29 +568,5 @@ fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
     let name = &recording.name;
     converted.map(|time| time.time_s).with_context(|| {
         format!("--at {time}: {name} does not say when its T+0 was on that clock; give the time as T+SECONDS")
-    })
-}
-
-/// Where a flight is taken over, as a person names it.
-#[derive(Debug, Clone, Copy)]
-enum Moment {
-    Frame(u64),
-    Time(ClockTime),
-    Phase(Phase),
-}
-
-fn moment_named(given: &str) -> Result<Moment> {
-    if let Some(number) = given.strip_prefix("frame:") {
-        return number
-            .parse()
-            .map(Moment::Frame)
-            .with_context(|| format!("`{given}`: a frame is a whole number"));
-    }
-    if let Some(phase) = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given)) {
-        return Ok(Moment::Phase(phase));
-    }
-    given.parse().map(Moment::Time).map_err(|error| {
-        let names: Vec<&str> = Phase::ALL.iter().map(|phase| phase.name()).collect();
-        anyhow!("{error}, a phase ({}), or frame:NUMBER", names.join(", "))
     })
 }

@@ -58,9 +58,9 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let mut info = described(path)?;
-    info.findings = findings::of(&recording, info.verdict.as_ref());
-    let flight = Flight::of(recording).with(&info);
-    Ok((flight, info))
+    let (flight, watched) = Flight::of(recording);
+    info.findings = watched.map(|found| findings::facts(&flight.recording, info.verdict.as_ref(), &found));
+    Ok((flight.with(&info), info))
 }
 
 #[derive(Debug, clap::Args)]

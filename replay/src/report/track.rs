@@ -4,6 +4,7 @@
 //! made in the frame of the moving air; here they are converted to the ground.
 
 use campaign::figure::Span;
+use flight::computer::findings::Findings;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::estimation::estimator::{AidStatus, Aids, Estimate};
 use flight::guidance::powered::ControlLevel;
@@ -203,10 +204,14 @@ struct Again {
 
 impl Flight {
     /// A recorded flight. Without mission, start or frames the sections report what is missing.
-    pub(super) fn of(recording: Recording) -> Self {
-        match run_again(&recording) {
-            None => Self::heard(recording),
-            Some((mission, again, pilot, ratios)) => Self::told(recording, &mission, &again, &pilot, ratios),
+    /// Beside it what its computer shows, if it decides again as it did.
+    pub(super) fn of(recording: Recording) -> (Self, Option<Findings>) {
+        match RunAgain::on(&recording) {
+            None => (Self::heard(recording), None),
+            Some(again) => {
+                let RunAgain { mission, frames, pilot, test_ratios, findings } = again;
+                (Self::told(recording, &mission, &frames, &pilot, test_ratios), findings)
+            }
         }
     }
 
@@ -478,38 +483,56 @@ fn named_aids(aids: &Aids) -> [(&'static str, AidStatus); 4] {
     ]
 }
 
-/// Runs the flight computer again and returns its estimate and plan at every tenth frame, and the test ratios; `None` if the
-/// log lacks records.
-fn run_again(recording: &Recording) -> Option<(Mission, Vec<Again>, Pilot, TestRatios)> {
-    let (start, frames) = recording.replayable_frames().ok()?;
-    let toml = recording.profile_toml().ok()?;
-    let mut controller = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
-    let mission = controller.pilot().mission().clone();
-    let curve: ThrustCurve = mission.motor_curve.clone();
-    let (mut again, mut plans) = (Vec::new(), NewPlans::default());
-    let mut test_ratios = TestRatios::default();
-    for recorded in frames {
-        let frame = controller.run_again(recorded).ok()?;
-        let aids = named_aids(controller.pilot().estimator().aids());
-        for ((_, aid), ratios) in aids.iter().zip(&mut test_ratios).filter(|((_, aid), _)| aid.fresh) {
-            ratios.push((recorded.input.time_s, aid.test_ratio));
+/// What the flight computer makes of the log's frames.
+struct RunAgain {
+    mission: Mission,
+    /// Estimate and plan at every tenth frame.
+    frames: Vec<Again>,
+    /// At the end.
+    pilot: Pilot,
+    test_ratios: TestRatios,
+    /// What it shows; `None` if it decides otherwise than it did.
+    findings: Option<Findings>,
+}
+
+impl RunAgain {
+    /// Runs the flight computer again; `None` if the log lacks records.
+    fn on(recording: &Recording) -> Option<Self> {
+        let (start, recorded_frames) = recording.replayable_frames().ok()?;
+        let toml = recording.profile_toml().ok()?;
+        let mut controller = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
+        let mission = controller.pilot().mission().clone();
+        let curve: ThrustCurve = mission.motor_curve.clone();
+        let (mut frames, mut plans) = (Vec::new(), NewPlans::default());
+        let mut test_ratios = TestRatios::default();
+        let mut findings = Some(Findings::default());
+        for recorded in recorded_frames {
+            let frame = controller.run_again(recorded).ok()?;
+            findings = findings.filter(|_| frame.output == recorded.output);
+            if let Some(findings) = &mut findings {
+                findings.note(controller.computer());
+            }
+            let aids = named_aids(controller.pilot().estimator().aids());
+            for ((_, aid), ratios) in aids.iter().zip(&mut test_ratios).filter(|((_, aid), _)| aid.fresh) {
+                ratios.push((recorded.input.time_s, aid.test_ratio));
+            }
+            if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
+                continue;
+            }
+            let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
+            let plan = plans.made(pilot, frame.output.level);
+            frames.push(Again {
+                time_s,
+                phase: frame.output.phase,
+                level: frame.output.level,
+                estimate: pilot.estimate().copied(),
+                burning_s: pilot.burning_s(time_s).unwrap_or(0.0),
+                inferred_n: pilot.motor().predict(&curve, time_s, time_s).thrust_n,
+                plan: plan.map(|(states, step_s)| (*pilot.report(), states.to_vec(), step_s)),
+            });
         }
-        if !recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
-            continue;
-        }
-        let (pilot, time_s) = (controller.pilot(), recorded.input.time_s);
-        let plan = plans.made(pilot, frame.output.level);
-        again.push(Again {
-            time_s,
-            phase: frame.output.phase,
-            level: frame.output.level,
-            estimate: pilot.estimate().copied(),
-            burning_s: pilot.burning_s(time_s).unwrap_or(0.0),
-            inferred_n: pilot.motor().predict(&curve, time_s, time_s).thrust_n,
-            plan: plan.map(|(states, step_s)| (*pilot.report(), states.to_vec(), step_s)),
-        });
+        Some(Self { mission, frames, pilot: controller.pilot().clone(), test_ratios, findings })
     }
-    Some((mission, again, controller.pilot().clone(), test_ratios))
 }
 
 /// The state in the plane, relative to the ground; altitude is the height of the feet.

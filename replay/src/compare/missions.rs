@@ -1,0 +1,101 @@
+//! Compares missions: every setting that only one of two has, or that has another value, with the airframe's.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use flight::vehicles::mission::BUILTIN;
+use serde::Serialize;
+
+use crate::cli::text_of;
+use crate::print::{counted, shown};
+use crate::settings::{SettingError, settings_of_mission};
+
+/// A setting in which two missions differ; `None`: it is not in that text, and has its default or means nothing there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SettingDifference {
+    pub setting: String,
+    pub baseline: Option<String>,
+    pub other: Option<String>,
+}
+
+/// One mission against another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissionComparison {
+    pub baseline: String,
+    pub other: String,
+    /// Settings with the same value in both.
+    pub same: usize,
+    pub differences: Vec<SettingDifference>,
+}
+
+/// Whether an argument names a mission and no log: a built-in one, or a TOML file.
+pub(super) fn is_mission(path: &Path) -> bool {
+    let is_builtin = BUILTIN.iter().any(|(name, _)| path == Path::new(name));
+    is_builtin || path.extension().is_some_and(|end| end == "toml")
+}
+
+/// Compares missions, each a built-in one or a file, with the first.
+///
+/// # Errors
+/// One cannot be read, or is no TOML.
+pub(super) fn compare_missions(baseline: &Path, others: &[&Path]) -> Result<Vec<MissionComparison>> {
+    let read = |path: &Path| -> Result<(String, BTreeMap<String, String>)> {
+        ensure!(is_mission(path), "{}: is no mission, and the other one is", path.display());
+        let name = path.display().to_string();
+        let settings = values(&text_of(&name, BUILTIN, "mission")?, &name)?;
+        Ok((name, settings))
+    };
+    let (baseline, wanted) = read(baseline)?;
+    let compared = others.iter().map(|other| {
+        let (other, found) = read(other)?;
+        let keys: std::collections::BTreeSet<&String> = wanted.keys().chain(found.keys()).collect();
+        let differs = |setting: &&String| wanted.get(*setting) != found.get(*setting);
+        let differences: Vec<SettingDifference> = keys
+            .iter()
+            .copied()
+            .filter(differs)
+            .map(|setting| SettingDifference {
+                setting: setting.clone(),
+                baseline: wanted.get(setting).cloned(),
+                other: found.get(setting).cloned(),
+            })
+            .collect();
+        Ok(MissionComparison {
+            baseline: baseline.clone(),
+            other,
+            same: keys.len() - differences.len(),
+            differences,
+        })
+    });
+    compared.collect()
+}
+
+/// The settings of a mission by their names, as text.
+fn values(text: &str, origin: &str) -> Result<BTreeMap<String, String>, SettingError> {
+    let settings = settings_of_mission(text, origin)?;
+    Ok(settings.into_iter().map(|setting| (setting.path, setting.value.to_string())).collect())
+}
+
+/// Writes the settings that differ as text.
+///
+/// # Errors
+/// The output failed.
+pub(super) fn print_missions(comparisons: &[MissionComparison], output: &mut impl Write) -> io::Result<()> {
+    for MissionComparison { baseline, other, same, differences } in comparisons {
+        let (baseline, other) = (shown(baseline), shown(other));
+        let count = counted(differences.len() as u64, "setting");
+        if differences.is_empty() {
+            writeln!(output, "{other} is the same mission as {baseline}: {same} settings")?;
+            continue;
+        }
+        writeln!(output, "{other} differs from {baseline} in {count}; {same} are the same")?;
+        let width = differences.iter().map(|difference| difference.setting.len()).max().unwrap_or(0);
+        for SettingDifference { setting, baseline, other } in differences {
+            let value = |value: &Option<String>| value.as_ref().map_or("-".to_owned(), |value| shown(value));
+            writeln!(output, "  {setting:<width$}  {} -> {}", value(baseline), value(other))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,253 @@
+//! Cuts a log: a span of its time, and some of its topics, as a new log.
+//!
+//! What a record means may hang on all before it: the flight computer remembers, and an entry of a book is proven by those
+//! before it. So the topics of both are kept from the beginning ([`CHAINED`]), unless they are left out, and a cut log is
+//! verified as far as it goes. Metadata and attachments are kept, and the log's run facts say what it was cut from. A
+//! message is kept unchanged or not at all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use flight::rules::phase::Phase;
+use flight_log::frame::phase_of;
+use mcap::records::Metadata;
+use protocol::log::record::{
+    METADATA_RUN, TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START,
+};
+use serde::Serialize;
+
+use crate::cli::{Outcome, answer};
+use crate::log::{Clock, ClockTime, Clocks, Entry, FlightLog, LogError, Moment, heard_message};
+use crate::output::{Destination, Overwrite, WriteError};
+use crate::print::{counted, print_json, shown};
+use crate::recover::scan::Records;
+use crate::recover::write::{Kept, Rescue};
+
+/// A record of these says nothing without those before it.
+const CHAINED: [&str; 4] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_BOOK, TOPIC_BOOK_HEAD];
+/// The run fact that says what a log was cut from.
+const CUT_FROM: &str = "cut_from";
+
+/// Why nothing was cut.
+#[derive(Debug, thiserror::Error)]
+pub enum CutError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The bytes between what can be read are not copied.
+    #[error("{name}: is damaged: {damage}; `replay recover` makes a whole log of what can be read")]
+    Damaged { name: String, damage: String },
+    /// The log does not say when that was.
+    #[error("{name}: has no {moment}")]
+    NoMoment { name: String, moment: Moment },
+    /// Nothing is left.
+    #[error("{name}: no message is of that time and those topics; it has {}", topics.join(", "))]
+    Nothing { name: String, topics: Vec<String> },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What of a log is kept.
+#[derive(Debug, Clone, Default)]
+pub struct Wanted {
+    pub from: Option<Moment>,
+    pub until: Option<Moment>,
+    /// Topics; a `*` at the end matches any rest. Empty for all.
+    pub topics: Vec<String>,
+}
+
+impl Wanted {
+    fn has(&self, topic: &str) -> bool {
+        let fits = |pattern: &String| {
+            pattern.strip_suffix('*').map_or(pattern == topic, |begin| topic.starts_with(begin))
+        };
+        self.topics.is_empty() || self.topics.iter().any(fits)
+    }
+}
+
+/// Report of a cut.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CutOut {
+    /// The log that was cut.
+    pub input: String,
+    pub output: PathBuf,
+    /// Messages kept, and those left out.
+    pub messages: u64,
+    pub left_out: u64,
+    /// Messages before the span that were kept because later ones hang on them.
+    pub chained: u64,
+    /// The flight computer's frames are kept: `verify` runs them again.
+    pub can_be_verified: bool,
+    /// The book's entries are kept: `verify --book` proves them up to its last signed end.
+    pub has_book: bool,
+}
+
+/// Cuts a log into a new file.
+///
+/// # Errors
+/// See [`CutError`].
+pub fn cut<'a>(
+    input: &Path,
+    wanted: &Wanted,
+    output: impl Into<Destination<'a>>,
+) -> Result<CutOut, CutError> {
+    let destination = output.into();
+    let name = input.display().to_string();
+    let mut records = Records::open(input)?;
+    let contents = records.contents()?;
+    if let Some(damage) = contents.fault() {
+        return Err(CutError::Damaged { name, damage });
+    }
+    let (from_ns, until_ns) = span_ns(input, wanted)?;
+    let (mut chained, mut kept_topics) = (0, BTreeSet::new());
+    let mut keeps = |topic: &str, at_ns: u64| {
+        let is_before = at_ns < from_ns;
+        let is_kept = wanted.has(topic) && at_ns <= until_ns && (!is_before || CHAINED.contains(&topic));
+        if is_kept {
+            chained += u64::from(is_before);
+            if !kept_topics.contains(topic) {
+                kept_topics.insert(topic.to_owned());
+            }
+        }
+        is_kept
+    };
+    let mut rescue = Rescue::create(destination, input, &contents.told, &mut keeps)?;
+    for piece in &contents.good {
+        let body = records.body(piece.at)?;
+        rescue.keep(piece.opcode, &body)?;
+    }
+    let Kept { messages, left_out, .. } = rescue.kept();
+    if messages == 0 {
+        let topics = contents.told.channels.into_values().map(|channel| channel.topic).collect();
+        return Err(CutError::Nothing { name, topics });
+    }
+    let facts = BTreeMap::from([(CUT_FROM.to_owned(), words_of(&name, wanted))]);
+    rescue.finish(&Metadata { name: METADATA_RUN.to_owned(), metadata: facts })?;
+    let has = |topics: [&str; 2]| topics.iter().all(|topic| kept_topics.contains(*topic));
+    Ok(CutOut {
+        input: name,
+        output: destination.path.to_owned(),
+        messages,
+        left_out,
+        chained,
+        can_be_verified: has([TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME]),
+        has_book: has([TOPIC_BOOK, TOPIC_BOOK_HEAD]),
+    })
+}
+
+/// What a log was cut from, for its run facts.
+fn words_of(name: &str, Wanted { from, until, topics }: &Wanted) -> String {
+    let from = from.map(|from| format!(", from {from}")).unwrap_or_default();
+    let until = until.map(|until| format!(", until {until}")).unwrap_or_default();
+    let topics = if topics.is_empty() { String::new() } else { format!(", only {}", topics.join(" ")) };
+    format!("{name}{from}{until}{topics}")
+}
+
+/// The first and the last time that are kept, ns since the Unix epoch.
+fn span_ns(input: &Path, wanted: &Wanted) -> Result<(u64, u64), CutError> {
+    let mut log = FlightLog::open(input)?;
+    let (mut clocks, mut first_ns) = (Clocks::default(), None);
+    let mut begins: BTreeMap<Phase, u64> = BTreeMap::new();
+    let mut frames_ns: [Option<u64>; 2] = [None; 2];
+    while let Some(stamped) = log.next_entry()? {
+        let at_ns = stamped.log_time_ns;
+        let since_ns = at_ns.saturating_sub(*first_ns.get_or_insert(at_ns));
+        let message = heard_message(log.channel(stamped.channel_id), &stamped);
+        clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
+        let phase = match &stamped.entry {
+            Entry::ComputerFrame(frame) => {
+                for (found, moment) in frames_ns.iter_mut().zip([wanted.from, wanted.until]) {
+                    if matches!(moment, Some(Moment::Frame(number)) if number == frame.record.input.frame) {
+                        found.get_or_insert(at_ns);
+                    }
+                }
+                phase_of(&frame.record.output)
+            }
+            Entry::Telemetry(telemetry) => {
+                telemetry.phase.and_then(|phase| Phase::from_index(u8::try_from(phase).ok()?))
+            }
+            _ => None,
+        };
+        if let Some(phase) = phase {
+            begins.entry(phase).or_insert(at_ns);
+        }
+    }
+    let first_ns = first_ns.unwrap_or(0);
+    let at_ns = |moment: Option<Moment>, frame_ns: Option<u64>, otherwise: u64| {
+        let Some(moment) = moment else { return Ok(otherwise) };
+        let found = match moment {
+            Moment::Frame(_) => frame_ns,
+            Moment::Phase(phase) => begins.get(&phase).copied(),
+            Moment::Time(time) => clocks.convert(time, Clock::Log).map(|ClockTime { time_s, .. }| {
+                // A time before the first record is the beginning.
+                first_ns + (1e9 * time_s.max(0.0)) as u64
+            }),
+        };
+        found.ok_or_else(|| CutError::NoMoment { name: log.name().to_owned(), moment })
+    };
+    Ok((at_ns(wanted.from, frames_ns[0], 0)?, at_ns(wanted.until, frames_ns[1], u64::MAX)?))
+}
+
+/// Writes what was kept, and what can still be proven, as text.
+///
+/// # Errors
+/// The output failed.
+pub fn print_cut(cut: &CutOut, output: &mut impl Write) -> io::Result<()> {
+    let CutOut { messages, left_out, chained, .. } = cut;
+    writeln!(
+        output,
+        "{}: kept {}, left out {left_out}; written to {}",
+        shown(&cut.input),
+        counted(*messages, "message"),
+        cut.output.display()
+    )?;
+    if *chained > 0 {
+        writeln!(output, "{chained} of them are older than the span: what comes later hangs on them")?;
+    }
+    let verified = if cut.can_be_verified {
+        "`replay verify` runs the flight computer again, from its beginning to where this log ends"
+    } else {
+        "`replay verify` CANNOT run it again: the flight computer's start or its frames are not in it"
+    };
+    writeln!(output, "{verified}")?;
+    if cut.has_book {
+        writeln!(output, "`replay verify --book` proves the book up to its last signed end in this log")?;
+    }
+    Ok(())
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The log.
+    file: PathBuf,
+    /// The log to write.
+    output: PathBuf,
+    /// Only these topics; a * at the end matches any rest.
+    topics: Vec<String>,
+    /// Begin here: T+12.9, boot:19.8, log:19.7, POWERED or frame:1290.
+    ///
+    /// The frames of the flight computer and the entries of a book are kept from the beginning: what comes later hangs on
+    /// them.
+    #[arg(long, value_name = "WHERE")]
+    from: Option<Moment>,
+    /// End here, in the same words.
+    #[arg(long, value_name = "WHERE")]
+    until: Option<Moment>,
+    /// Replace an existing file, but never the log that is cut.
+    #[arg(long)]
+    force: bool,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<Outcome> {
+        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
+        let cut = cut(&self.file, &wanted, destination)?;
+        answer(|output| if self.json { print_json(&cut, output) } else { print_cut(&cut, output) })?;
+        Ok(Outcome::Given)
+    }
+}
