@@ -110,6 +110,23 @@ fn send_all(target: SocketAddr, kind: Traffic, stop: &AtomicBool, sent: &AtomicU
     }
 }
 
+/// What a ground has counted since it was connected. None of it depends on how long anything took.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counted {
+    heartbeats: u32,
+    asked: u32,
+    answered: u32,
+    /// The vehicle's clock at its first answer and at its last, ns.
+    clock_ns: Option<(i64, i64)>,
+}
+
+impl Counted {
+    /// The seconds that have passed on the vehicle between its first answer and its last.
+    fn vehicle_s(&self) -> f64 {
+        self.clock_ns.map_or(0.0, |(first_ns, last_ns)| (last_ns - first_ns) as f64 / 1e9)
+    }
+}
+
 /// A ground station on one socket. It sends first and measures how long the vehicle takes to answer.
 struct TimedGround {
     socket: UdpSocket,
@@ -124,6 +141,7 @@ struct TimedGround {
     /// The same for the answers to questions that are asked ten times a second.
     answer_at: Instant,
     worst_answer: Duration,
+    counted: Counted,
     /// Whether the vehicle has accepted the abort.
     accepted: bool,
     /// Whether the vehicle reports that the abort is latched.
@@ -146,6 +164,7 @@ impl TimedGround {
             worst_beat: Duration::ZERO,
             answer_at: at,
             worst_answer: Duration::ZERO,
+            counted: Counted::default(),
             accepted: false,
             latched: false,
         }
@@ -180,6 +199,7 @@ impl TimedGround {
             }
             if asked_at.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
                 asked_at = Some(now());
+                self.counted.asked += 1;
                 let Address { system_id: target_system, component_id: target_component } = VEHICLE;
                 self.send(&MavMessage::TIMESYNC(TIMESYNC_DATA {
                     tc1: 0,
@@ -208,6 +228,7 @@ impl TimedGround {
             Ok(MavMessage::HEARTBEAT(beat)) if frame.source() == VEHICLE => {
                 self.worst_beat = self.worst_beat.max(self.beat_at.elapsed());
                 self.beat_at = now();
+                self.counted.heartbeats += 1;
                 self.latched |= beat.system_status == MavState::MAV_STATE_FLIGHT_TERMINATION;
             }
             Ok(MavMessage::COMMAND_ACK(answer)) => {
@@ -216,6 +237,9 @@ impl TimedGround {
             Ok(MavMessage::TIMESYNC(sync)) if sync.tc1 != 0 => {
                 self.worst_answer = self.worst_answer.max(self.answer_at.elapsed());
                 self.answer_at = now();
+                self.counted.answered += 1;
+                let (first_ns, _) = self.counted.clock_ns.unwrap_or((sync.tc1, sync.tc1));
+                self.counted.clock_ns = Some((first_ns, sync.tc1));
             }
             _ => {}
         }
@@ -229,6 +253,7 @@ impl TimedGround {
         self.run_until(began + within, |ground| ground.answer_at > began && ground.beat_at > began);
         assert!(self.answer_at > began && self.beat_at > began, "no connection within {within:?}");
         (self.worst_beat, self.worst_answer) = (Duration::ZERO, Duration::ZERO);
+        self.counted = Counted::default();
         began.elapsed()
     }
 
@@ -264,6 +289,7 @@ struct Attempt {
     latched: Duration,
     worst_beat: Duration,
     worst_answer: Duration,
+    counted: Counted,
 }
 
 /// The strangers send first; then the ground starts, runs for a while, and aborts.
@@ -276,16 +302,28 @@ fn abort_among(kind: Traffic, keyed: bool, run_time: Duration) -> Attempt {
     ground.wait_until_connected(PATIENCE);
     ground.run_until(now() + run_time, |_| false);
     let latched = ground.abort();
-    Attempt { latched, worst_beat: ground.worst_beat, worst_answer: ground.worst_answer }
+    let TimedGround { worst_beat, worst_answer, counted, .. } = ground;
+    Attempt { latched, worst_beat, worst_answer, counted }
 }
 
-/// HEARTBEAT is sent once a second and may be half a second late. On a busy machine the kernel's queue may lose
-/// single answers, but not five in a row.
-fn check(attempt: &Attempt, case: &str) {
+fn check_abort(attempt: &Attempt, case: &str) {
     assert!(
         attempt.latched <= Duration::from_millis(500),
         "{case}: the abort was latched too late: {attempt:?}"
     );
+}
+
+/// A heartbeat in each second of the vehicle's clock, also if the machine is so busy that they come late. The kernel's queue
+/// may lose single questions, but not most.
+fn check_counted(attempt: &Attempt, case: &str) {
+    let Counted { heartbeats, asked, answered, .. } = attempt.counted;
+    let whole_seconds = attempt.counted.vehicle_s().floor();
+    assert!(f64::from(heartbeats) >= whole_seconds, "{case}: a heartbeat is missing: {attempt:?}");
+    assert!(whole_seconds > 1.0 && 2 * answered > asked, "{case}: answers are missing: {attempt:?}");
+}
+
+/// HEARTBEAT is sent once a second and may be half a second late, and not five answers in a row are missing: on an idle machine.
+fn check_gaps(attempt: &Attempt, case: &str) {
     assert!(
         attempt.worst_beat <= Duration::from_millis(1_500),
         "{case}: a heartbeat is missing: {attempt:?}"
@@ -299,7 +337,9 @@ fn strangers_do_not_delay_an_abort() {
         for keyed in [true, false] {
             let attempt = abort_among(kind, keyed, Duration::from_secs(3));
             println!("{kind:?}, key {keyed}: {attempt:?}");
-            check(&attempt, &format!("{kind:?}, key {keyed}"));
+            let case = format!("{kind:?}, key {keyed}");
+            check_abort(&attempt, &case);
+            check_counted(&attempt, &case);
         }
     }
 }
@@ -323,7 +363,9 @@ fn a_hundred_aborts_of_each_kind_are_latched_within_half_a_second() {
                 longest(|attempt| attempt.worst_answer)
             );
             for attempt in &attempts {
-                check(attempt, &format!("{kind:?}, key {keyed}"));
+                let case = format!("{kind:?}, key {keyed}");
+                check_abort(attempt, &case);
+                check_gaps(attempt, &case);
             }
         }
     }
