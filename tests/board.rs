@@ -8,6 +8,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
 
 use e2e::{
     Ended, Program, Random, Running, SerialLine, Signal, Terminal, auto_ground, expect_identical_replay,
@@ -71,9 +72,16 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
     let mut screen = Terminal::start(&ground, (100, 40), false);
     screen.wait_for("every arming check passes");
-    screen.type_until(b"AARM\r", " ARMED ");
-    screen.type_until(b"SSTART\r", "START  commanded");
-    screen.wait_for("Falling");
+    // A busy machine may leave the radio silent for a second, which holds the countdown: then the crew starts anew.
+    let falls = |screen: &Terminal| {
+        screen.wait_within(Duration::from_secs(30), |window| window.shows("Falling").then_some(())).is_some()
+    };
+    let flown = (0..3).any(|_| {
+        screen.type_until(b"AARM\r", " ARMED ");
+        screen.type_until(b"SSTART\r", "START  commanded");
+        falls(&screen)
+    });
+    assert!(flown, "{}", screen.window().rows().join("\n"));
     screen.type_bytes(b"\x18\r");
     screen.wait_for("Parachute");
     screen.wait_for("On the ground");
