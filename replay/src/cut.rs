@@ -28,7 +28,7 @@ use crate::recover::write::{Kept, Rescue};
 /// A record of these says nothing without those before it.
 const CHAINED: [&str; 4] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_BOOK, TOPIC_BOOK_HEAD];
 /// The run fact that says what a log was cut from.
-const CUT_FROM: &str = "cut_from";
+pub(crate) const CUT_FROM: &str = "cut_from";
 
 /// Why nothing was cut.
 #[derive(Debug, thiserror::Error)]

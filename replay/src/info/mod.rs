@@ -16,6 +16,7 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
+use crate::cut::CUT_FROM;
 use crate::findings::{self, FindingFacts};
 use crate::log::{
     AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, Recording,
@@ -433,7 +434,8 @@ fn completeness(info: &Info) -> String {
         faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
     }
     if found.messages_lost > 0 {
-        faults.push(format!("{} lost", counted(found.messages_lost, "message")));
+        let how = if info.run.contains_key(CUT_FROM) { "cut out or lost" } else { "lost" };
+        faults.push(format!("{} {how}", counted(found.messages_lost, "message")));
     }
     faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
     format!("NO: {}", faults.join("; "))

@@ -61,7 +61,10 @@ fn a_span_keeps_what_later_records_hang_on_and_is_verified_to_its_end() {
     let (frames, flown) =
         (Recording::open(&made.path).unwrap().frames, Recording::open(&WITH_FRAMES.log).unwrap().frames);
     assert!(frames.len() < flown.len() && frames[..] == flown[..frames.len()]);
-    assert!(info(&made.path).unwrap().run["cut_from"].contains("from POWERED, until TOUCHDOWN"));
+    let described = info(&made.path).unwrap();
+    assert!(described.run["cut_from"].contains("from POWERED, until TOUCHDOWN"));
+    let (_, said, _) = run(&mut replay("info", &made.path));
+    assert!(said.contains("messages cut out or lost; the flight ends"), "{said}");
 }
 
 #[test]
