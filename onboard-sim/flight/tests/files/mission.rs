@@ -1,5 +1,4 @@
 use flight::estimation::estimator::EstimatorConfig;
-use flight::guidance::ignition::IgnitionSettings;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::site::Site;
 use flight::vehicles::mission::{BUILTIN, from_toml, is_meant};
@@ -74,9 +73,9 @@ fn another_motor_brings_its_own_curve() {
     assert_ne!(other.motor_curve, mission.motor_curve);
 }
 
-/// The two files repeat each other, so that each can be read and changed alone: a number that changes in one of them has to change
-/// in the other. Only mk3's estimator has its two doubts, and only mk3's legs let it begin higher: mk2 stays as it was, for
-/// comparison.
+/// The two files repeat each other, so that each can be read and changed alone. Until a search finds better numbers for
+/// mk3, a number that changes in one of them has to change in the other. Only mk3's estimator has its two doubts: mk2 stays
+/// as it was, for comparison.
 #[test]
 fn mk3_flies_with_the_numbers_of_mk2() {
     let read = |name: &str| flight::vehicles::mission::builtin(name).expect("built in").expect("sound");
@@ -91,12 +90,7 @@ fn mk3_flies_with_the_numbers_of_mk2() {
         |mission: &Mission| mission.descent.stiffness_m3 / mission.airframe.mass.loaded_pitch_inertia_kg_m2;
     assert!((per_inertia(&mk2) - per_inertia(&mk3)).abs() < 0.001);
     let descent = mk2.descent;
-    assert!(mk3.ignition.place > mk2.ignition.place);
-    let ignition = IgnitionSettings { place: mk2.ignition.place, ..mk3.ignition };
-    assert_eq!(
-        Mission { name, summary, airframe, estimator, drop, leg_limits, descent, ignition, ..mk3 },
-        mk2
-    );
+    assert_eq!(Mission { name, summary, airframe, estimator, drop, leg_limits, descent, ..mk3 }, mk2);
 }
 
 #[test]
