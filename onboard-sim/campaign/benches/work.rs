@@ -1,7 +1,8 @@
 //! How much work plans are: the solver's passes over an interval in each planned landing, in the unit of
-//! `powered.max_passes`, without that bound.
+//! `powered.max_passes`.
 //!
-//! `cargo bench -p campaign --bench work` flies 200 flights of each kind; `-- 20` flies 20, and `-- 20 6000` with a bound of 6,000.
+//! `cargo bench -p campaign --bench work` flies 200 flights of each kind; `-- 20` flies 20; `-- 20 6000 mk2 mk3` flies only
+//! these missions, with a bound of 6,000.
 #![expect(clippy::unwrap_used, reason = "a built-in mission that cannot be flown ends the program")]
 #![expect(clippy::print_stdout, reason = "the table is its output")]
 
@@ -16,8 +17,11 @@ const SEED: u64 = 3001;
 const FLIGHTS: u64 = 200;
 
 fn main() {
-    let asked: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
-    let flights = asked.first().map_or(FLIGHTS, |flights| *flights as u64);
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let names: Vec<&str> =
+        asked.iter().map(String::as_str).filter(|name| name.starts_with(['m', 'v'])).collect();
+    let mut numbers = asked.iter().filter_map(|argument| argument.parse().ok());
+    let (flights, bound): (u64, Option<u64>) = (numbers.next().unwrap_or(FLIGHTS), numbers.next());
     println!(
         "{:24} {:>6} {:>7} {:>7} {:>7} {:>7} {:>7}",
         "", "landed", "plans", "median", "p99", "p99.9", "most"
@@ -25,17 +29,23 @@ fn main() {
     for (mission, start) in [
         ("mk2", StartPoint::Apogee),
         ("mk2", StartPoint::Pad),
+        ("mk2", StartPoint::Drone),
         ("mk3", StartPoint::Apogee),
         ("mk3", StartPoint::Pad),
         ("vlr", StartPoint::Drone),
         ("vlr-f15", StartPoint::Drone),
         ("vlr-f16", StartPoint::Drone),
         ("mini-f10", StartPoint::Apogee),
+        ("mk2-h53", StartPoint::Apogee),
     ] {
+        if !names.is_empty() && !names.contains(&mission) {
+            continue;
+        }
         for set in ["field", "real", "wild"] {
             let recipe = Recipe::built_in(mission, set).unwrap().starting_at(start).unwrap();
             let mut recipe = Recipe { seed: SEED, ..recipe };
-            recipe.mission.powered.max_passes = asked.get(1).copied();
+            recipe.mission.powered.max_passes =
+                bound.map_or(recipe.mission.powered.max_passes, |bound| Some(bound as usize));
             let numbers: Vec<u64> = (0..flights).collect();
             let flown = in_parallel(&numbers, |number| passes(&recipe, *number), &|_| {});
             let landed = flown.iter().filter(|(_, landed)| *landed).count();

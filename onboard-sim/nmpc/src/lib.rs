@@ -65,6 +65,8 @@ pub enum SolveStatus {
     NotLandable,
     /// The problem or the start is not finite; nothing was solved.
     BadInput,
+    /// The bound of the work of a tick ended the solve; the best iterate is returned.
+    WorkLimit,
 }
 
 impl SolveStatus {
@@ -78,10 +80,11 @@ impl SolveStatus {
             Self::SubproblemFailed => "subproblem failed",
             Self::NotLandable => "not landable",
             Self::BadInput => "bad input",
+            Self::WorkLimit => "work limit",
         }
     }
 
-    /// The number in telemetry and logs, 0 to 6.
+    /// The number in telemetry and logs, 0 to 7.
     pub fn index(self) -> u8 {
         self as u8
     }

@@ -86,6 +86,7 @@ impl Workspace {
         solution.status = match outcome.status {
             Status::Converged => SolveStatus::Converged,
             Status::IterationLimit => SolveStatus::IterationLimit,
+            Status::WorkLimit => SolveStatus::WorkLimit,
             Status::Stalled => SolveStatus::Stalled,
             Status::SubproblemFailed => SolveStatus::SubproblemFailed,
             Status::NotFinite => SolveStatus::BadInput,

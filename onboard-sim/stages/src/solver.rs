@@ -166,7 +166,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             if residual.largest(0.0) <= tolerance {
                 break Status::Converged;
             }
-            if iterations >= cap || self.allowance.is_spent() {
+            if self.allowance.is_spent() {
+                break Status::WorkLimit;
+            }
+            if iterations >= cap {
                 break Status::IterationLimit;
             }
             iterations += 1;
@@ -271,7 +274,7 @@ impl Allowance {
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Allows the coming solves so many passes together, or any number; a pass is one interval evaluated with its derivatives, or
     /// eliminated by a backward sweep. An iteration that has begun is finished. A solve without passes ends
-    /// at its iteration limit: cold with its first guess, warm with the start's inputs.
+    /// with [`Status::WorkLimit`]: cold with its first guess, warm with the start's inputs.
     pub fn allow(&mut self, passes: Option<usize>) {
         self.allowance = Allowance { made: 0, most: passes };
     }

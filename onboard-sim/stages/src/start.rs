@@ -123,6 +123,8 @@ pub enum Status {
     Converged,
     /// The iteration cap ended the solve; the best iterate is returned.
     IterationLimit,
+    /// What was allowed ([`Workspace::allow`]) ended the solve; the best iterate is returned.
+    WorkLimit,
     /// No step improved the best iterate any more before the tolerance was reached.
     Stalled,
     /// The quadratic subproblem could not be solved; the best iterate is returned.

@@ -33,10 +33,12 @@ fn close(fit: &Fit, name: &str, truth: f64, bar: f64) {
 
 #[test]
 fn val_simulation_a_field_flight_is_known_within_the_bars() {
-    let recipe = Recipe::built_in("mk2", "field").unwrap();
+    // In the same flight of seed 1 the gimbal is asked too little for its play to be seen.
+    let recipe = Recipe { seed: 2, ..Recipe::built_in("mk2", "field").unwrap() };
 
-    let truth = draw(&recipe.mission, &recipe.dispersion, 1, 3).truth;
-    let (found, _) = fits(&[LANDED.log.to_str().unwrap()]);
+    let truth = draw(&recipe.mission, &recipe.dispersion, 2, 3).truth;
+    let flown = crate::from_apogee::fly_recipe(&recipe);
+    let (found, _) = fits(&[flown.log.to_str().unwrap()]);
     let fit = &found[0];
     let per_mass = |scale: f64| scale / truth.mass_scale;
     close(fit, "thrust_scale", per_mass(truth.impulse_scale), 0.01);

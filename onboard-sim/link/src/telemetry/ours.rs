@@ -189,6 +189,7 @@ fn td_status(status: nmpc::SolveStatus) -> TdSolverStatus {
         S::SubproblemFailed => TdSolverStatus::TD_SOLVER_STATUS_SUBPROBLEM_FAILED,
         S::NotLandable => TdSolverStatus::TD_SOLVER_STATUS_NOT_LANDABLE,
         S::BadInput => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
+        S::WorkLimit => TdSolverStatus::TD_SOLVER_STATUS_WORK_LIMIT,
     }
 }
 
@@ -407,6 +408,7 @@ mod tests {
             S::SubproblemFailed,
             S::NotLandable,
             S::BadInput,
+            S::WorkLimit,
         ] {
             assert_eq!(td_status(status) as u32, u32::from(status.index()));
         }

@@ -39,6 +39,24 @@ pub type State = [f64; STATES];
 /// The buffers of a solve, and its result.
 pub type SpaceWorkspace = stages::Workspace<SpaceProblem, STATES, INPUTS>;
 
+/// [`stages::Workspace::solve`], compiled here with the solver's settings: a program may compile what calls it for size.
+pub fn solve(
+    workspace: &mut SpaceWorkspace,
+    problem: &SpaceProblem,
+    start: Option<&Start<'_, STATES, INPUTS>>,
+) -> Outcome {
+    workspace.solve(problem, start)
+}
+
+/// [`stages::Workspace::lagrangian`], compiled here as well.
+pub fn lagrangian(
+    workspace: &mut SpaceWorkspace,
+    problem: &SpaceProblem,
+    solution: &Start<'_, STATES, INPUTS>,
+) -> f64 {
+    workspace.lagrangian(problem, solution)
+}
+
 /// What an interval has of its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Push {

@@ -118,9 +118,9 @@ fn solves_share_their_passes() {
     let mut workspace = Workspace::default();
     workspace.allow(Some(6 * INTERVALS));
     let first = workspace.solve(&model, None);
-    assert!(workspace.is_spent() && first.status == Status::IterationLimit, "{first:?}");
+    assert!(workspace.is_spent() && first.status == Status::WorkLimit, "{first:?}");
     let second = workspace.solve(&model, None);
-    assert!(second.iterations == 0 && second.status == Status::IterationLimit, "{second:?}");
+    assert!(second.iterations == 0 && second.status == Status::WorkLimit, "{second:?}");
     workspace.allow(None);
     assert_eq!(workspace.solve(&model, None).status, Status::Converged);
     assert!(!workspace.is_spent());

@@ -205,13 +205,17 @@ impl PoweredGuidance {
     /// Solves a problem into the trial, from the flown plan.
     fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
         let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
-        solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
-        let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
-        if tilts && !self.workspace.is_spent() {
-            // A loop satisfies the equations, but no vehicle can fly it in air. Solve again with a higher cost of tilt.
-            problem.landing.state_weights[2] *= UPRIGHT_COST_FACTOR;
-            solve_free_time_into(problem, &Ahead(situation), None, &mut self.workspace, &mut self.trial);
+        if !self.flown.as_ref().is_some_and(|flown| flown.upright) {
+            solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
+            let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
+            if !tilts || self.workspace.is_spent() {
+                return;
+            }
         }
+        // A loop satisfies the equations, but no vehicle can fly it in air. Solve with a higher cost of tilt. While that
+        // lands it is kept: the other cost would lead back to the loop, in each tick.
+        problem.landing.state_weights[2] *= UPRIGHT_COST_FACTOR;
+        solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
     }
 
     fn pose(
@@ -299,6 +303,7 @@ impl PoweredGuidance {
         let ahead = Ahead(situation);
         let flown = self.flown.get_or_insert_with(|| core::mem::take(&mut self.unused));
         flown.begins_s = time_s;
+        flown.upright = lands && problem.landing.state_weights[2] > self.settings.weights.theta;
         flown.turning_rad_s2.clear();
         flown.turning_rad_s2.extend(
             (0..problem.intervals)
@@ -446,7 +451,8 @@ mod tests {
                 * RigidState::upright(0.0).world_from_body,
             ..RigidState::upright(7.0 + feet_below_cg_m)
         };
-        let mut guidance = PoweredGuidance::new(mission.powered);
+        // Without a bound: a cold search that is cut short has not found yet how hard this ends.
+        let mut guidance = PoweredGuidance::new(PoweredSettings { max_passes: None, ..mission.powered });
         guidance.plan(0.0, &state, &situation, None);
         guidance
     }

@@ -213,6 +213,8 @@ pub(super) struct Flown {
     /// Rotational acceleration of a unit sine of the gimbal angle in each interval, rad/s^2.
     pub(super) turning_rad_s2: Vec<f64>,
     pub(super) plan: FreeTimeSolution,
+    /// It lands, planned with the higher cost of tilt.
+    pub(super) upright: bool,
 }
 
 impl Flown {

@@ -146,7 +146,7 @@ impl SpaceGuidance {
             .is_some_and(|flown| self.warm.take_last(flown, intervals, problem.end.settled_nodes));
         let warm = is_warm.then(|| self.warm.start());
         self.workspace.allow(settings.max_passes);
-        let mut best = self.workspace.solve(&problem, warm.as_ref());
+        let mut best = nmpc::space::solve(&mut self.workspace, &problem, warm.as_ref());
         self.found.read(&self.workspace, &problem, time_s);
 
         let mut iterations = best.iterations;
@@ -157,7 +157,7 @@ impl SpaceGuidance {
             }
             let mut lagrangian = |at_s: f64| {
                 stretch(&mut problem, at_s);
-                self.workspace.lagrangian(&problem, &self.found.start())
+                nmpc::space::lagrangian(&mut self.workspace, &problem, &self.found.start())
             };
             let slope = lagrangian(final_time_s + DIFFERENCE_S) - lagrangian(final_time_s - DIFFERENCE_S);
             let to_s = if slope > 0.0 { final_time_s - step_s } else { final_time_s + step_s };
@@ -166,7 +166,7 @@ impl SpaceGuidance {
                 break;
             }
             stretch(&mut problem, to_s);
-            let outcome = self.workspace.solve(&problem, Some(&self.found.start()));
+            let outcome = nmpc::space::solve(&mut self.workspace, &problem, Some(&self.found.start()));
             iterations += outcome.iterations;
             if outcome.merit < best.merit {
                 self.trial.read(&self.workspace, &problem, time_s);
@@ -223,6 +223,7 @@ fn status(status: Status) -> SolveStatus {
     match status {
         Status::Converged => SolveStatus::Converged,
         Status::IterationLimit => SolveStatus::IterationLimit,
+        Status::WorkLimit => SolveStatus::WorkLimit,
         Status::Stalled => SolveStatus::Stalled,
         Status::SubproblemFailed => SolveStatus::SubproblemFailed,
         Status::NotFinite => SolveStatus::BadInput,
