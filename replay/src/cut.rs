@@ -41,6 +41,8 @@ pub enum CutError {
     /// The log does not say when that was.
     #[error("{name}: has no {moment}")]
     NoMoment { name: String, moment: Moment },
+    #[error("{name}: {until} is before {from}: nothing lies between")]
+    Backwards { name: String, from: Moment, until: Moment },
     /// Nothing is left.
     #[error("{name}: no message is of that time and those topics; it has {}", topics.join(", "))]
     Nothing { name: String, topics: Vec<String> },
@@ -100,6 +102,9 @@ pub fn cut<'a>(
         return Err(CutError::Damaged { name, damage });
     }
     let (from_ns, until_ns) = span_ns(input, wanted)?;
+    if let (Some(from), Some(until), true) = (wanted.from, wanted.until, until_ns < from_ns) {
+        return Err(CutError::Backwards { name, from, until });
+    }
     let (mut chained, mut kept_topics) = (0, BTreeSet::new());
     let mut keeps = |topic: &str, at_ns: u64| {
         let is_before = at_ns < from_ns;
@@ -119,8 +124,10 @@ pub fn cut<'a>(
     }
     let Kept { messages, left_out, .. } = rescue.kept();
     if messages == 0 {
-        let topics = contents.told.channels.into_values().map(|channel| channel.topic).collect();
-        return Err(CutError::Nothing { name, topics });
+        // A topic may have a channel a link.
+        let topics: BTreeSet<String> =
+            contents.told.channels.into_values().map(|channel| channel.topic).collect();
+        return Err(CutError::Nothing { name, topics: topics.into_iter().collect() });
     }
     let facts = BTreeMap::from([(CUT_FROM.to_owned(), words_of(&name, wanted))]);
     rescue.finish(&Metadata { name: METADATA_RUN.to_owned(), metadata: facts })?;

@@ -86,6 +86,8 @@ fn what_cannot_be_cut_is_refused_with_the_reason() {
     assert!(refused(Some("BOOST"), &[]).ends_with("has no BOOST"));
     assert!(refused(Some("frame:999999"), &[]).ends_with("has no frame 999999"));
     assert!(refused(None, &["/nothing"]).contains("it has /"));
+    let backwards = made(Some("TOUCHDOWN"), Some("POWERED"), &[]).err().unwrap().to_string();
+    assert!(backwards.ends_with("POWERED is before TOUCHDOWN: nothing lies between"), "{backwards}");
     let folder = tempfile::tempdir().unwrap();
     let half = folder.path().join("half.mcap");
     let bytes = std::fs::read(&WITH_FRAMES.log).unwrap();
