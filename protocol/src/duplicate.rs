@@ -9,21 +9,19 @@ use crate::frame::Frame;
 use crate::identity::Address;
 
 /// A frame may arrive this much later over one link than over another. A SiK radio lags by about 0.3 s; an overloaded
-/// link lags by seconds. If a copy were not detected, its command would be executed again.
+/// link, or all of them after the computer slept, by seconds. If a copy were not detected, its command would be executed again.
 const MAX_DELAY: Duration = Duration::from_secs(10);
-/// Sequence numbers repeat after 256 frames. After this many frames, a frame with the same number and content is a
-/// new one.
-const MAX_FRAMES_APART: u64 = 200;
+/// So many frames with the same number are remembered: 4,096 of a source, more than it sends in that time.
+const MAX_OF_A_NUMBER: usize = 16;
 /// At most this many sources are remembered, so that a flood of forged ids cannot fill the memory.
 const MAX_SOURCES: usize = 16;
 
 /// A frame at its first arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct LastCopy {
+struct Heard {
     at: Duration,
-    /// How many frames of its source arrived before it.
-    nth: u64,
-    link: usize,
+    /// The links over which it has arrived, a bit each.
+    links: u64,
     operator: u8,
     message_id: u32,
     crc: u16,
@@ -32,18 +30,12 @@ struct LastCopy {
 /// Tells copies apart from new frames.
 ///
 /// A component numbers its frames once for all links, so a copy has the sequence number and the checksum of a frame
-/// that arrived over another link shortly before. A frame that arrives twice over the same link is no copy: its
-/// sender sent it twice, or does not number its frames.
+/// that arrived over other links shortly before, and not over this one. A frame that arrives twice over the same link is no
+/// copy: its sender sent it twice, has used all its numbers since, or does not number its frames.
 #[derive(Debug, Default)]
 pub struct Duplicates {
-    sources: BTreeMap<Address, SourceHistory>,
-}
-
-/// The last frame of each sequence number of a source, and how many frames arrived from it.
-#[derive(Debug)]
-struct SourceHistory {
-    ring: Vec<Option<LastCopy>>,
-    heard: u64,
+    /// Of each source the frames that may still have copies, by sequence number, oldest first.
+    sources: BTreeMap<Address, Vec<Vec<Heard>>>,
 }
 
 impl Duplicates {
@@ -52,34 +44,34 @@ impl Duplicates {
     }
 
     /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether it is a copy. Nobody
-    /// can turn another one's frame into a copy.
+    /// can turn another one's frame into a copy. Over a link from the 65th on nothing is a copy.
     pub fn is_copy(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
         let source = frame.source();
         if !self.sources.contains_key(&source) && self.sources.len() >= MAX_SOURCES {
             return false;
         }
-        let of =
-            self.sources.entry(source).or_insert_with(|| SourceHistory { ring: vec![None; 256], heard: 0 });
-        let place = &mut of.ring[usize::from(frame.sequence())];
-        let heard = LastCopy {
-            at: now,
-            nth: of.heard,
-            link,
-            operator,
-            message_id: frame.message_id(),
-            crc: frame.crc(),
-        };
-        let is_copy = place.is_some_and(|seen| {
-            seen.link != link
-                && now.saturating_sub(seen.at) <= MAX_DELAY
-                && heard.nth - seen.nth < MAX_FRAMES_APART
-                && (seen.operator, seen.message_id, seen.crc) == (heard.operator, heard.message_id, heard.crc)
+        let of = self.sources.entry(source).or_insert_with(|| vec![Vec::new(); 256]);
+        let heard = &mut of[usize::from(frame.sequence())];
+        heard.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
+        let over = u32::try_from(link).ok().and_then(|link| 1_u64.checked_shl(link)).unwrap_or(0);
+        let content = (operator, frame.message_id(), frame.crc());
+        let first = heard.iter_mut().find(|earlier| {
+            earlier.links & over == 0 && (earlier.operator, earlier.message_id, earlier.crc) == content
         });
-        if !is_copy {
-            *place = Some(heard);
-            of.heard += 1;
+        match first {
+            Some(first) if over != 0 => {
+                first.links |= over;
+                true
+            }
+            _ => {
+                if heard.len() >= MAX_OF_A_NUMBER {
+                    heard.remove(0);
+                }
+                let (operator, message_id, crc) = content;
+                heard.push(Heard { at: now, links: over, operator, message_id, crc });
+                false
+            }
         }
-        is_copy
     }
 }
 
@@ -116,6 +108,25 @@ mod tests {
         for frame in 0..1_000 {
             let beat = encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             assert!(!duplicates.is_copy(&beat, 0, frame % 2, Duration::from_millis(frame as u64)), "{frame}");
+        }
+    }
+
+    /// A computer that slept hears some seconds of each link at once: more frames than there are numbers.
+    #[test]
+    fn a_link_that_is_read_long_after_another_one_has_copies_alone() {
+        let mut encoder = Encoder::new(VEHICLE);
+        let frames: Vec<_> = (0..1_000)
+            .map(|mode| {
+                let beat = HEARTBEAT_DATA { custom_mode: mode / 600, ..HEARTBEAT_DATA::default() };
+                encoder.encode(&MavMessage::HEARTBEAT(beat))
+            })
+            .collect();
+        let mut duplicates = Duplicates::new();
+        for link in 0..3 {
+            for (nth, frame) in frames.iter().enumerate() {
+                let now = Duration::from_secs(link as u64);
+                assert_eq!(duplicates.is_copy(frame, 0, link, now), link > 0, "frame {nth} over link {link}");
+            }
         }
     }
 

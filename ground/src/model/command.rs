@@ -430,6 +430,8 @@ pub(crate) enum AutoStep {
         not_before: Duration,
     },
     WaitForArmed,
+    /// The countdown runs. Held because one did not hear the other, it is started anew.
+    Started,
     Done,
 }
 

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
-use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdPhase};
+use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdHold, TdPhase};
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
@@ -298,7 +298,22 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
                 start_auto(model, now);
             }
         }
+        AutoStep::Started => match phase {
+            Some(TdPhase::TD_PHASE_PAD_ARMED) => start_anew_if_silent(model, now),
+            Some(TdPhase::TD_PHASE_PAD_IDLE) | None => {}
+            Some(_) => model.auto_step = AutoStep::Done,
+        },
         AutoStep::Done => {}
+    }
+}
+
+/// A computer that was busy or asleep for a second holds a countdown. Its link carries again, so the run goes on.
+fn start_anew_if_silent(model: &mut Model, now: Duration) {
+    let silent = |hold| matches!(hold, TdHold::TD_HOLD_UPLINK_SILENT | TdHold::TD_HOLD_STATION_DEAF);
+    let held = model.vehicle.status.as_ref().is_some_and(|status| silent(status.value.hold));
+    let withdrawn = model.commands.of(CommandKind::Start).is_some_and(|track| track.is_withdrawn);
+    if held && withdrawn && model.vehicle.is_armed() && model.link.uplink.is_proven(now) {
+        start_auto(model, now);
     }
 }
 
@@ -367,7 +382,7 @@ fn start_auto(model: &mut Model, now: Duration) {
         return model.warn(now, format!("automatic mode: not started: {why}"));
     }
     model.info(now, "automatic mode: starting");
-    model.auto_step = AutoStep::Done;
+    model.auto_step = AutoStep::Started;
     if model.vehicle.countdown_s().is_none() {
         submit(model, CommandKind::Start, Seat::automatic(), now);
     }

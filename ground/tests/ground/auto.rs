@@ -3,7 +3,7 @@
 use crate::rig::{Rig, is_arm, settings};
 use ground::exit::{Exit, decide};
 use ground::model::Settings;
-use protocol::dialect::{MavCmd, TdPhase};
+use protocol::dialect::{MavCmd, TdHold, TdPhase};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const TEMPORARILY_REJECTED: u8 = 1;
@@ -26,6 +26,30 @@ fn the_automatic_mode_arms_and_starts_once() {
     let commands = rig.take_commands();
     assert_eq!(commands.len(), 1);
     assert_eq!(commands[0].command, MavCmd::MAV_CMD_MISSION_START);
+}
+
+/// A computer that sleeps for a second makes the vehicle hold its countdown.
+#[test]
+fn a_countdown_that_silence_has_held_is_started_anew_and_one_that_a_person_has_held_is_not() {
+    for (hold, starts) in [(TdHold::TD_HOLD_UPLINK_SILENT, 1), (TdHold::TD_HOLD_COMMANDED, 0)] {
+        let mut rig = Rig::new(settings(true, false));
+        rig.run(2.0);
+        rig.answer(ARM, 0);
+        rig.armed = true;
+        rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+        rig.run(1.0);
+        rig.answer(MavCmd::MAV_CMD_MISSION_START, 0);
+        rig.countdown_ms = 5_000;
+        rig.run(1.0);
+        rig.take_commands();
+        rig.countdown_ms = i32::MAX;
+        rig.hold = hold;
+        // Not long enough for a second attempt of the same command.
+        rig.run(0.4);
+        let again = rig.take_commands();
+        assert_eq!(again.len(), starts, "{hold:?}: {}", rig.events());
+        assert!(again.iter().all(|sent| sent.command == MavCmd::MAV_CMD_MISSION_START), "{again:?}");
+    }
 }
 
 #[test]
