@@ -1,7 +1,9 @@
 """acados on the landing problem, in every one of its ways.
 
 Dynamics are discrete: the same RK4 step as everybody's. One solver for each length of the horizon, all from one
-generated program for each way.
+generated program for each way: exact Hessians (CONVEXIFY) or Gauss-Newton, HPIPM after partial or full condensing. Cold with
+a merit line search; warm with full steps, all multipliers and the slacks handed over, the path rolled out from the kicked
+state. A few microseconds of its Python interface are in its times.
 """
 
 import dataclasses

@@ -1,4 +1,10 @@
-"""ripopt, an interior-point method in Rust, through its C interface, with the compiled functions that IPOPT gets."""
+"""ripopt, an interior-point method in Rust, through its C interface, with the compiled functions that IPOPT gets.
+
+From crates.io, built for this processor, with the sparse factorisation `feral` alone: its default feature `faer` is for
+small dense problems. Warm as IPOPT, but with the multipliers of the equations alone: given those of the bounds, it ends
+the process (index out of bounds in `apply_warm_start`, when its preprocessing or its restoration changes the number of
+variables).
+"""
 
 import ctypes
 import os

@@ -2,6 +2,7 @@
 
 Per interval: the RK4 step, its adjoint, its tangents and the exact second derivative of `costate . step`, by the
 five directions (theta, u, w, q, delta); then the backward Riccati sweep, the forward sweep and the new costates.
+x and z are integrators, q and theta known in closed form, `P` symmetric, sums and products with known 0 and 1 left out.
 Run with `Number`s it counts itself; `check` compares what it computes with CasADi's derivatives and with a dense
 solution of the same linear system.
 """
