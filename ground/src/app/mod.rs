@@ -5,6 +5,7 @@ pub mod clock;
 pub mod download;
 pub mod files;
 pub mod output;
+pub mod pace;
 pub mod programs;
 pub mod replaying;
 pub mod screen;

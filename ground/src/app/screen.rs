@@ -1,6 +1,5 @@
-//! The full screen: prepares and restores the terminal, reads its keys, decides when to draw, and writes the frames.
+//! The full screen: prepares and restores the terminal, reads its keys, and writes the frames.
 
-use std::collections::VecDeque;
 use std::io;
 use std::io::Write;
 use std::mem::ManuallyDrop;
@@ -24,20 +23,19 @@ use crossterm::terminal::{
 };
 use crossterm::{execute, queue};
 use futures_util::Stream as _;
-use protocol::dialect::TdPhase;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
+use super::pace::Pace;
 use super::programs::{Voice, VoiceEnded};
 use super::terminal::Thrifty;
 use crate::cli::Characters;
 use crate::config::Config;
 use crate::key::Key;
-use crate::model::{Acknowledgement, CommandKind, Model, Page};
+use crate::model::Model;
 use crate::update::Msg;
 use crate::view::theme::Theme;
-use crate::view::view;
 
 /// The most keys passed on at once, so that a paste does not delay link and clock.
 const TOGETHER_MAX: usize = 1_024;
@@ -118,7 +116,7 @@ impl Screen {
             let size = self.terminal.size()?;
             self.terminal.resize(size.into())?;
         }
-        let drawn = self.terminal.draw(|frame| view(model, self.theme, model_now, frame))?;
+        let drawn = self.pace.draw(&mut self.terminal, model, self.theme, (now, model_now))?;
         let cells = drawn.area.area();
         self.pace.drew(model, cells, self.writer.waiting(), now);
         self.writer.send();
@@ -401,133 +399,5 @@ fn write_frames(frames: &Receiver<Vec<u8>>, gone: &AtomicBool) {
         let written = out.write_all(&frame).and_then(|()| out.flush());
         gone.fetch_or(written.is_err(), Ordering::AcqRel);
         WRITING.store(false, Ordering::Release);
-    }
-}
-
-// Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough for a slow line.
-// Important changes are drawn at once in any case.
-
-/// The shortest time between two frames, for input and important changes.
-const FRAME: Duration = Duration::from_millis(100);
-/// The same in flight, for telemetry: numbers that change faster cannot be read.
-const FLIGHT_FRAME: Duration = Duration::from_millis(200);
-/// The same on the pad and after a flight, for telemetry, to save a slow line.
-const CALM_FRAME: Duration = Duration::from_millis(500);
-/// The longest time between two frames, because ages grow even if nothing arrives.
-const IDLE_FRAME: Duration = Duration::from_secs(1);
-
-/// The bytes written are counted over this time.
-const WINDOW: Duration = Duration::from_secs(1);
-/// Cells of an 80x24 terminal.
-const SMALL_CELLS: u32 = 80 * 24;
-/// How many bytes per second frames that can wait may use. The rest of the 5 kB (80x24) or 8 kB per second is left
-/// for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
-const SMALL_ROOM_BYTES: usize = 1_400;
-const LARGE_ROOM_BYTES: usize = 1_400;
-
-/// The state whose changes are drawn at once.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Urgent {
-    page: Page,
-    phase: Option<TdPhase>,
-    armed: Option<bool>,
-    /// The number of unacknowledged alarms, and when the newest was raised.
-    alarms: (usize, Option<Duration>),
-    /// The progress of an abort.
-    abort: Option<(Acknowledgement, bool)>,
-}
-
-impl Urgent {
-    fn of(model: &Model) -> Self {
-        let newest = model.alarms.list().iter().map(|alarm| alarm.raised_at).max();
-        let abort = model.commands.of(CommandKind::Abort);
-        Self {
-            page: model.page(),
-            phase: model.vehicle.phase_now(),
-            armed: model.vehicle.armed().map(|armed| armed.value),
-            alarms: (model.alarms.unacknowledged(), newest),
-            abort: abort.map(|track| (track.acknowledged, track.observed_at.is_some())),
-        }
-    }
-}
-
-/// Computes when the next frame is due, from what has happened and how much was written.
-#[derive(Debug, Default)]
-pub struct Pace {
-    wait: Duration,
-    drawn_at: Option<Duration>,
-    drawn: Option<Urgent>,
-    /// Whether the next frame is drawn although the line is busy.
-    urgent: bool,
-    cells: u32,
-    /// The frames of the last second: when they were drawn, and their bytes.
-    written: VecDeque<(Duration, usize)>,
-}
-
-impl Pace {
-    /// A person has done something and waits for the result.
-    pub fn mark_changed(&mut self) {
-        self.wait = self.wait.min(FRAME);
-        self.urgent = true;
-    }
-
-    /// A message was taken into the model; its kind decides how soon it must be drawn.
-    pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
-        match msg {
-            // These change nothing that must be drawn within the next second.
-            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) | Msg::HeardFrom(_) => {}
-            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
-                self.wait = self.wait.min(FLIGHT_FRAME);
-            }
-            Msg::Frame(_) | Msg::Received { .. } => self.wait = self.wait.min(CALM_FRAME),
-            _ => self.mark_changed(),
-        }
-    }
-
-    /// Checks whether an important state has changed.
-    pub fn check_urgent(&mut self, model: &Model) {
-        if self.drawn != Some(Urgent::of(model)) {
-            self.mark_changed();
-        }
-    }
-
-    /// When the next frame is due.
-    pub fn redraw_at(&self) -> Duration {
-        let Some(drawn_at) = self.drawn_at else { return Duration::ZERO };
-        let due = drawn_at + self.wait;
-        if self.urgent { due } else { due.max(self.room_at()) }
-    }
-
-    /// When the line has room for another frame.
-    fn room_at(&self) -> Duration {
-        let room = if self.cells > SMALL_CELLS { LARGE_ROOM_BYTES } else { SMALL_ROOM_BYTES };
-        let mut left: usize = self.written.iter().map(|(_, bytes)| bytes).sum();
-        let next = self.written.iter().map(|(_, bytes)| *bytes).min().unwrap_or(0);
-        let mut room_at = Duration::ZERO;
-        for (at, bytes) in &self.written {
-            if left + next <= room {
-                break;
-            }
-            left -= bytes;
-            room_at = *at + WINDOW;
-        }
-        room_at
-    }
-
-    /// The terminal has not taken the previous frame yet, so drawing is postponed.
-    pub fn postpone(&mut self, now: Duration) {
-        (self.drawn_at, self.wait) = (Some(now), FRAME);
-    }
-
-    /// A frame of this many cells and bytes was drawn.
-    pub fn drew(&mut self, model: &Model, cells: u32, bytes: usize, now: Duration) {
-        (self.drawn_at, self.wait, self.urgent) = (Some(now), IDLE_FRAME, false);
-        self.drawn = Some(Urgent::of(model));
-        self.cells = cells;
-        self.written.push_back((now, bytes));
-        while self.written.front().is_some_and(|(at, _)| *at + WINDOW <= now) {
-            self.written.pop_front();
-        }
     }
 }

@@ -46,6 +46,8 @@ fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
 
 /// How long the line of a flight in progress is, so that it is rarely drawn anew, s.
 pub const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
+/// The steps of what is expected, in lengths of the line.
+const EXPECTED_STEP: f64 = 1.0 / 40.0;
 /// The mark of the shown moment, of what has been, of what is expected, of a warning or an error; the time that has passed, and
 /// that is to come.
 const NOW: char = '◆';
@@ -119,7 +121,13 @@ fn timeline(
     }
     let been =
         phases.iter().filter_map(|(phase, at)| Some((words::event(*phase)?, *at, BEEN, Ink::Measured)));
-    let to_come = to_come.iter().map(|(name, at)| (*name, *at, EXPECTED, Ink::Predicted));
+    // In steps, so that it does not tremble; never in the past.
+    let step_s = length_s * EXPECTED_STEP;
+    let steady = |at: Duration| {
+        let steps = libm::round(at.saturating_sub(from).as_secs_f64() / step_s);
+        (from + Duration::from_secs_f64(steps * step_s)).max(now)
+    };
+    let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), EXPECTED, Ink::Predicted));
     let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
     for (place, (name, at, mark, ink)) in marks.iter().enumerate() {
         let begin = column(*at);

@@ -36,16 +36,23 @@ const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
 
 pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
+    draw(model, theme, now, frame);
+}
+
+/// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
     let area = frame.area();
     frame.buffer_mut().set_style(area, theme.ground());
-    if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
-        draw_wide(model, theme, now, frame, area);
+    let pictures = if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
+        draw_wide(model, theme, now, frame, area)
     } else {
         draw_compact(model, theme, now, frame, area);
-    }
+        None
+    };
     if theme.ascii {
         theme::flatten(frame.buffer_mut());
     }
+    pictures
 }
 
 /// The last cell of a line that is cut.
@@ -90,7 +97,7 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
 // The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
 // approaching; pinned numbers; the page; the flight along its time, or an alarm; the keys.
 
-pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     // Everything but the page always shows the present.
     let past = model.past();
     let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
@@ -126,11 +133,13 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     // Also over the past: whether people may approach is a matter of the present.
     let large = banner.filter(|banner| banner.is_large_on(model.page()));
     let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
-    pages::draw(shown, theme, shown_at, frame, body);
+    let pictures = pages::draw(shown, theme, shown_at, frame, body);
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);
     dialog::draw_palette(model, theme, now, frame, body);
     dialog::draw_dialog(model, theme, now, frame, body);
+    let is_covered = model.pages.entry.is_some() || dialog::dialog_lines(model, theme, now).is_some();
+    pictures.filter(|_| past.is_none() && !is_covered)
 }
 
 /// Says that the page shows the past, and for how long.

@@ -22,7 +22,7 @@ pub const LOST_COLUMNS: u16 = 28;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
 
-/// Draws a page with these values.
+/// Draws a page with these values. Returns where its pictures are.
 pub fn draw_flying(
     model: &Model,
     (title, values): (&str, Vec<Line<'static>>),
@@ -30,7 +30,7 @@ pub fn draw_flying(
     now: Duration,
     frame: &mut Frame,
     area: Rect,
-) {
+) -> Rect {
     let room = Room::of(frame.area());
     // What the newest report means, under the number.
     let below = values.first().cloned().unwrap_or_default();
@@ -45,7 +45,7 @@ pub fn draw_flying(
         height(model, theme, now, frame, left);
         map(model, theme, now, frame, middle);
         side_or_lost(model, Side::South, theme, now, frame, right);
-        return;
+        return area;
     }
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
@@ -56,6 +56,7 @@ pub fn draw_flying(
     table(title, &values, theme, frame, left);
     bars::draw_surfaces(model, theme, now, frame, middle);
     events(model, theme, frame, right);
+    area
 }
 
 fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -99,9 +100,9 @@ pub fn insert_height(lines: &mut Vec<Line<'static>>, model: &Model, theme: Theme
 
 // The ascent page.
 
-pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let values = ascent_values(model, theme, now);
-    draw_flying(model, ("ascent", values), theme, now, frame, area);
+    draw_flying(model, ("ascent", values), theme, now, frame, area)
 }
 
 /// For small screens: the values, with height and speed, which have no headline there.
@@ -170,9 +171,9 @@ fn state_row(
 
 // The descent page.
 
-pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let values = descent_values(model, theme, now);
-    draw_flying(model, ("descent", values), theme, now, frame, area);
+    draw_flying(model, ("descent", values), theme, now, frame, area)
 }
 
 /// For small screens: the values, with height and speed, which have no headline there.

@@ -21,8 +21,8 @@ use crate::view::{
 const LIMIT_ROWS: u16 = 8;
 const BELOW_ROWS: u16 = 10;
 
-/// Draws the band, height over sink, the vehicle, the limits and the place.
-pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+/// Draws the band, height over sink, the vehicle, the limits and the place. Returns where the pictures are.
+pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let room = Room::of(frame.area());
     let below = panels::controller_rows(model, theme, now).into_iter().next().unwrap_or_default();
     let area = if headline::replaces_band(model, now) {
@@ -40,7 +40,7 @@ pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         if place.height > 5 {
             map(model, theme, now, frame, place);
         }
-        return;
+        return area;
     }
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
@@ -51,6 +51,7 @@ pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     bars::draw_limits(model, theme, now, frame, left);
     bars::draw_surfaces(model, theme, now, frame, middle);
     events(model, theme, frame, right);
+    area
 }
 
 fn sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {

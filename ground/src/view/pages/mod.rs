@@ -21,13 +21,13 @@ use super::pictures::attitude::{Side, draw_attitude, tilt_words};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{Model, Page};
 
-/// Draws the present page between the top lines and the alarm line.
-pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+/// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
+pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     match model.page() {
+        Page::Ascent => return Some(flight::draw_ascent(model, theme, now, frame, area)),
+        Page::Descent => return Some(flight::draw_descent(model, theme, now, frame, area)),
+        Page::Landing => return Some(landing::draw_landing(model, theme, now, frame, area)),
         Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
-        Page::Ascent => flight::draw_ascent(model, theme, now, frame, area),
-        Page::Descent => flight::draw_descent(model, theme, now, frame, area),
-        Page::Landing => landing::draw_landing(model, theme, now, frame, area),
         Page::Review => landing::draw_review(model, theme, now, frame, area),
         Page::Path => plots::draw_path(model, theme, now, frame, area),
         Page::Values => plots::draw_values(model, theme, now, frame, area),
@@ -37,6 +37,7 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
             draw_lines(frame, inside, &lines(model, page, theme, now, inside));
         }
     }
+    None
 }
 
 /// The page as lines, the most important first.

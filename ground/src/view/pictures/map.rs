@@ -14,10 +14,15 @@ use crate::view::{fixed, shortest, widgets};
 /// The least that the picture shows to every side, m; in the burn the scale of the last 30 m.
 const REACH_MIN_M: f64 = 10.0;
 const BURN_REACH_M: f64 = 15.0;
+/// The steps of its reach, each 1.4 times the one before, up to 3,000 km; and of its middle, in reaches.
+const REACH_STEPS: usize = 36;
+const MIDDLE_STEP: f64 = 0.5;
+/// How much farther the picture reaches than what it shows, so that nothing stands on its edge.
+const EDGE: f64 = 1.15;
 /// The fence is included if it enlarges the picture by no more than this factor.
 const FENCE_COST_MAX: f64 = 15.0;
-/// Where the circle of the uncertainty may stand, and how large it may be, dots.
-const SPREAD_STEP_DOTS: f64 = 4.0;
+/// The steps of the place and the radius of the circle of the uncertainty, in reaches.
+const SPREAD_STEP: f64 = 1.0 / 6.0;
 /// How far back predictions of the touchdown count for its uncertainty.
 const SCATTER_OVER: Duration = Duration::from_secs(5);
 
@@ -57,15 +62,27 @@ fn rehearsed(model: &Model) -> Option<(f64, f64)> {
     Some((0.0, prediction.value.touchdown.x_m)).filter(|(_, north_m)| north_m.is_finite())
 }
 
-/// The middle of the picture and how far it reaches, m.
+/// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands still while the vehicle moves
+/// over it.
 fn box_around(points: &[(f64, f64)], least_m: f64) -> ((f64, f64), f64) {
     let of = |pick: fn(&(f64, f64)) -> f64| {
         let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
         let high = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
         if low <= high { (f64::midpoint(low, high), (high - low) / 2.0) } else { (0.0, 0.0) }
     };
-    let ((x, half_x), (y, half_y)) = (of(|point| point.0), of(|point| point.1));
-    ((x, y), (1.25 * half_x.max(half_y)).max(least_m))
+    let (x, y) = (of(|point| point.0), of(|point| point.1));
+    let steps = std::iter::successors(Some(least_m), |reach_m| Some(reach_m * std::f64::consts::SQRT_2));
+    let mut boxes = steps.take(REACH_STEPS).map(|reach_m| {
+        let step_m = reach_m * MIDDLE_STEP;
+        let snapped = |(middle, _): (f64, f64)| libm::round(middle / step_m) * step_m;
+        ((snapped(x), snapped(y)), reach_m)
+    });
+    let holds = |middle: f64, reach_m: f64, (exact, half): (f64, f64)| {
+        (middle - exact).abs() + EDGE * half <= reach_m
+    };
+    boxes
+        .find(|((east, north), reach_m)| holds(*east, *reach_m, x) && holds(*north, *reach_m, y))
+        .unwrap_or(((0.0, 0.0), least_m))
 }
 
 /// Draws the picture; both axes have the same scale.
@@ -110,7 +127,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let plane =
         Plane { area, x: [middle.0 - half_x, middle.0 + half_x], y: [middle.1 - half_y, middle.1 + half_y] };
     // In whole steps, so that it does not tremble.
-    let step_m = SPREAD_STEP_DOTS * per_dot;
+    let step_m = SPREAD_STEP * reach_m;
     let spread = down.map(|at| {
         let [east_m, north_m] = [at.east_m, at.north_m].map(|place_m| (place_m / step_m).round() * step_m);
         circle((east_m, north_m), ((at.radius_m / step_m).round() * step_m).max(step_m))
