@@ -29,7 +29,7 @@ const PICTURES: Duration = Duration::from_secs(1);
 const WINDOW: Duration = Duration::from_secs(1);
 /// Cells of an 80x24 terminal.
 const SMALL_CELLS: u32 = 80 * 24;
-/// How many bytes per second frames that can wait may use: numbers and pictures once a second. The rest of the 5 kB (80x24) or 9 kB
+/// How many bytes per second frames that can wait may use: numbers and pictures once a second. The rest of the 5 kB (80x24) or 8 kB
 /// per second is left for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
 const SMALL_ROOM_BYTES: usize = 1_200;
 const LARGE_ROOM_BYTES: usize = 1_400;

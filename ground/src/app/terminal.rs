@@ -6,6 +6,7 @@
 //! that is less than half the bytes. Each frame stands for itself, so that what another program writes between two is no more than
 //! a blot.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::io::Write;
 use std::ops::RangeInclusive;
@@ -22,11 +23,13 @@ pub struct Thrifty<W: Write> {
     /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
+    /// What stands on the terminal.
+    shown: BTreeMap<Place, Cell>,
 }
 
 impl<W: Write> Thrifty<W> {
     pub fn new(terminal: CrosstermBackend<W>) -> Self {
-        Self { terminal, rightmost: 0, cursor_is_hidden: false }
+        Self { terminal, rightmost: 0, cursor_is_hidden: false, shown: BTreeMap::new() }
     }
 }
 
@@ -135,7 +138,8 @@ impl Way {
         }
     }
 
-    fn write(self, out: &mut impl Write) -> io::Result<()> {
+    /// `between` is what the cells between are, if it may be written.
+    fn write(self, out: &mut impl Write, between: &str) -> io::Result<()> {
         let (rows, columns) = match self {
             Self::AtOnce((row, column)) => return write!(out, "\x1b[{};{}H", row + 1, column + 1),
             Self::Along { rows, columns } => (rows, columns),
@@ -145,6 +149,9 @@ impl Way {
         steps(out, rows.min(0).unsigned_abs(), 'A')?;
         if BACKSPACES.contains(&columns) {
             return (columns..0).try_for_each(|_| out.write_all(b"\x08"));
+        }
+        if !between.is_empty() && between.len() < sequence_bytes(columns.unsigned_abs()) {
+            return out.write_all(between.as_bytes());
         }
         steps(out, columns.unsigned_abs(), if columns < 0 { 'D' } else { 'C' })
     }
@@ -216,11 +223,30 @@ fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>) -> Vec<Run> {
     runs
 }
 
+/// Over more columns the shortest way is never to write them again.
+const BETWEEN_MAX: u16 = 3;
+
+/// What the cells between the cursor and a place to its right show, if that can be written in this style.
+fn between(shown: &BTreeMap<Place, Cell>, cursor: Option<Place>, (row, to): Place, style: &Style) -> String {
+    let from = cursor.map_or(to, |(_, column)| column);
+    if to.saturating_sub(from) > BETWEEN_MAX {
+        return String::new();
+    }
+    let fits = |cell: &&Cell| {
+        let is_blank = cell.symbol() == " " && !(cell.modifier | style.modifier).contains(Modifier::REVERSED);
+        cell.bg == style.back && (is_blank || cell.fg == style.fore && cell.modifier == style.modifier)
+    };
+    let cells: Option<Vec<&Cell>> = (from..to).map(|column| shown.get(&(row, column)).filter(fits)).collect();
+    cells.unwrap_or_default().into_iter().map(Cell::symbol).collect()
+}
+
 impl<W: Write> Backend for Thrifty<W> {
     type Error = io::Error;
 
     fn draw<'a, I: Iterator<Item = (u16, u16, &'a Cell)>>(&mut self, content: I) -> io::Result<()> {
-        let mut left = runs(content);
+        let content: Vec<_> = content.collect();
+        self.shown.extend(content.iter().map(|(column, row, cell)| ((*row, *column), (*cell).clone())));
+        let mut left = runs(content.into_iter());
         if left.is_empty() {
             return Ok(());
         }
@@ -239,14 +265,14 @@ impl<W: Write> Backend for Thrifty<W> {
             };
             let Some(next) = cheapest(true).or_else(|| cheapest(false)) else { break };
             let run = left.remove(next);
-            Way::shortest(cursor, run.from).write(out)?;
-            cursor = run.end(self.rightmost);
             let style = run.style_after(&said);
             let codes: Vec<String> = style.codes_after(&said).iter().map(u8::to_string).collect();
             if !codes.is_empty() {
                 write!(out, "\x1b[{}m", codes.join(";"))?;
             }
             said = style;
+            Way::shortest(cursor, run.from).write(out, &between(&self.shown, cursor, run.from, &style))?;
+            cursor = run.end(self.rightmost);
             out.write_all(run.symbols.as_bytes())?;
         }
         write!(out, "\x1b[m")
@@ -272,6 +298,7 @@ impl<W: Write> Backend for Thrifty<W> {
 
     fn clear(&mut self) -> io::Result<()> {
         (self.rightmost, self.cursor_is_hidden) = (0, false);
+        self.shown.clear();
         self.terminal.clear()
     }
 
@@ -313,13 +340,16 @@ mod tests {
             cell("c", plain),
             cell("d", other.add_modifier(bold)),
         ];
-        let mut written = Vec::new();
         let places = [(3, 1), (4, 1), (5, 1), (9, 1), (0, 2)];
-        Thrifty::new(CrosstermBackend::new(&mut written))
-            .draw(places.into_iter().zip(&cells).map(|((x, y), cell)| (x, y, cell)))
-            .unwrap();
-        let expected =
-            "\x1b[2;4H\x1b[38;5;75;48;5;233ma\x1b[5Cc\x1b[2;5H\x1b[38;5;79mb \n\x1b[6D\x1b[1md\x1b[m";
-        assert_eq!(String::from_utf8(written).unwrap(), expected);
+        let (x, y) = (cell("x", other), cell("y", other));
+        // The b between the two is written again, which is shorter than a step of the cursor.
+        let beside_b = [((3, 1), &x), ((5, 1), &y)];
+        let mut written = Vec::new();
+        let mut terminal = Thrifty::new(CrosstermBackend::new(&mut written));
+        terminal.draw(places.into_iter().zip(&cells).map(|((x, y), cell)| (x, y, cell))).unwrap();
+        terminal.draw(beside_b.into_iter().map(|((x, y), cell)| (x, y, cell))).unwrap();
+        let first = "\x1b[38;5;75;48;5;233m\x1b[2;4Ha\x1b[5Cc\x1b[38;5;79m\x1b[2;5Hb \x1b[1m\n\x1b[6Dd\x1b[m";
+        let second = "\x1b[38;5;79;48;5;233m\x1b[2;4Hxby\x1b[m";
+        assert_eq!(String::from_utf8(written).unwrap(), format!("{first}{second}"));
     }
 }
