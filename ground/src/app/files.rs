@@ -4,6 +4,7 @@ use std::fs;
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -82,6 +83,11 @@ pub struct SpaceWatch {
 }
 
 impl SpaceWatch {
+    /// The length of the log's files when they were last looked at.
+    pub(super) fn bytes(&self) -> u64 {
+        self.last.map_or(0, |(_, bytes)| bytes)
+    }
+
     /// The space as it was last looked at; `None` where the system does not tell it.
     pub fn look(&mut self, recorder: &Recorder, now: Duration) -> Option<LogSpace> {
         if now < self.due {
@@ -101,20 +107,29 @@ impl SpaceWatch {
     }
 }
 
+/// The log that a guard finishes; a station that begins another log puts it here.
+pub(super) type GuardedLog = Arc<Mutex<Option<Recorder>>>;
+
 /// Finishes the log when it goes out of scope, also while a panic unwinds.
-pub struct LogGuard {
-    recorder: Option<Recorder>,
-}
+pub struct LogGuard(GuardedLog);
 
 impl LogGuard {
     /// Guards a log, if there is one.
     pub fn new(recorder: Option<Recorder>) -> Self {
-        Self { recorder }
+        Self(Arc::new(Mutex::new(recorder)))
+    }
+
+    pub(super) fn log(&self) -> GuardedLog {
+        Arc::clone(&self.0)
+    }
+
+    fn take(&self) -> Option<Recorder> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Deletes the log again, because the run has failed before it began.
-    pub fn discard(mut self) {
-        if let Some(recorder) = self.recorder.take() {
+    pub fn discard(self) {
+        if let Some(recorder) = self.take() {
             // Why the run has failed is being reported.
             let _ = recorder.discard();
         }
@@ -124,14 +139,14 @@ impl LogGuard {
     ///
     /// # Errors
     /// A record could not be written.
-    pub fn finish(mut self) -> Result<Option<PathBuf>, RecorderError> {
-        self.recorder.take().map(|recorder| recorder.finish()).transpose()
+    pub fn finish(self) -> Result<Option<PathBuf>, RecorderError> {
+        self.take().map(|recorder| recorder.finish()).transpose()
     }
 }
 
 impl Drop for LogGuard {
     fn drop(&mut self) {
-        if let Some(recorder) = self.recorder.take() {
+        if let Some(recorder) = self.take() {
             // Another error is already being reported.
             let _ = recorder.finish();
         }

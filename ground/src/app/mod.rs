@@ -4,6 +4,7 @@ pub mod attached;
 pub mod clock;
 pub mod download;
 pub mod files;
+mod next_log;
 pub mod output;
 pub mod pace;
 pub mod programs;
@@ -43,6 +44,7 @@ use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name};
+use next_log::NextLog;
 use output::{Output, print};
 use replaying::Again;
 use server::{Server, Watchers, hello};
@@ -142,9 +144,10 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let tlog = args.tlog.as_ref();
     let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
     let recorder = open_log(args.log.as_ref(), tlog, &header)?;
-    let log_guard = LogGuard::new(recorder.clone());
+    let log_guard = LogGuard::new(recorder);
+    let next_log = NextLog::new(args, header, log_guard.log());
     let (mut station, mut model, mut wire) =
-        match Box::pin(start(args, config, duty, (clock, demo_options, recorder))).await {
+        match Box::pin(start(args, config, duty, (clock, demo_options), next_log)).await {
             Ok(started) => started,
             Err(error) => {
                 log_guard.discard();
@@ -155,7 +158,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
         print(output::greeting(&model).as_bytes())?;
     }
     let ran = station.run(&mut model, &mut wire).await;
-    station.close_book(&mut model, &mut wire);
+    station.close_book("the station ends", &mut model, &mut wire);
     if let Some(msg) = wire.save_timestamps() {
         update(&mut model, msg, clock.now());
     }
@@ -172,9 +175,11 @@ async fn start(
     args: &StationArgs,
     config: &Config,
     duty: Duty,
-    (clock, demo_options, recorder): (Clock, Option<DemoOptions>, Option<Recorder>),
+    (clock, demo_options): (Clock, Option<DemoOptions>),
+    next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let Duty { is_daemon, interactive, time_limit } = duty;
+    let recorder = next_log.present();
     let link = &args.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
     let mut endpoints = link.connect.clone();
@@ -269,8 +274,9 @@ async fn start(
         download: None,
         place_failed: false,
         report_at: Duration::ZERO,
+        next_log: next_log.signed_with(book_key),
     };
-    station.open_book(&model, book_key);
+    station.open_book(&model, "");
     station.publish_kept(&model, clock.now());
     Ok((station, model, wire))
 }

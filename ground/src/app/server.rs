@@ -163,6 +163,13 @@ impl Server {
         let _ = self.shared.news.send(bytes);
     }
 
+    /// Greets later screens with this.
+    pub(super) fn greet_with(&self, hello: Hello) {
+        if let Ok(mut history) = self.shared.history.lock() {
+            history.hello = hello;
+        }
+    }
+
     /// The next event.
     pub async fn next(&mut self) -> ServerEvent {
         match self.requests.recv().await {

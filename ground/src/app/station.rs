@@ -4,7 +4,7 @@ use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use protocol::book::{BookKey, CLOSED, Line};
+use protocol::book::{CLOSED, Line};
 use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::recorder::Recorder;
@@ -14,6 +14,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::clock::{Clock, LogTime, Signals};
 use super::download::{DownloadReport, Downloading};
 use super::files::{SignatureFile, SpaceWatch, StationBook};
+use super::next_log::NextLog;
 use super::output::{Lines, Output};
 use super::replaying::Again;
 use super::server::{Server, ServerEvent, Watchers, hello};
@@ -62,11 +63,12 @@ pub(super) struct Station {
     pub(super) signatures: Option<SignatureFile>,
     /// When the links are reported next.
     pub(super) report_at: Duration,
+    pub(super) next_log: NextLog,
 }
 
 /// What the loop does next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Next {
+pub(super) enum Next {
     Go,
     LeaveScreen,
     Quit,
@@ -132,6 +134,7 @@ impl Station {
                 next = next.max(self.step(model, wire, Msg::ScreenGone));
             }
             self.tell_crew(model, wire);
+            self.keep_logs_short(model, wire);
             if next == Next::Quit {
                 return Ok(());
             }
@@ -248,7 +251,7 @@ impl Station {
     }
 
     /// Takes one message into the model and does the resulting actions.
-    fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
+    pub(super) fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
         let now = self.clock.now();
         let mut next = Next::Go;
         self.publish(&msg, now);
@@ -383,8 +386,8 @@ impl Station {
         }
     }
 
-    /// Opens the book of this run, if there is a log for it.
-    pub(super) fn open_book(&mut self, model: &Model, key: Option<BookKey>) {
+    /// Opens the book of this log, if there is one. `after` says what came before it.
+    pub(super) fn open_book(&mut self, model: &Model, after: &str) {
         if self.recorder.is_none() {
             return;
         }
@@ -395,10 +398,10 @@ impl Station {
         );
         let mission = mission.map_or_else(|| "any mission".to_owned(), |hash| format!("mission {hash}"));
         let about = format!(
-            "station {}/{}, vehicle system {}, {owner}, {mission}",
+            "station {}/{}, vehicle system {}, {owner}, {mission}{after}",
             us.system_id, us.component_id, vehicle.system_id
         );
-        let (book, first) = StationBook::open(key, &about, self.clock.unix_ns());
+        let (book, first) = StationBook::open(self.next_log.book_key.clone(), &about, self.clock.unix_ns());
         self.book = Some(book);
         self.record(first);
         for (name, role) in &model.settings.crew_roles {
@@ -426,8 +429,8 @@ impl Station {
     }
 
     /// Closes the book. Its end is sent to the vehicle without waiting for an answer.
-    pub(super) fn close_book(&mut self, model: &mut Model, wire: &mut Wire) {
-        let (kind, text) = (CLOSED.to_owned(), "the station ends".to_owned());
+    pub(super) fn close_book(&mut self, why: &str, model: &mut Model, wire: &mut Wire) {
+        let (kind, text) = (CLOSED.to_owned(), why.to_owned());
         self.enter(&BookLine { kind, who: String::new(), text });
         let Some(msg) = self.sign_book(true) else { return };
         self.book = None;
@@ -486,6 +489,8 @@ impl Station {
         if let Some(demo) = self.demo {
             demo.stop().await;
         }
+        // The end of the log before is written, too.
+        let _ = self.next_log.ending.map(|ending| ending.recv());
     }
 }
 

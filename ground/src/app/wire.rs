@@ -103,6 +103,11 @@ impl Wire {
         })
     }
 
+    /// Records into this log from now on.
+    pub(super) fn record_into(&mut self, log: Recorder) {
+        self.recorder = Some(log);
+    }
+
     /// The addresses of the links.
     pub fn endpoints(&self) -> impl Iterator<Item = &LinkAddress> {
         self.links.each().map(|(address, _)| address)

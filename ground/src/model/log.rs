@@ -9,7 +9,7 @@ use protocol::book::{SignedHead, shown};
 use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
 
-use super::Model;
+use super::{LinkState, Model, Settings, Vehicle, is_on_pad};
 
 /// With less free space nothing is armed: several minutes of the busiest link.
 const SPACE_MIN_BYTES: u64 = 64 << 20;
@@ -17,6 +17,8 @@ const SPACE_MIN_BYTES: u64 = 64 << 20;
 const TIME_MIN: Duration = Duration::from_mins(15);
 /// From this many times either on the crew is warned.
 const WARNED_TIMES: u32 = 4;
+/// A vehicle that was heard, and is not for so long, was switched off.
+const SILENT_FOR: Duration = Duration::from_mins(10);
 /// A log that has lost records counts as unfit for this long.
 const LOSES_FOR: Duration = Duration::from_secs(30);
 
@@ -91,6 +93,26 @@ impl Model {
             _ if dropped > 0 => LogStanding::Warned(format!("has lost {dropped} records")),
             _ => LogStanding::Fine,
         }
+    }
+
+    /// Whether the station may end its log and begin another: the vehicle is disarmed on the pad, or nothing is heard, and no
+    /// vehicle that was heard flies or is about to.
+    pub fn may_change_log(&self, now: Duration) -> bool {
+        let rests = |vehicle: &Vehicle| {
+            let counts = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+            !vehicle.is_armed() && !vehicle.in_flight() && !counts
+        };
+        let is_silent = match self.link.state(now) {
+            LinkState::NeverHeard => true,
+            LinkState::Lost(silence) => silence >= SILENT_FOR,
+            LinkState::Alive(_) | LinkState::Doubtful(_) => false,
+        };
+        let stands = self.vehicle.armed().is_some() && self.vehicle.phase_now().is_some_and(is_on_pad);
+        let Settings { interactive, demonstration, auto, .. } = self.settings;
+        // The others end with their flight, and the log of a demonstration begins with the flight computer's start.
+        let is_a_station = interactive && !demonstration && !auto;
+        let all_rest = std::iter::once(&self.vehicle).chain(self.others.values()).all(rests);
+        is_a_station && all_rest && !self.commands.is_aborting() && (is_silent || stands)
     }
 
     /// Why nothing is armed or started from here; `None` if the log is fit, or if the crew goes on without it.

@@ -21,7 +21,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
-    Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat, Speaker,
+    BookState, Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat,
+    Speaker,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -94,6 +95,11 @@ pub enum Msg {
     /// A warning about the links for the crew.
     LinkSays(String),
     Log(LogHealth),
+    /// The station's log goes on in these files.
+    LogBegins {
+        log: String,
+        tlog: Option<String>,
+    },
     /// The embedded simulator has ended; the reason, if it failed.
     SimulatorEnded(Option<String>),
     /// Time passes; sent ten times a second.
@@ -158,7 +164,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Download(Ok(words)) => model.info(now, words),
         Msg::Download(Err(why)) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
         Msg::Place(place) => model.place = Some(*place),
-        Msg::Book { head, is_signed } => (model.book.head, model.book.is_signed) = (Some(head), is_signed),
+        Msg::Book { head, is_signed } => {
+            let is_another = model.book.head.is_some_and(|signed| signed.head.book != head.head.book);
+            let before = if is_another { BookState::default() } else { model.book };
+            model.book = BookState { head: Some(head), is_signed, ..before };
+        }
         Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
@@ -194,6 +204,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::HeardFrom(place) => model.link.place = place,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
+        Msg::LogBegins { log, tlog } => on_log_begins(model, log, tlog, now),
         Msg::SimulatorEnded(failure) => {
             if let Some(why) = failure {
                 model.say(now, Speaker::Ground, EventLevel::Error, format!("the simulator failed: {why}"));
@@ -284,6 +295,13 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
         _ => None,
     };
     model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
+}
+
+/// The log before is complete. What was flown is in it, and not in the one that is replayed and reported from now on.
+fn on_log_begins(model: &mut Model, log: String, tlog: Option<String>, now: Duration) {
+    model.info(now, format!("the log goes on in {log}"));
+    (model.settings.log_path, model.settings.tlog_path) = (Some(log), tlog);
+    model.outcome.started = false;
 }
 
 // After the flight: the flight again on this screen, its report, and the log that the vehicle has written itself.

@@ -3,7 +3,7 @@
 use ground::key::Key;
 use ground::model::{LogFault, LogHealth, LogSpace, LogStanding, Prompt, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
-use protocol::dialect::MavCmd;
+use protocol::dialect::{MavCmd, TdPhase};
 use protocol::log::record::Record;
 
 use crate::rig::{Rig, is_arm, settings, typed};
@@ -20,6 +20,30 @@ const FAILED: LogHealth = LogHealth { dropped: 0, failed: true, space: None };
 
 fn enter(word: &str) -> Vec<Key> {
     [typed(word), vec![Key::Enter]].concat()
+}
+
+#[test]
+fn a_log_is_changed_on_the_pad_or_in_silence_and_never_in_a_flight() {
+    let mut rig = on_the_pad();
+    rig.run(1.0);
+    assert!(rig.model.may_change_log(rig.now), "disarmed on the pad");
+    rig.model.settings.auto = true;
+    assert!(!rig.model.may_change_log(rig.now), "an automatic run ends with its flight");
+    rig.model.settings.auto = false;
+    for ((is_armed, phase), may) in [
+        ((true, TdPhase::TD_PHASE_PAD_ARMED), false),
+        ((true, TdPhase::TD_PHASE_AERO_DESCENT), false),
+        ((false, TdPhase::TD_PHASE_AERO_DESCENT), false),
+        ((false, TdPhase::TD_PHASE_TOUCHDOWN), false),
+    ] {
+        (rig.armed, rig.phase) = (is_armed, phase);
+        rig.run(1.0);
+        assert_eq!(rig.model.may_change_log(rig.now), may, "{is_armed} {phase:?}");
+        rig.now += std::time::Duration::from_mins(11);
+        rig.msg(Msg::Tick);
+        let is_over = phase == TdPhase::TD_PHASE_TOUCHDOWN;
+        assert_eq!(rig.model.may_change_log(rig.now), is_over, "silent, {is_armed} {phase:?}");
+    }
 }
 
 /// The crew is warned before the disk is full: by what is left, and by the time that it lasts.

@@ -1,0 +1,217 @@
+//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody flies.
+//!
+//! Everything that records does so in the run loop, so no frame comes between the two logs: the one before has all until then, the
+//! next one all after it. The book is closed in the one and opened in the other, whose first entry names the log before and the
+//! end of its book.
+
+use std::path::Path;
+use std::sync::PoisonError;
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::time::Duration;
+
+use protocol::book::BookKey;
+use protocol::log::recorder::{Recorder, RecorderError};
+use protocol::log::writer::LogHeader;
+
+use super::files::{GuardedLog, SpaceWatch, open_log};
+use super::output::absolute;
+use super::server::hello;
+use super::station::Station;
+use super::wire::Wire;
+use crate::cli::{LogChoice, StationArgs};
+use crate::model::Model;
+use crate::update::Msg;
+
+/// A log of this size is ended: a day over a radio of 57,600 baud, which brings 490 MB.
+const LONG_BYTES: u64 = 512 << 20;
+/// If no next log can be created, it is tried again after this time.
+const AGAIN_AFTER: Duration = Duration::from_hours(1);
+
+/// What the next log needs.
+pub(super) struct NextLog {
+    /// The names that were asked for: of the log and of the telemetry log.
+    names: (Option<LogChoice>, Option<LogChoice>),
+    /// Times of the next log count from the start of the station, too.
+    header: LogHeader,
+    pub(super) book_key: Option<BookKey>,
+    guarded: GuardedLog,
+    /// The next one could not be created; when to try again.
+    not_before: Duration,
+    /// The log before, while its end is written.
+    pub(super) ending: Option<Receiver<Result<(), RecorderError>>>,
+}
+
+impl NextLog {
+    pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
+        let names = (args.log.clone(), args.tlog.clone());
+        Self { names, header, book_key: None, guarded, not_before: Duration::ZERO, ending: None }
+    }
+
+    pub(super) fn signed_with(self, book_key: Option<BookKey>) -> Self {
+        Self { book_key, ..self }
+    }
+
+    /// The log that is written; `None` if none is wanted.
+    pub(super) fn present(&self) -> Option<Recorder> {
+        self.guarded.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Writes the end of a log in a thread of its own, because the disk may be slow.
+fn end(log: Recorder) -> Option<Receiver<Result<(), RecorderError>>> {
+    let (tell, told) = sync_channel(1);
+    let ends = move || {
+        // The station may have ended.
+        let _ = tell.send(log.finish().map(drop));
+    };
+    // Without the thread the last handle is gone, and the recorder ends the log by itself.
+    std::thread::Builder::new().name("log end".to_owned()).spawn(ends).ok().map(|_| told)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+impl Station {
+    /// Begins the next log if the present one is long and nobody flies.
+    pub(super) fn keep_logs_short(&mut self, model: &mut Model, wire: &mut Wire) {
+        let now = self.clock.now();
+        let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
+        if let Some(Ok(ended)) = &ended {
+            self.next_log.ending = None;
+            if let Err(why) = ended {
+                model.warn(now, format!("the log before is not complete: {why}"));
+            }
+        }
+        let is_long = self.log_space.bytes() >= LONG_BYTES;
+        let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
+        if is_long && !waits && model.may_change_log(now) {
+            self.change_log(model, wire);
+        }
+    }
+
+    fn change_log(&mut self, model: &mut Model, wire: &mut Wire) {
+        let now = self.clock.now();
+        // What has failed is told to the crew, and not hidden by a new log.
+        let Some(before) = self.recorder.clone().filter(Recorder::is_whole) else { return };
+        let before_name = file_name(before.path());
+        let NextLog { names: (log, tlog), header, .. } = &self.next_log;
+        let mut header = header.clone();
+        header.run.insert("after".to_owned(), before_name.clone());
+        let next = match open_log(log.as_ref(), tlog.as_ref(), &header) {
+            Ok(Some(next)) => next,
+            Ok(None) => return,
+            Err(why) => {
+                self.next_log.not_before = now + AGAIN_AFTER;
+                return model.warn(now, format!("the log stays the same: {why:#}"));
+            }
+        };
+        self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
+        let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
+        *self.next_log.guarded.lock().unwrap_or_else(PoisonError::into_inner) = Some(next.clone());
+        wire.record_into(next.clone());
+        (self.recorder, self.log_space) = (Some(next.clone()), SpaceWatch::default());
+        self.next_log.ending = end(before);
+        self.open_book(model, &format!(", after {before_name}{end_of_book}"));
+        let path = |path: &Path| absolute(&path.display().to_string());
+        let (log, tlog) = (path(next.path()), next.tlog_path().map(path));
+        self.step(model, wire, Msg::LogBegins { log, tlog });
+        if let Some(server) = &mut self.server {
+            server.greet_with(hello(model));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+    use std::path::PathBuf;
+
+    use clap::Parser as _;
+    use prost::Message as _;
+    use protocol::book::{Audit, RecordedHead, SignedHead, audit, shown};
+    use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
+    use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_TX};
+    use protocol::log::{reader::LogItem, reader::LogReader, v1};
+
+    use super::super::files::LogGuard;
+    use super::super::{Clock, Duty, start};
+    use super::*;
+    use crate::cli::{Cli, Command};
+    use crate::config::Config;
+
+    /// The raw frames of a log, its book, and what is found of the book.
+    fn read(path: &Path) -> (Vec<Vec<u8>>, Vec<v1::BookEntry>, Audit) {
+        let mut reader = LogReader::new(std::fs::File::open(path).unwrap());
+        let (mut frames, mut entries, mut heads) = (Vec::new(), Vec::new(), Vec::new());
+        while let Some(item) = reader.next_item().unwrap() {
+            let LogItem::Message { channel_id, data, .. } = item else { continue };
+            match reader.channel(channel_id).unwrap().topic.as_str() {
+                TOPIC_RAW_TX => frames.push(data),
+                TOPIC_BOOK => entries.push(v1::BookEntry::decode(&data[..]).unwrap()),
+                TOPIC_BOOK_HEAD => {
+                    let signed = SignedHead::of_record(&v1::BookHead::decode(&data[..]).unwrap()).unwrap();
+                    heads.push(RecordedHead { from: String::new(), by_vehicle: false, signed });
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(reader.damage(), None);
+        let audited = audit(&entries, &heads, None);
+        (frames, entries, audited)
+    }
+
+    #[test]
+    fn no_frame_is_lost_between_two_logs_and_both_books_are_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let link = format!("udpout:{}", vehicle.local_addr().unwrap());
+        let [log, socket] = [path("flight.mcap"), path("station.sock")];
+        let cli =
+            Cli::try_parse_from(["ground", "daemon", "--connect", &link, "--log", &log, "--socket", &socket]);
+        let Some(Command::Daemon { station: args }) = cli.unwrap().command else { panic!("a daemon") };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let clock = Clock::start();
+            let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
+            let guard = LogGuard::new(open_log(args.log.as_ref(), None, &header).unwrap());
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            let next_log = NextLog::new(&args, header, guard.log());
+            let config = Config::default();
+            let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
+            let (mut station, mut model, mut wire) = started.unwrap();
+            let say = |wire: &mut Wire| {
+                for _ in 0..3 {
+                    wire.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()), 0);
+                }
+            };
+            say(&mut wire);
+            station.keep_logs_short(&mut model, &mut wire);
+            assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
+            station.change_log(&mut model, &mut wire);
+            say(&mut wire);
+            assert_eq!(super::super::stations::of(&model, &[]).log, path("flight-2.mcap"));
+            station.change_log(&mut model, &mut wire);
+            say(&mut wire);
+            station.close_book("the station ends", &mut model, &mut wire);
+            station.close(&model).await;
+            assert_eq!(guard.finish().unwrap(), Some(PathBuf::from(path("flight-3.mcap"))));
+        });
+        let logs = ["flight.mcap", "flight-2.mcap", "flight-3.mcap"].map(|name| read(Path::new(&path(name))));
+        // The fifth byte of a frame is its number (MAVLink 2).
+        let numbers: Vec<u8> =
+            logs.iter().flat_map(|(frames, ..)| frames.iter().map(|frame| frame[4])).collect();
+        assert!(
+            numbers.len() >= 9 && numbers.iter().zip(0..).all(|(number, place)| *number == place),
+            "{numbers:?}"
+        );
+        for (place, (frames, entries, audit)) in logs.iter().enumerate() {
+            assert!(frames.len() >= 3 && audit.closed && audit.broken.is_none(), "{place}: {audit:?}");
+            let Some((_, _, before)) = place.checked_sub(1).map(|before| &logs[before]) else { continue };
+            let head = before.head.unwrap();
+            let link = format!(" with book {}:{};", head.entries, shown(&head.hash));
+            assert!(entries[0].text.contains(&link), "{}", entries[0].text);
+        }
+    }
+}
