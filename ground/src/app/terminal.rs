@@ -9,7 +9,6 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::io::Write;
-use std::ops::RangeInclusive;
 
 use ratatui::backend::{Backend, ClearType, CrosstermBackend, WindowSize};
 use ratatui::buffer::Cell;
@@ -107,10 +106,6 @@ fn sequence_bytes(number: u16) -> usize {
     }
 }
 
-/// Steps down and to the left for which a byte each is the shortest way.
-const LINE_FEEDS: RangeInclusive<i16> = 1..=i16::MAX;
-const BACKSPACES: RangeInclusive<i16> = -3..=-1;
-
 impl Way {
     /// The shortest one. Nothing is known of the cursor without `from`.
     fn shortest(from: Option<Place>, to: Place) -> Self {
@@ -129,11 +124,12 @@ impl Way {
                 sequence_bytes(row + 1).max(4) + sequence_bytes(column + 1).max(4) - 2
             }
             Self::Along { rows, columns } => {
-                let bytes = |steps: i16, single: RangeInclusive<i16>| {
-                    let number = steps.unsigned_abs();
-                    if single.contains(&steps) { usize::from(number) } else { sequence_bytes(number) }
+                let vertical = if rows > 0 {
+                    usize::from(rows.unsigned_abs())
+                } else {
+                    sequence_bytes(rows.unsigned_abs())
                 };
-                bytes(rows, LINE_FEEDS) + bytes(columns, BACKSPACES)
+                vertical + sequence_bytes(columns.unsigned_abs())
             }
         }
     }
@@ -144,12 +140,10 @@ impl Way {
             Self::AtOnce((row, column)) => return write!(out, "\x1b[{};{}H", row + 1, column + 1),
             Self::Along { rows, columns } => (rows, columns),
         };
+        // Backspaces would save 2 % of the bytes; but nobody could tell them from those of a hostile text.
         // A line feed does nothing but go down, because the terminal is in raw mode.
         (0..rows).try_for_each(|_| out.write_all(b"\n"))?;
         steps(out, rows.min(0).unsigned_abs(), 'A')?;
-        if BACKSPACES.contains(&columns) {
-            return (columns..0).try_for_each(|_| out.write_all(b"\x08"));
-        }
         if !between.is_empty() && between.len() < sequence_bytes(columns.unsigned_abs()) {
             return out.write_all(between.as_bytes());
         }
