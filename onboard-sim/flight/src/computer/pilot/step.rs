@@ -442,14 +442,8 @@ impl Pilot {
 
     fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
         let state = &estimate.state;
-        if self.model.mission.powered.space.is_some() {
-            let fins_m2 = self.model.largest_fin_drag_area_m2();
-            let situated = self.model.powered_situation(estimate, situation, self.model.burn(), fins_m2);
-            self.powered.plan(time_s, state, &situated, None);
-        } else {
-            let (preferred, fallback) = self.model.situations_to_plan(estimate, situation, fins_rad);
-            self.powered.plan(time_s, state, &preferred, fallback.as_ref());
-        }
+        let (preferred, fallback) = self.model.situations_to_plan(estimate, situation, fins_rad);
+        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
         if self.powered.fin_share(time_s).is_none() {
             self.fin_share = self.fin_share_of_band(estimate, situation);
         }

@@ -199,9 +199,14 @@ impl VehicleModel {
             None => column.falls_too_slowly(&estimated, burning.burning_s, estimate.state.velocity_m_s.z),
         };
         let situation = |assumed: Assumed<'a>| {
+            let largest_m2 = self.largest_fin_drag_area_m2();
+            // A plan in space opens the fins itself.
             let kept = self.mission.fins_kept;
-            let fin_drag_area_m2 = kept * self.fin_drag_area_m2(fins_rad)
-                + (1.0 - kept) * assumed.fin_share * self.largest_fin_drag_area_m2();
+            let fin_drag_area_m2 = if self.mission.powered.space.is_some() {
+                largest_m2
+            } else {
+                kept * self.fin_drag_area_m2(fins_rad) + (1.0 - kept) * assumed.fin_share * largest_m2
+            };
             PoweredSituation {
                 high,
                 ..self.powered_situation(estimate, burning, assumed.burn, fin_drag_area_m2)

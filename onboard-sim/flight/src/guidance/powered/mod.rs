@@ -422,10 +422,10 @@ mod tests {
 
     // What the guidance flies when no plan is good.
 
-    /// mk2 in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3 m/s: it has to turn away more
-    /// thrust than it can without hovering.
-    fn too_high(high: bool) -> PoweredGuidance {
-        let mission = builtin("mk2").unwrap().unwrap();
+    /// A vehicle in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3 m/s: it has to turn away more
+    /// thrust than it can without hovering. mk2 plans in a plane, mk3 in space.
+    fn too_high(mission: &str, high: bool) -> PoweredGuidance {
+        let mission = builtin(mission).unwrap().unwrap();
         let feet_below_cg_m = 0.44;
         let situation = PoweredSituation {
             burn: Burn::nominal(&mission.motor_curve),
@@ -459,13 +459,16 @@ mod tests {
 
     #[test]
     fn a_vehicle_that_is_high_flies_a_hard_plan_and_does_not_brake_upright() {
-        let low = too_high(false);
-        assert!(low.report().touchdown.u_m_s < HARD_M_S, "{:?}", low.report());
-        assert_eq!(low.report().level, ControlLevel::Stabiliser);
+        for mission in ["mk2", "mk3"] {
+            let low = too_high(mission, false);
+            assert!(low.report().touchdown.u_m_s < HARD_M_S, "{mission}: {:?}", low.report());
+            assert_eq!(low.report().level, ControlLevel::Stabiliser, "{mission}");
 
-        let high = too_high(true);
-        assert_eq!(high.report().level, ControlLevel::BestFeasible, "{:?}", high.report());
-        assert!(high.report().largest_tilt_rad > 45.0_f64.to_radians(), "{:?}", high.report());
+            let high = too_high(mission, true);
+            assert_eq!(high.report().level, ControlLevel::BestFeasible, "{mission}: {:?}", high.report());
+            let tilt_rad = high.report().largest_tilt_rad;
+            assert!(tilt_rad > 45.0_f64.to_radians(), "{mission}: {:?}", high.report());
+        }
     }
 
     #[test]

@@ -88,8 +88,8 @@ impl SpaceGuidance {
     ) -> Option<PoweredReport> {
         let outcome = self.search(time_s, state, situation, settings, space)?;
         let usable = self.found.is_finite();
-        // Too low for any landing: upright brakes just as well.
-        let too_low = self.found.end_m_s() < HARD_M_S;
+        // Too low for any landing: upright brakes just as well. High above the ground it would stop the vehicle there.
+        let too_low = !situation.high && self.found.end_m_s() < HARD_M_S;
         let lands = outcome.status == Status::Converged && outcome.miss <= settings.landing_miss;
         let level = ControlLevel::of_plan(usable, self.left_s(time_s), too_low, lands);
         if usable {
