@@ -166,7 +166,7 @@ impl FlightVerifier {
         self.frames += 1;
         self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
-        let impossible = self.inputs.judge(&frame.record.input, frame.since_release.is_some());
+        let impossible = self.inputs.judge(&frame.record.input, frame.since_release);
         // What a missing field was filled with says nothing.
         let impossible = impossible.filter(|_| misread_frame(data).is_none());
         self.parts.inputs.recorded += 1;

@@ -33,6 +33,8 @@ const ROUNDING_S: f64 = 1e-3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Inputs {
     last: Option<LastInput>,
+    /// The frame of the release, once it is known.
+    release_frame: Option<u64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -47,11 +49,14 @@ struct LastInput {
 }
 
 impl Inputs {
-    /// Why the input cannot be; `None` if it can.
-    pub(super) fn judge(&mut self, input: &ComputerInput, in_flight: bool) -> Option<String> {
+    /// Why the input cannot be; `None` if it can. `since_release`: the frame's number in flight.
+    pub(super) fn judge(&mut self, input: &ComputerInput, since_release: Option<u64>) -> Option<String> {
+        if let Some(number) = since_release {
+            self.release_frame = input.frame.checked_sub(number);
+        }
         let now = LastInput {
             frame: input.frame,
-            in_flight,
+            in_flight: since_release.is_some(),
             pin_out: input.pin_out,
             booster_attached: input.booster_attached,
             battery_v: input.battery_v,
@@ -59,7 +64,8 @@ impl Inputs {
             commander_age_s: input.commander.as_ref().map(|commander| commander.age_s),
         };
         let before = self.last.replace(now);
-        out_of_range(input).or_else(|| before.and_then(|before| out_of_order(&before, &now)))
+        out_of_range(input, self.release_frame)
+            .or_else(|| before.and_then(|before| out_of_order(&before, &now)))
     }
 }
 
@@ -76,7 +82,7 @@ fn vector(what: &str, Vector3 { x, y, z }: &Vector3, most: f64) -> Option<String
     [x, y, z].into_iter().find_map(|value| within(what, *value, most))
 }
 
-fn out_of_range(input: &ComputerInput) -> Option<String> {
+fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<String> {
     let time_s = flight_time_s(input.frame);
     if input.time_s.to_bits() != time_s.to_bits() {
         return Some(format!("time {:?} s: the frame is at {time_s} s", input.time_s));
@@ -100,7 +106,11 @@ fn out_of_range(input: &ComputerInput) -> Option<String> {
         .or_else(|| {
             outside("age of the commander, s,", input.commander.as_ref()?.age_s, -ROUNDING_S, f64::MAX)
         })
-        .or_else(|| measured(input.measured.as_ref()?, time_s))
+        .or_else(|| {
+            // Fixes are on the clock of the flight: from power-up, and from the release on T+.
+            let clock_s = flight_time_s(input.frame.saturating_sub(release_frame.unwrap_or(0)));
+            measured(input.measured.as_ref()?, clock_s)
+        })
         .or_else(|| known(input.known.as_ref()?))
 }
 

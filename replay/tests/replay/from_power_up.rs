@@ -22,7 +22,7 @@ use simulated_vehicle::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use tempfile::TempDir;
 
 /// More frames than any flight has.
-const LONGEST: u64 = 20_000;
+const LONGEST: u64 = 30_000;
 
 const STATION: Station = Station { system: 255, component: 190, number: 1 };
 
@@ -213,6 +213,18 @@ fn a_flight_verifies_from_power_up_to_safed() {
     assert_eq!(report.outcome, Verification::Identical, "{report:?}");
     assert_eq!(all_frames_identical(&report), flown.frames());
     assert!(report.frames_compared > 60);
+}
+
+/// A fix is timed from the release on, and the frames from power-up.
+#[test]
+fn after_minutes_on_the_pad_no_input_of_the_flight_is_impossible() {
+    for start in [StartPoint::Apogee, StartPoint::Pad] {
+        let flown = Flown::from(start, &armed_and_started(14_000), &[]);
+        assert!(flown.phases.contains(&Phase::Powered), "{:?}", flown.phases);
+        let report = flown.verified();
+        assert_eq!(report.outcome, Verification::Identical, "{start:?}: {report:?}");
+        assert_eq!(all_frames_identical(&report), flown.frames());
+    }
 }
 
 #[test]

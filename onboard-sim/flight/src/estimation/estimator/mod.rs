@@ -383,7 +383,8 @@ pub struct GnssFix {
     /// Position in the world, relative to the pad, m.
     pub position_m: Vector3<f64>,
     pub velocity_m_s: Vector3<f64>,
-    /// Time of validity, s on the flight computer's clock.
+    /// Time of validity on the flight computer's clock, s: from power-up on the pad, and T+ (from the release) in flight. A fix
+    /// that is older than the estimator remembers is not used.
     pub valid_at_s: f64,
 }
 
