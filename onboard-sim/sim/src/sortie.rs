@@ -160,9 +160,9 @@ impl Sortie {
 
     /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
     fn begin(&mut self) {
-        // A motor that lit itself is on its way already.
+        // A motor that lit itself is on its way already: only the clock begins anew.
         if self.surroundings.world.booster_thrust_n() > 0.0 {
-            return;
+            return self.surroundings.count_from(flight_time_s(self.frame));
         }
         self.surroundings.begin(&self.mission, &self.dispersion, &self.drawn);
     }

@@ -63,6 +63,13 @@ impl Surroundings {
         self.actuators = at_rest(mission);
     }
 
+    /// From now on the receiver's times count from this time of its clock, s: the flight computer's do.
+    pub(crate) fn count_from(&mut self, release_s: f64) {
+        if let Some(sensors) = &mut self.sensors {
+            sensors.count_from(release_s);
+        }
+    }
+
     /// The world moves for one frame, and the sensors measure it. `None` if they have given no sample: what is true is then known to
     /// nobody. Without sensors the computer is told the true state.
     pub(crate) fn sample_sensors(&mut self) -> Option<Sensed> {

@@ -160,6 +160,11 @@ pub struct Sensors {
 }
 
 impl Sensors {
+    /// From now on times count from this one, s.
+    pub fn count_from(&mut self, time_s: f64) {
+        self.start_s -= time_s;
+    }
+
     /// Draws one flight's sensors; `start_s` is the flight computer's time at the start of the simulation.
     ///
     /// # Errors
