@@ -9,6 +9,16 @@ const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const TEMPORARILY_REJECTED: u8 = 1;
 const DENIED: u8 = 2;
 
+/// The vehicle does what the automatic mode has commanded, and what it commands next.
+fn arms_and_starts(rig: &mut Rig) {
+    rig.answer(ARM, 0);
+    rig.armed = true;
+    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+    rig.run(1.0);
+    rig.answer(MavCmd::MAV_CMD_MISSION_START, 0);
+    rig.countdown_ms = 5_000;
+}
+
 #[test]
 fn the_automatic_mode_arms_and_starts_once() {
     let mut rig = Rig::new(settings(true, false));
@@ -16,12 +26,7 @@ fn the_automatic_mode_arms_and_starts_once() {
     let commands = rig.take_commands();
     assert!(!commands.is_empty() && commands.iter().all(is_arm), "{commands:?}");
     assert!(commands.iter().all(|sent| sent.param2.to_bits() == commands[0].param2.to_bits()), "one command");
-    rig.answer(ARM, 0);
-    rig.armed = true;
-    rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
-    rig.run(1.0);
-    rig.answer(MavCmd::MAV_CMD_MISSION_START, 0);
-    rig.countdown_ms = 5_000;
+    arms_and_starts(&mut rig);
     rig.run(5.0);
     let commands = rig.take_commands();
     assert_eq!(commands.len(), 1);
@@ -34,12 +39,7 @@ fn a_countdown_that_silence_has_held_is_started_anew_and_one_that_a_person_has_h
     for (hold, starts) in [(TdHold::TD_HOLD_UPLINK_SILENT, 1), (TdHold::TD_HOLD_COMMANDED, 0)] {
         let mut rig = Rig::new(settings(true, false));
         rig.run(2.0);
-        rig.answer(ARM, 0);
-        rig.armed = true;
-        rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
-        rig.run(1.0);
-        rig.answer(MavCmd::MAV_CMD_MISSION_START, 0);
-        rig.countdown_ms = 5_000;
+        arms_and_starts(&mut rig);
         rig.run(1.0);
         rig.take_commands();
         rig.countdown_ms = i32::MAX;

@@ -188,13 +188,12 @@ fn at_contact(mission: &Mission, outcome: &Outcome) -> Outcome {
 
 /// Landings within the limits of the legs at contact, in JSBSim and in our world, and both worlds' outcomes.
 fn compare(mission: &str, wind_m_s: f64, flights: u64) -> ([usize; 2], Flown) {
-    let (name, mission_toml) =
-        *flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == mission).unwrap();
-    let mission = flight::vehicles::mission::from_toml(mission_toml, name).unwrap();
+    let mission = flight::vehicles::mission::builtin(mission).unwrap().unwrap();
     let flown = fly(&mission, wind_m_s, flights);
     let Flown { theirs, ours, again } = &flown;
     println!(
-        "{name}, wind {wind_m_s} m/s: vertical m/s, lateral m/s, tilt deg, rate deg/s, distance m, time s"
+        "{}, wind {wind_m_s} m/s: vertical m/s, lateral m/s, tilt deg, rate deg/s, distance m, time s",
+        mission.name
     );
     for (number, (theirs, ours)) in theirs.iter().zip(ours).enumerate() {
         let failed = |outcome: &Outcome| outcome.failure.map_or("landed", Failure::name);

@@ -200,8 +200,8 @@ impl VehicleModel {
         };
         let situation = |assumed: Assumed<'a>| {
             let largest_m2 = self.largest_fin_drag_area_m2();
-            // A plan in space opens the fins itself.
             let kept = self.mission.fins_kept;
+            // A plan in space opens the fins itself.
             let fin_drag_area_m2 = if self.mission.powered.space.is_some() {
                 largest_m2
             } else {
