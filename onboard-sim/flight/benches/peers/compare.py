@@ -9,6 +9,7 @@ import sys
 import floor
 import landing
 import measure
+import quadratic
 import rollout
 import scattered
 import space_measure
@@ -19,6 +20,9 @@ from ours import Ours
 
 # Who gets the landing in space, too.
 IN_SPACE = ("fatrop", "ipopt")
+
+# Who gets one step's quadratic problem alone.
+QUADRATIC = ("piqp", "hpipm")
 
 
 def said(*command):
@@ -52,7 +56,7 @@ def asked():
     parser.add_argument("--acados", required=True, help="folder of the programs that acados generates")
     parser.add_argument("--ripopt", required=True, help="ripopt's library")
     parser.add_argument("--bridge", required=True, help="the library between ripopt and the functions")
-    parser.add_argument("peers", nargs="+", choices=("fatrop", "ipopt", "ripopt", "acados"))
+    parser.add_argument("peers", nargs="+", choices=("fatrop", "ipopt", "ripopt", "acados", *QUADRATIC))
     return parser.parse_args()
 
 
@@ -70,10 +74,14 @@ def main():
     entrants = list(own)
     print(f"{machine()}; {said(os.environ.get('CC', 'cc'), '--version')}; {said('rustc', '--version')}")
     print(f"ours at {said('git', '-C', os.path.dirname(__file__), 'describe', '--always', '--dirty', '--exclude=*')}")
+    workers |= {peer: ("quadratic", peer, words.wheel) for peer in QUADRATIC}
+    public = []
     for peer in words.peers:
         version, made = worker.start(*workers[peer])
         print(version, flush=True)
-        entrants += made
+        (public if peer in QUADRATIC else entrants).extend(made)
+    if public:
+        quadratic.run(own[0], public)
     records = [measure.Record(entrant) for entrant in entrants]
     measure.cold(records)
     planned_rad = measure.warm(records)

@@ -78,6 +78,13 @@ class Ours:
     def space_warm(self, samples, start):
         return self._space("warm", samples, *map(float, start))
 
+    def quadratic(self, start):
+        """One step's quadratic problem, and the answer as `quadratic` has it."""
+        swept, *words = self._ask("quadratic", *map(float, start))
+        numbers = np.array(words[: 48 * landing.HORIZON], dtype=float).reshape(landing.HORIZON, 8, 6)
+        status, ns, iterations, _cost, _stationarity, _feasibility, _miss, *inputs = words[numbers.size :]
+        return numbers, (status == "converged", int(ns), int(iterations), float(swept), np.array(inputs, dtype=float))
+
     def layers(self, start):
         """Derivatives, Newton step, whole solve of one iteration, ns."""
         return [float(word) for word in self._ask("sweep", *map(float, start))]

@@ -13,6 +13,7 @@
 //! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at its beginning
 //! space hold               make that solution the plan in space
 //! space warm SAMPLES STATE solve what is left of it
+//! quadratic STATE          the problem of one Gauss-Newton step (`quadratic`) at the plan
 //! sweep STATE              time the layers of one iteration at the cold solution
 //! peak                     time the arithmetic of this machine
 //! ```
@@ -20,12 +21,14 @@
 //! A solve runs twice, and the second run is timed in the thread's own processor time, so interruptions do not count.
 //! Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad. The answer
 //! to `sweep` is the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one
-//! iteration. The answer to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns.
+//! iteration. The answer to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
+//! solve. The answer to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
 mod one_guess;
 mod peak;
+mod quadratic;
 mod space;
 
 use std::error::Error;
@@ -40,7 +43,7 @@ use nmpc::dynamics::PlanarState;
 use nmpc::{Problem, Solution, SolverLimits, WarmStart, Workspace, paper, solve, solve_into};
 use one_guess::OneGuess;
 use space::Space;
-use stages::Status;
+use stages::{Model, Status};
 
 /// Number of runs that are averaged, and of repeats, when the layers of an iteration are timed.
 const RUNS: u32 = 50;
@@ -91,8 +94,10 @@ impl Peer {
                 let problem = self.problem(state(words)?, paper::HORIZON);
                 match which {
                     "both" => self.timed(&problem, None),
-                    "0" => timed_from_one(&OneGuess { problem: &problem, index: 0 }),
-                    "1" => timed_from_one(&OneGuess { problem: &problem, index: 1 }),
+                    "0" | "1" => {
+                        let index = usize::from(which == "1");
+                        timed(&OneGuess { problem: &problem, index }, &mut stages::Workspace::default())
+                    }
                     _ => bail!("guess '{which}': both, 0 or 1"),
                 }
             }
@@ -112,10 +117,11 @@ impl Peer {
                 let warm = self.plan.shifted(samples);
                 self.timed(&problem, Some(&warm))
             }
+            Some("quadratic") => quadratic::answer(&self.problem(state(words)?, paper::HORIZON), &self.plan),
             Some("space") => self.in_space(words),
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
-            _ => bail!("must start with penalty, cold, hold, warm, space, sweep or peak"),
+            _ => bail!("must start with penalty, cold, hold, warm, quadratic, space, sweep or peak"),
         }
     }
 
@@ -182,8 +188,7 @@ impl Peer {
 }
 
 /// Solves from one guess twice, each time with the buffers of the solve before.
-fn timed_from_one(model: &OneGuess) -> Result<String> {
-    let mut workspace = stages::Workspace::default();
+fn timed<M: Model<6, 1>>(model: &M, workspace: &mut stages::Workspace<M, 6, 1>) -> Result<String> {
     workspace.solve(black_box(model), None);
     let before = thread_ns();
     let outcome = workspace.solve(black_box(model), None);
