@@ -11,10 +11,11 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use campaign::run::in_parallel;
 use flight::guidance::baseline::{Controller, Law};
+use flight::vehicle::lot::Posterior;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha12Rng;
 use replay::fit::day::{Outcomes, is_go};
-use replay::fit::lot::{Chance, Lot, Trial, draw_next, predict};
+use replay::fit::lot::{Chance, Trial, burnt, draw_next, predict};
 use sim::draw::{Draw, draw};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -80,15 +81,15 @@ impl World {
 /// A club's true rate of the next day, and for each limit whether it has a GO.
 fn club(number: u64, simulated: &World, own: &World) -> anyhow::Result<(f64, [bool; LIMITS.len()])> {
     let mut chance = Chance(ChaCha12Rng::seed_from_u64(9_000_000 + number));
-    let priors = [0, 1, 2].map(|i: usize| Lot::prior(nominal()[i], PRIOR[i]));
-    let lot = priors.map(|prior| prior.draw(&mut chance));
+    let priors = [0, 1, 2].map(|i: usize| Posterior::prior(nominal()[i], PRIOR[i]));
+    let lot = priors.map(|prior| chance.lot(&prior));
     let burn = |chance: &mut Chance| lot.map(|(mean, sigma)| mean + sigma * chance.normal());
     let missed = MISSED.map(|sigma| sigma * chance.normal());
     let burns: [Motor; BURNS] = std::array::from_fn(|_| burn(&mut chance));
     let landed = burns.iter().filter(|motor| chance.unit() < own.chance_to_land(motor)).count();
     let lots = [0, 1, 2].map(|i: usize| {
         let values: Vec<f64> = burns.iter().map(|burn| burn[i] + missed[i]).collect();
-        Lot { common: MISSED[i], ..priors[i].with(&values) }
+        priors[i].with(BURNS as u32, &burnt(&values, MISSED[i]))
     });
     // The day's mission expects what was learnt.
     let expected = |motor: &[f64]| {

@@ -28,7 +28,7 @@ pub mod vehicle {
     //!
     //! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the limits.
     //! * [`airframe`] holds masses, shape and actuators.
-    //! * [`thrust_curve`] is the certified motor, and [`burn`] the expected burn of this motor.
+    //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`] the expected burn of this motor.
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
     //! * [`dynamics`] has the state and the equations of motion in the plane, [`rigid`] the state in space.
     //! * [`site`] is the place of the pad on the Earth.
@@ -40,6 +40,7 @@ pub mod vehicle {
     pub mod drop;
     pub mod fins;
     pub mod launch;
+    pub mod lot;
     pub mod mission;
     pub mod rigid;
     pub mod site;

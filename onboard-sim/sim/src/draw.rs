@@ -36,7 +36,7 @@ pub struct Draw {
 /// other draws, and two sets of dispersions can be compared flight by flight.
 pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
     let mut chance = Chance::of(seed, number);
-    let sigma = dispersion;
+    let sigma = &known(mission, dispersion);
     let nominal = Truth::default();
     let impulse_scale =
         1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even();
@@ -92,9 +92,27 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         ..nominal
     };
     let truth = mismatched(&truth, &mission.airframe.legs, &sigma.mismatch, seed, number);
+    // The booster's motor is of another lot.
     let ascent = ascended(mission, dispersion, seed, number);
     let hanging = hung(mission, dispersion, seed, number);
     Draw { truth, apogee, ascent, hanging, flight_seed }
+}
+
+/// The set, which scatters landing motors as certified curves differ, with the scatter that the mission knows of its lot, and
+/// a vehicle that was weighed. What the set does not scatter stays as it is.
+fn known(mission: &Mission, set: &Dispersion) -> Dispersion {
+    let Some(expected) = &mission.expected else { return *set };
+    // The variance of an even distribution is a third of its half-width's square.
+    let both = libm::hypot(set.impulse_share, set.impulse_even_share / libm::sqrt(3.0));
+    let narrows = if both > 0.0 { expected.impulse.share / both } else { 1.0 };
+    let scatters = set.burn_time_share > 0.0;
+    Dispersion {
+        impulse_share: set.impulse_share * narrows,
+        impulse_even_share: set.impulse_even_share * narrows,
+        burn_time_share: if scatters { expected.burn_time.share } else { 0.0 },
+        mass_share: set.mass_share.min(expected.mass_share),
+        ..*set
+    }
 }
 
 /// The ascent of flight `number`, from a generator of its own.

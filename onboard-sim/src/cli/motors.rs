@@ -130,10 +130,11 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let team = choices.team()?;
     let mission = &team.recipe.mission;
     let found = choices.motors()?;
-    let motor = if let Some(name) = &arguments.motor {
+    let own = &mission.airframe.motor;
+    let motor = if let Some(name) = arguments.motor.as_ref().filter(|name| *name != own) {
         named(name, &found)?
     } else {
-        let motor = mission.airframe.motor.clone();
+        let motor = own.clone();
         let curve = mission.motor_curve.clone();
         Candidate { origin: "the mission".to_owned(), motor, curve, in_production: None }
     };

@@ -17,8 +17,8 @@ use campaign::run::in_parallel;
 use campaign::stopwatch::Stopwatch;
 use clap::Args;
 use flight::guidance::baseline::{Controller, Law};
+use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
-use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha12Rng;
 use serde::Serialize;
@@ -28,7 +28,7 @@ use sim::sortie::{SetUpError, Sortie};
 use sim::world::truth::Truth;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
 
-use super::lot::{Chance, Lot, Prediction, Trial, draw_next, predict};
+use super::lot::{Chance, Prediction, Trial, burnt, draw_next, predict};
 use super::{Basis, Fit, Pooled, Z_95, pooled};
 use crate::cli::{in_pool, refuse_existing, say, text_of, write_new};
 use crate::print::{counted, shown};
@@ -101,6 +101,8 @@ pub struct Learnt {
     pub set: String,
     pub sources: Vec<String>,
     pub lots: Vec<LotReport>,
+    /// The same as the section `[lot]` of a mission.
+    pub lot_toml: String,
     /// Drag and gimbal of the airframe, over the flights.
     pub airframe: Vec<Pooled>,
     /// Mean wind at the site, lowest and highest of an even distribution, m/s.
@@ -129,7 +131,8 @@ const PROPERTIES: [(&str, &str); 3] =
 /// [`LearnError`] says what is wrong with the fits, the mission or the set.
 pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     let set = Dispersion::from_toml(ask.set.1, ask.set.0)?;
-    let mission = crate::settings::mission_with(ask.mission_toml, &[])?;
+    let (before, lot) = unburnt(ask.mission_toml)?;
+    let mission = mission_with(&before, &[])?;
     one_vehicle(fits, [&mission.name, mission.motor_curve.name()])?;
     let basis = Basis::of(&mission);
     let fits: Vec<Fit> = fits.iter().map(|fit| fit.over(&basis)).collect();
@@ -146,24 +149,30 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
         ),
     ]
     // A set without scatter still has to leave room for what is measured.
-    .map(|(mean, sigma)| Lot::prior(mean, sigma.max(1e-3)));
-    let values: Vec<Vec<f64>> = PROPERTIES
-        .iter()
-        .map(|(name, _)| fits.iter().filter_map(|fit| fit.get(name)).map(|found| found.value).collect())
-        .collect();
-    if values[0].is_empty() {
+    .map(|(mean, sigma)| Posterior::prior(mean, sigma.max(1e-3)));
+    // A lot counts its burns once: those of which both are known.
+    let whole = |fit: &&Fit| PROPERTIES[..2].iter().all(|(name, _)| fit.get(name).is_some());
+    let burns: Vec<&Fit> = fits.iter().filter(whole).collect();
+    if burns.is_empty() {
         return Err(LearnError::NoBurn(fits.len()));
     }
-    let common = PROPERTIES.map(|(name, _)| {
-        let systematic = fits.iter().filter_map(|fit| fit.get(name)?.systematic);
-        systematic.fold(0.0, f64::max)
-    });
-    let lots = priors.iter().zip(&values).zip(common);
-    let lots: Vec<Lot> = lots.map(|((prior, values), common)| Lot { common, ..prior.with(values) }).collect();
+    let of = |fits: &[&Fit], name: &str| {
+        let found: Vec<_> = fits.iter().filter_map(|fit| fit.get(name)).collect();
+        let common = found.iter().filter_map(|found| found.systematic).fold(0.0, f64::max);
+        let values: Vec<f64> = found.iter().map(|found| found.value).collect();
+        (values.len(), burnt(&values, common))
+    };
+    let all: Vec<&Fit> = fits.iter().collect();
+    let [thrust, burn_time, delay] = PROPERTIES.map(|(name, _)| name);
+    let values = [of(&burns, thrust), of(&burns, burn_time), of(&all, delay)];
+    let lots = priors.iter().zip(&values);
+    let lots: Vec<Posterior> = lots.map(|(prior, (count, burnt))| prior.with(*count as u32, burnt)).collect();
     let airframe: Vec<Pooled> = airframe(fits);
     let wind_m_s = wind(fits, &set);
     let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
-    let day = Day::of(ask, &mission, &lots, &airframe, wind_m_s, &sources)?;
+    let motor = mission.motor_curve.name();
+    let lot = with_burns(lot, motor, burns.len(), [&values[0].1, &values[1].1])?;
+    let day = Day::of(ask, &before, &lot, &lots, &airframe, wind_m_s, &sources)?;
     let trials = ask.flights.map(|flights| fly(ask, flights, &lots, &day)).transpose()?;
     let prediction = trials.as_ref().map(|trials| {
         predict(&lots, trials, ask.limit, ask.seed)
@@ -173,10 +182,10 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     let flown = Outcomes::of(fits);
     let pulled = prediction.and_then(|found| Pulled::of(&found, flown));
     let reports = PROPERTIES.iter().zip(&lots).zip(&values).zip(&priors);
-    let reports = reports.map(|((((name, unit), lot), values), prior)| LotReport {
+    let reports = reports.map(|((((name, unit), lot), (burns, _)), prior)| LotReport {
         name,
         unit,
-        burns: values.len(),
+        burns: *burns,
         mean: lot.mean,
         low: lot.mean - Z_95 * lot.mean_sigma(),
         high: lot.mean + Z_95 * lot.mean_sigma(),
@@ -186,10 +195,11 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     });
     Ok(Learnt {
         mission: mission.name.clone(),
-        motor: mission.motor_curve.name().to_owned(),
+        motor: motor.to_owned(),
         set: ask.set.0.to_owned(),
         sources,
         lots: reports.collect(),
+        lot_toml: lot_toml(&lot),
         airframe,
         wind_m_s,
         flights: trials.map_or(0, |trials| trials.len()),
@@ -307,13 +317,14 @@ fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
     if speeds.is_empty() || high <= low {
         return set.wind_m_s;
     }
-    let lot = Lot::prior(0.5 * (low + high), (high - low) / libm::sqrt(12.0)).with(&speeds);
+    let lot = Posterior::prior(0.5 * (low + high), (high - low) / libm::sqrt(12.0))
+        .with(speeds.len() as u32, &burnt(&speeds, 0.0));
     let reach = libm::sqrt(3.0) * lot.next_sigma();
     [(lot.mean - reach).max(0.0), lot.mean + reach]
 }
 
 /// Flies the day's flights.
-fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<Trial>, LearnError> {
+fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<Trial>, LearnError> {
     let law = Law::of(Controller::Nmpc, &day.mission);
     let mut chance = Chance(ChaCha12Rng::seed_from_u64(ask.seed));
     let motors: Vec<(u64, Vec<f64>)> =
@@ -325,6 +336,8 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Lot], day: &Day) -> Result<Vec<
             impulse_scale: (motor[0] / lots[0].mean).clamp(0.1, 10.0),
             burn_time_scale: (motor[1] / lots[1].mean).clamp(0.3, 10.0),
             ignition_delay_s: motor[2].clamp(0.02, 60.0),
+            // The thrust is per mass and has the mass's scatter in it.
+            mass_scale: 1.0,
             ..drawn.truth
         };
         let draw = Draw { truth, ..drawn };
@@ -349,24 +362,24 @@ pub struct Day {
 impl Day {
     pub(super) fn of(
         ask: &DayAsk<'_>,
-        mission: &Mission,
-        lots: &[Lot],
+        before_toml: &str,
+        lot: &toml::Table,
+        lots: &[Posterior],
         airframe: &[Pooled],
         wind_m_s: [f64; 2],
         sources: &[String],
     ) -> Result<Self, LearnError> {
-        let [thrust, burn_time, delay] = lots else {
+        let [_, _, delay] = lots else {
             return Err(LearnError::Day("a lot has thrust, burn time and delay".to_owned()));
         };
-        let curve = scaled(&mission.motor_curve, thrust.mean, burn_time.mean)
-            .ok_or_else(|| LearnError::Day("the lot's mean motor has no thrust".to_owned()))?;
+        let mission = mission_with(before_toml, &[])?;
         let drag = airframe.iter().find(|pooled| pooled.mean.name == "drag_scale").map(|pooled| &pooled.mean);
         let drag_scale = drag.map_or(1.0, |mean| mean.value);
         let (body, fins) = (&mission.airframe.body, &mission.airframe.fins);
         let float = |value: f64| toml::Value::Float(value);
         let set = |path: &str, value: toml::Value| Setting { path: path.to_owned(), value, at_s: None };
         let settings = [
-            set("airframe.motor", toml::Value::String(flight::vehicles::thrust_curve::to_rasp(&curve))),
+            set("lot", toml::Value::Table(lot.clone())),
             set("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
             set(
                 "airframe.body.crossflow_drag_coefficient",
@@ -376,15 +389,19 @@ impl Day {
             set("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
             set("airframe.legs.drag_area_m2", float(mission.airframe.legs.drag_area_m2 * drag_scale)),
             set("ignition.delay_s", float(delay.mean)),
-            set("motor.impulse_sigma", float(thrust.next_sigma())),
-            set("motor.burn_time_sigma", float(burn_time.next_sigma())),
         ];
         let head = head("The mission", ask, sources);
-        let mission_toml = head + &mission_toml_with(ask.mission_toml, &settings)?;
+        let mission_toml = head + &mission_toml_with(before_toml, &settings)?;
         let mission = mission_with(&mission_toml, &[])?;
-        let dispersion_toml =
-            dispersion_toml(ask, &mission, lots, drag.map(|mean| mean.sigma / mean.value), wind_m_s, sources)
-                .map_err(LearnError::Day)?;
+        let dispersion_toml = dispersion_toml(
+            ask,
+            &mission,
+            delay,
+            drag.map(|mean| mean.sigma / mean.value),
+            wind_m_s,
+            sources,
+        )
+        .map_err(LearnError::Day)?;
         // Read as the campaign reads it.
         let dispersion = Dispersion::from_toml(&dispersion_toml, "the day's set")?;
         Ok(Self { mission, mission_toml, dispersion, dispersion_toml })
@@ -404,20 +421,14 @@ fn head(what: &str, ask: &DayAsk<'_>, sources: &[String]) -> String {
 fn dispersion_toml(
     ask: &DayAsk<'_>,
     mission: &Mission,
-    lots: &[Lot],
+    delay: &Posterior,
     drag_share: Option<f64>,
     wind_m_s: [f64; 2],
     sources: &[String],
 ) -> Result<String, String> {
     let mut table: toml::Table = ask.set.1.parse().map_err(|error| format!("{}: {error}", ask.set.0))?;
     let mut set = |key: &str, value: f64| table.insert(key.to_owned(), toml::Value::Float(value));
-    let [thrust, burn_time, delay] = lots else { return Err("a lot has three properties".to_owned()) };
-    // The thrust is per mass and has the mass's scatter in it. A set has normal deviations where the next burn has a Student
-    // t of the same variance.
-    set("impulse_share", thrust.next_sigma() / thrust.mean);
-    set("impulse_even_share", 0.0);
-    set("mass_share", 0.0);
-    set("burn_time_share", burn_time.next_sigma() / burn_time.mean);
+    // Impulse and burn time scatter as the mission's lot does.
     // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
     let apart_s = delay.mean - Truth::default().ignition_delay_s;
     let scatter_scale = mission.airframe.igniter.scatter_scale.max(1e-3);
@@ -431,21 +442,42 @@ fn dispersion_toml(
     Ok(head("The dispersions", ask, sources) + &text)
 }
 
-/// A motor with another impulse in another time.
-fn scaled(curve: &ThrustCurve, impulse: f64, burn_time: f64) -> Option<ThrustCurve> {
-    let points = curve.points().iter().map(|point| ThrustPoint {
-        time_s: point.time_s * burn_time,
-        thrust_n: point.thrust_n * impulse / burn_time,
-    });
-    ThrustCurve::new(MotorData {
-        name: curve.name().to_owned(),
-        manufacturer: curve.manufacturer().to_owned(),
-        diameter_m: curve.diameter_m(),
-        length_m: curve.length_m(),
-        propellant_mass_kg: curve.propellant_mass_kg(),
-        total_mass_kg: curve.total_mass_kg(),
-        points: points.collect(),
-    })
+/// The mission without what it knows of burns and of a day, and its `[lot]`: scales are over its curve, and the next day has
+/// weights and temperatures of its own.
+fn unburnt(mission_toml: &str) -> Result<(String, toml::Table), LearnError> {
+    let mut mission: toml::Table = mission_toml.parse().map_err(day_error)?;
+    let Some(toml::Value::Table(lot)) = mission.get_mut("lot") else {
+        return Ok((mission_toml.to_owned(), toml::Table::new()));
+    };
+    lot.retain(|key, _| key == "name" || key == "curve");
+    lot.insert("burns".to_owned(), toml::Value::Integer(0));
+    let lot = lot.clone();
+    Ok((toml::to_string(&mission).map_err(day_error)?, lot))
+}
+
+/// A lot with its burns; without a name it is named after its motor.
+fn with_burns(
+    mut lot: toml::Table,
+    motor: &str,
+    burns: usize,
+    burnt: [&Burnt; 2],
+) -> Result<toml::Table, LearnError> {
+    lot.entry("name").or_insert_with(|| toml::Value::String(motor.to_owned()));
+    lot.insert("burns".to_owned(), toml::Value::try_from(burns).map_err(day_error)?);
+    for (name, burnt) in ["impulse", "burn_time"].into_iter().zip(burnt) {
+        lot.insert(name.to_owned(), toml::Value::try_from(burnt).map_err(day_error)?);
+    }
+    Ok(lot)
+}
+
+fn day_error(error: impl std::error::Error) -> LearnError {
+    LearnError::Day(error.to_string())
+}
+
+/// The section as text, each property in a line of its own.
+fn lot_toml(lot: &toml::Table) -> String {
+    let lines = lot.iter().map(|(key, value)| format!("{key} = {value}\n"));
+    format!("[lot]\n{}", lines.collect::<String>())
 }
 
 /// Writes what was learnt as text.
@@ -486,6 +518,7 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
         );
         writeln!(output, "{}", text.trim_end())?;
     }
+    write!(output, "{}", learnt.lot_toml)?;
     let [low, high] = learnt.wind_m_s;
     writeln!(output, "site      wind {low:.1} to {high:.1} m/s")?;
     let Some(found) = &learnt.prediction else { return Ok(()) };
@@ -657,17 +690,5 @@ mod tests {
         let seven = Outcomes { landed: 7, of: 10 };
         assert!(seven.allow(0.8) && !seven.allow(0.95));
         assert_eq!(Pulled::of(&simulated, Outcomes { landed: 0, of: 0 }), None);
-    }
-
-    #[test]
-    fn val_hand_a_scaled_motor() {
-        let curve =
-            flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap();
-        let found = scaled(&curve, 1.1, 2.0).unwrap();
-        assert!(
-            (found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12
-        );
-        assert!((found.thrust_at_n(4.0) - 22.0).abs() < 1e-12);
-        assert!((found.propellant_mass_kg() - 0.12).abs() < 1e-12);
     }
 }

@@ -1,87 +1,22 @@
-//! A lot's posterior: the mean and the scatter of a motor's property, from few burns and the scatter that a set of
-//! dispersions has.
+//! How often the next day lands, from a lot's posterior ([`flight::vehicle::lot`]) and simulated flights with motors of it.
 //!
-//! Normal values with an unknown mean and an unknown variance, with the conjugate normal-inverse-gamma prior; the next
-//! value has a Student t distribution (A. Gelman et al., Bayesian Data Analysis, 3rd edition, section 3.3). The errors of the
-//! fits count as scatter: they are a tenth of it and widen it by half a per cent. What all fits of a vehicle may have in common
-//! is no scatter, and no number of burns makes it smaller: it widens the mean by itself.
+//! The next value of a posterior has a Student t distribution. The errors of the fits count as scatter: they are a tenth of it
+//! and widen it by half a per cent. What all fits of a vehicle may have in common is no scatter: it widens the mean by itself.
 
 use core::f64::consts::TAU;
 
+use flight::vehicle::lot::{Burnt, Posterior};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 use serde::Serialize;
 
-/// The prior counts as this many burns for the mean: a lot's mean differs from the certified value as much as motors within
-/// the lot differ from each other. (The certified curves of one motor, which are of different lots, differ by 3.75 % of
-/// impulse; the set `field` has 2.5 % for the two together.)
-const PRIOR_BURNS: f64 = 1.0;
-/// Half the degrees of freedom of the prior's scatter: the fewest with which the next value has a variance, so that the
-/// lot's own burns count soon.
-const PRIOR_ALPHA: u32 = 2;
-
-/// What is known of a normal distribution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Lot {
-    /// Expected mean.
-    pub mean: f64,
-    /// How many values the knowledge of the mean is worth.
-    pub worth: f64,
-    /// Degrees of freedom of the scatter, and of the next value's Student t.
-    pub freedom: u32,
-    /// Sum of squares that belongs to the degrees of freedom.
-    pub squares: f64,
-    /// Standard deviation of what all values have in common.
-    pub common: f64,
-}
-
-impl Lot {
-    /// Before any burn: the next value has this mean and this standard deviation.
-    pub fn prior(mean: f64, sigma: f64) -> Self {
-        let alpha = f64::from(PRIOR_ALPHA);
-        // The variance of the next value is squares / (2 alpha - 2) (1 + 1 / worth).
-        let squares = 2.0 * sigma * sigma * (alpha - 1.0) / (1.0 + 1.0 / PRIOR_BURNS);
-        Self { mean, worth: PRIOR_BURNS, freedom: 2 * PRIOR_ALPHA, squares, common: 0.0 }
-    }
-
-    /// With some values more.
-    #[must_use]
-    pub fn with(self, values: &[f64]) -> Self {
-        values.iter().fold(self, |lot, value| {
-            let missed = value - lot.mean;
-            let worth = lot.worth + 1.0;
-            Self {
-                mean: lot.mean + missed / worth,
-                worth,
-                freedom: lot.freedom + 1,
-                squares: lot.squares + missed * missed * lot.worth / worth,
-                ..lot
-            }
-        })
-    }
-
-    /// Standard deviation of the next value.
-    pub fn next_sigma(&self) -> f64 {
-        libm::hypot(self.scatter(), self.mean_sigma())
-    }
-
-    /// Expected standard deviation within the lot (the root of the expected variance).
-    pub fn scatter(&self) -> f64 {
-        libm::sqrt(self.squares / (f64::from(self.freedom) - 2.0))
-    }
-
-    /// Standard deviation of the mean.
-    pub fn mean_sigma(&self) -> f64 {
-        libm::hypot(self.scatter() / libm::sqrt(self.worth), self.common)
-    }
-
-    /// A mean and a standard deviation that the lot may have.
-    pub fn draw(&self, chance: &mut Chance) -> (f64, f64) {
-        let chi_squared: f64 = (0..self.freedom).map(|_| libm::pow(chance.normal(), 2.0)).sum();
-        let sigma = libm::sqrt(self.squares / chi_squared.max(1e-9));
-        (self.mean + libm::hypot(sigma / libm::sqrt(self.worth), self.common) * chance.normal(), sigma)
-    }
+/// What burns with these values had, if all may be wrong by `common` in the same direction.
+pub fn burnt(values: &[f64], common: f64) -> Burnt {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count.max(1.0);
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    Burnt { mean, scatter: libm::sqrt(squares / (count - 1.0).max(1.0)), common }
 }
 
 /// Random numbers on `libm`, the same on every machine.
@@ -96,6 +31,13 @@ impl Chance {
     /// Standard normal.
     pub fn normal(&mut self) -> f64 {
         libm::sqrt(-2.0 * libm::log(1.0 - self.unit())) * libm::cos(TAU * self.unit())
+    }
+
+    /// A mean and a standard deviation that a lot may have.
+    pub fn lot(&mut self, lot: &Posterior) -> (f64, f64) {
+        let chi_squared: f64 = (0..lot.freedom).map(|_| libm::pow(self.normal(), 2.0)).sum();
+        let sigma = libm::sqrt(lot.squares / chi_squared.max(1e-9));
+        (lot.mean + libm::hypot(sigma / libm::sqrt(lot.worth), lot.common) * self.normal(), sigma)
     }
 }
 
@@ -132,16 +74,16 @@ pub struct Prediction {
 }
 
 /// Draws a flight's motor from the lots.
-pub fn draw_next(lots: &[Lot], chance: &mut Chance) -> Vec<f64> {
+pub fn draw_next(lots: &[Posterior], chance: &mut Chance) -> Vec<f64> {
     let next = lots.iter().map(|lot| {
-        let (mean, sigma) = lot.draw(chance);
+        let (mean, sigma) = chance.lot(lot);
         mean + sigma * chance.normal()
     });
     next.collect()
 }
 
 /// The rate over all lots that the posterior thinks possible; `None` without flights.
-pub fn predict(lots: &[Lot], trials: &[Trial], limit: f64, seed: u64) -> Option<Prediction> {
+pub fn predict(lots: &[Posterior], trials: &[Trial], limit: f64, seed: u64) -> Option<Prediction> {
     if trials.is_empty() {
         return None;
     }
@@ -152,7 +94,7 @@ pub fn predict(lots: &[Lot], trials: &[Trial], limit: f64, seed: u64) -> Option<
     let mut rates = (0..DRAWS)
         .map(|_| {
             let coefficients = surface.draw(&mut chance)?;
-            let possible: Vec<(f64, f64)> = lots.iter().map(|lot| lot.draw(&mut chance)).collect();
+            let possible: Vec<(f64, f64)> = lots.iter().map(|lot| chance.lot(lot)).collect();
             let mut rate = 0.0;
             for (burn, weight) in &burns {
                 for (value, ((mean, sigma), apart)) in motor.iter_mut().zip(possible.iter().zip(burn)) {
@@ -210,7 +152,7 @@ struct Surface {
 
 impl Surface {
     /// The surface of flights whose motors were drawn for the next burn of these lots; `None` if a motor is not a number.
-    pub(super) fn fit(lots: &[Lot], trials: &[Trial]) -> Option<Self> {
+    pub(super) fn fit(lots: &[Posterior], trials: &[Trial]) -> Option<Self> {
         let scales: Vec<(f64, f64)> = lots.iter().map(|lot| (lot.mean, lot.next_sigma())).collect();
         let count = 1 + lots.len() + lots.len() * (lots.len() + 1) / 2;
         let mut rows = Vec::with_capacity(count * trials.len());
@@ -224,13 +166,13 @@ impl Surface {
             1.0 / (sigma * sigma)
         });
         let mut mode = DVector::zeros(count);
-        let mut fitted = Posterior::at(&rows, &landed, &prior, &mode);
+        let mut fitted = Fitted::at(&rows, &landed, &prior, &mode);
         for _ in 0..STEPS {
             let step = fitted.precision()?.solve(&fitted.slope);
             let mut share = 1.0;
             let better = (0..HALVINGS).find_map(|_| {
                 let tried = &mode + &step * share;
-                let at = Posterior::at(&rows, &landed, &prior, &tried);
+                let at = Fitted::at(&rows, &landed, &prior, &tried);
                 share *= 0.5;
                 (at.log_density >= fitted.log_density).then_some((tried, at))
             });
@@ -279,14 +221,14 @@ fn logistic(log_odds: f64) -> f64 {
 }
 
 /// Log density of the coefficients, up to a constant, with its derivatives.
-struct Posterior {
+struct Fitted {
     log_density: f64,
     slope: DVector<f64>,
     /// The negative of the second derivative.
     curvature: DMatrix<f64>,
 }
 
-impl Posterior {
+impl Fitted {
     fn at(
         rows: &DMatrix<f64>,
         landed: &DVector<f64>,
@@ -319,35 +261,23 @@ mod tests {
     use super::*;
     use rand_chacha::ChaCha12Rng;
 
-    /// A prior of 1 with 0.02, worth one value, 4 degrees: squares 0.0004. Values 1.02 and 0.99: the mean is (1 + 1.02 +
-    /// 0.99) / 3; the squares grow by 0.02^2 / 2 and by 0.02^2 2/3.
     #[test]
-    fn val_hand_two_burns() {
-        let prior = Lot::prior(1.0, 0.02);
-        assert!((prior.next_sigma() - 0.02).abs() < 1e-12 && (prior.squares - 0.0004).abs() < 1e-15);
-        let lot = prior.with(&[1.02, 0.99]);
-        assert!((lot.mean - 3.01 / 3.0).abs() < 1e-12);
-        assert_eq!(lot.freedom, 6);
-        assert!((lot.squares - (0.0004 + 0.0004 / 2.0 + 0.0004 * 2.0 / 3.0)).abs() < 1e-12, "{lot:?}");
-        assert!((lot.next_sigma() - libm::sqrt(lot.squares / 4.0 * 4.0 / 3.0)).abs() < 1e-15);
-    }
-
-    /// 0.03 in common with 0.04 of the mean by its values: the mean has 0.05.
-    #[test]
-    fn val_hand_what_all_burns_have_in_common_widens_the_mean() {
-        let lot = Lot::prior(1.0, 0.02);
-        let lot = Lot { squares: 0.0016 * 2.0, common: 0.03, ..lot };
-        assert!((lot.mean_sigma() - 0.05).abs() < 1e-12 && (lot.scatter() - 0.04).abs() < 1e-12, "{lot:?}");
+    fn val_hand_what_burns_had() {
+        let found = burnt(&[1.02, 0.99, 1.02], 0.0);
+        // Distances of 0.01, 0.02 and 0.01: 0.0006 over 2.
+        assert!((found.mean - 1.01).abs() < 1e-12 && (found.scatter - libm::sqrt(0.0003)).abs() < 1e-12);
+        assert_eq!(burnt(&[1.02], 0.005), Burnt { mean: 1.02, scatter: 0.0, common: 0.005 });
     }
 
     /// Draws of a mean and a scatter, and then of a value, have the next value's variance.
     #[test]
     fn val_student_draws() {
         let mut chance = Chance(ChaCha12Rng::seed_from_u64(1));
-        let lot = Lot::prior(0.0, 1.0).with(&[0.3, -0.2, 0.1, 0.5, -0.6, 0.2, 0.1, -0.4]);
+        let lot =
+            Posterior::prior(0.0, 1.0).with(8, &burnt(&[0.3, -0.2, 0.1, 0.5, -0.6, 0.2, 0.1, -0.4], 0.0));
         let count = 20_000;
         let squares = (0..count).map(|_| {
-            let (mean, sigma) = lot.draw(&mut chance);
+            let (mean, sigma) = chance.lot(&lot);
             libm::pow(mean + sigma * chance.normal() - lot.mean, 2.0)
         });
         let found = libm::sqrt(squares.sum::<f64>() / f64::from(count));
@@ -388,13 +318,16 @@ mod tests {
     /// and its mission expects what it has learnt.
     fn held(clubs: u64, lands: fn([f64; 2]) -> f64) -> f64 {
         const FLOWN: u32 = 4000;
-        let priors = [Lot::prior(1.0, 0.025), Lot::prior(1.0, 0.04)];
+        let priors = [Posterior::prior(1.0, 0.025), Posterior::prior(1.0, 0.04)];
         let holds = |club: u64| {
             let mut chance = Chance(ChaCha12Rng::seed_from_u64(1000 + club));
-            let truth = priors.map(|prior| prior.draw(&mut chance));
+            let truth = priors.map(|prior| chance.lot(&prior));
             let burn = |chance: &mut Chance| truth.map(|(mean, sigma)| mean + sigma * chance.normal());
             let burns: Vec<[f64; 2]> = (0..5).map(|_| burn(&mut chance)).collect();
-            let lots = [0, 1].map(|i| priors[i].with(&burns.iter().map(|burn| burn[i]).collect::<Vec<_>>()));
+            let lots = [0, 1].map(|i| {
+                let values: Vec<f64> = burns.iter().map(|burn| burn[i]).collect();
+                priors[i].with(5, &burnt(&values, 0.0))
+            });
             let chance_of = |motor: &[f64]| lands([0, 1].map(|i| motor[i] / lots[i].mean));
             let mut trial = || {
                 let drawn = draw_next(&lots, &mut chance);
@@ -428,7 +361,7 @@ mod tests {
 
     #[test]
     fn flights_that_all_land_are_little_risk_if_they_are_many_and_no_flights_are_no_answer() {
-        let lots = [Lot::prior(1.0, 0.02)];
+        let lots = [Posterior::prior(1.0, 0.02)];
         assert_eq!(predict(&lots, &[], 0.9, 1), None);
         let found = |flights| {
             let mut chance = Chance(ChaCha12Rng::seed_from_u64(3));
@@ -446,7 +379,7 @@ mod tests {
     #[test]
     fn val_simulation_the_surface_of_many_flights_is_found() {
         const TRUE: [f64; 3] = [2.0, 1.5, -0.7];
-        let lots = [Lot::prior(1.0, 0.03)];
+        let lots = [Posterior::prior(1.0, 0.03)];
         let mut chance = Chance(ChaCha12Rng::seed_from_u64(5));
         let trials: Vec<Trial> = (0..20_000)
             .map(|_| {
@@ -471,7 +404,7 @@ mod tests {
 
     #[test]
     fn flights_with_one_outcome_have_a_surface_and_no_number_has_none() {
-        let lots = [Lot::prior(1.0, 0.03), Lot::prior(1.0, 0.05)];
+        let lots = [Posterior::prior(1.0, 0.03), Posterior::prior(1.0, 0.05)];
         let trials = |value: f64| vec![Trial { drawn: vec![value, 1.01], landed: true }; 40];
         let surface = Surface::fit(&lots, &trials(1.0)).unwrap();
         let chance = surface.chance_to_land(&surface.mode, &[1.0, 1.01], &mut Vec::new());

@@ -52,7 +52,34 @@ fn five_burns_become_a_day_that_the_campaigns_readers_take() {
     let impulse = |mission: &flight::vehicle::mission::Mission| mission.motor_curve.total_impulse_n_s();
     assert!((impulse(&mission) / impulse(&built_in) - 6.05 / 6.0).abs() < 1e-9);
     let set = sim::dispersion::Dispersion::from_toml(&text("dispersion.toml"), "day").unwrap();
-    assert!(set.impulse_share < 0.027 && set.mass_share.abs() < 1e-12 && set.sensors, "{set:?}");
+    // What is known of the motors stands in one place.
+    let real = sim::dispersion::Dispersion::from_toml(
+        sim::dispersion::Dispersion::builtin_toml("real").unwrap(),
+        "real",
+    );
+    assert!((set.impulse_share - real.unwrap().impulse_share).abs() < 1e-12 && set.sensors, "{set:?}");
+    let lot = mission.lot.as_ref().unwrap();
+    assert_eq!((lot.name.as_str(), lot.burns), ("H45W", 5));
+    assert!((lot.impulse.mean - 1.01).abs() < 1e-12 && (lot.impulse.scatter - 0.015_811).abs() < 1e-6);
+    assert!(mission.is_confirmed() && mission.motor.impulse_sigma < built_in.motor.impulse_sigma);
+    // The table can be pasted.
+    let pasted =
+        format!("{}\n{}", flight::vehicles::mission::BUILTIN[0].1, answer["lot_toml"].as_str().unwrap());
+    assert_eq!(
+        flight::vehicles::mission::from_toml(&pasted, "pasted").unwrap().motor_curve,
+        mission.motor_curve
+    );
+    // With the day's mission the same burns are learnt again, not on top of it.
+    let out = directory.path().join("again");
+    let mission_file = directory.path().join("day/mission.toml");
+    let again =
+        [file.to_str().unwrap(), "--mission", mission_file.to_str().unwrap(), "--day", out.to_str().unwrap()];
+    assert!(learn(&again).0 < 2);
+    let again = flight::vehicles::mission::from_toml(
+        &std::fs::read_to_string(out.join("mission.toml")).unwrap(),
+        "again",
+    );
+    assert!((impulse(&again.unwrap()) / impulse(&mission) - 1.0).abs() < 1e-12);
     assert!(text("dispersion.toml").contains("# flight 3\n"), "{}", text("dispersion.toml"));
     // The same question again gives the same answer, and replaces nothing.
     let (code, _, stderr) = learn(&arguments);

@@ -159,6 +159,8 @@ pub struct Changes<'a> {
     pub summary: &'a str,
     /// Name of a built-in motor, or the text of a motor file.
     pub motor: &'a str,
+    /// Whether the motor is the one whose lot the mission may know.
+    pub keeps_lot: bool,
     pub mass: Mass,
     /// Height of the centre of gravity above the pad at which the flight begins, m.
     pub start_height_m: f64,
@@ -215,6 +217,14 @@ pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, Miss
     mission.insert("airframe".to_owned(), Value::Table(airframe));
     mission.insert("name".to_owned(), Value::String(changes.name.to_owned()));
     mission.insert("summary".to_owned(), Value::String(changes.summary.to_owned()));
+    if changes.keeps_lot {
+        // A weight of the day would replace the mass above.
+        let lot = mission.get_mut("lot").and_then(Value::as_table_mut);
+        let weighed = lot.and_then(|lot| lot.get_mut("weighed")).and_then(Value::as_table_mut);
+        weighed.and_then(|weighed| weighed.remove("vehicle_kg"));
+    } else {
+        mission.remove("lot");
+    }
     let at = mission.get("start").and_then(|start| start.get("at")).and_then(Value::as_str);
     let section = if at == Some(StartPoint::Drone.name()) { "drop" } else { "start" };
     let start = mission.get_mut(section).and_then(Value::as_table_mut);
@@ -314,6 +324,7 @@ mod tests {
                 name: &mission.name,
                 summary: &mission.summary,
                 motor: &mission.airframe.motor,
+                keeps_lot: true,
                 mass: mission.airframe.mass,
                 start_height_m: start_height_m(&mission),
             };
@@ -325,13 +336,45 @@ mod tests {
         }
     }
 
+    /// With its own motor a mission keeps what is known of the lot, but not the weight of another ballast; with another one
+    /// nothing of it.
+    #[test]
+    fn a_lot_stays_with_its_motor() {
+        let (name, text) = flight::vehicles::mission::BUILTIN[0];
+        let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.15 }";
+        let text = format!("{text}\n[lot]\n{lot}\n");
+        let mission = flight::vehicles::mission::from_toml(&text, name).unwrap();
+        let mass = Mass { loaded_kg: 3.2, ..mission.airframe.mass };
+        let changes = Changes {
+            name: "x",
+            summary: "y",
+            motor: &mission.airframe.motor,
+            keeps_lot: true,
+            mass,
+            start_height_m: 300.0,
+        };
+        let read =
+            |changes| flight::vehicles::mission::from_toml(&changed(&text, changes).unwrap(), "x").unwrap();
+        let kept = read(&changes);
+        assert_eq!((&kept.motor_curve, kept.airframe.mass), (&mission.motor_curve, mass));
+        let other = read(&Changes { motor: "G33", keeps_lot: false, ..changes });
+        assert!(other.lot.is_none() && !other.is_confirmed());
+        assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
+    }
+
     #[test]
     fn the_text_of_a_motor_file_stays_in_the_mission() {
         let (name, text) = flight::vehicles::mission::BUILTIN[0];
         let mission = flight::vehicles::mission::from_toml(text, name).unwrap();
         let motor = "; it's \"quoted\" \\ and 'so'\nX1 29 93 4-6-8 0.04 0.08 A B\n0.5 30\n2 0\n";
-        let changes =
-            Changes { name: "x", summary: "y", motor, mass: mission.airframe.mass, start_height_m: 100.0 };
+        let changes = Changes {
+            name: "x",
+            summary: "y",
+            motor,
+            keeps_lot: false,
+            mass: mission.airframe.mass,
+            start_height_m: 100.0,
+        };
         let again = flight::vehicles::mission::from_toml(&changed(text, &changes).unwrap(), "x").unwrap();
         assert_eq!(again.airframe.motor, motor);
         assert_eq!(again.motor_curve, flight::vehicles::motors::named(motor).unwrap());

@@ -148,6 +148,7 @@ impl Landing {
                 candidate.name()
             ),
             motor: &candidate.motor,
+            keeps_lot: candidate.curve == of.mission.motor_curve,
             mass,
             start_height_m: from_m,
         };

@@ -13,6 +13,7 @@ use crate::guidance::powered::PoweredSettings;
 use crate::vehicle::airframe::{Airframe, BadValue};
 use crate::vehicle::drop::Drop;
 use crate::vehicle::launch::Launch;
+use crate::vehicle::lot::{Expectation, Lot};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
@@ -225,10 +226,17 @@ pub struct Mission {
     pub summary: String,
     /// The vehicle.
     pub airframe: Airframe,
-    /// The certified thrust curve of the landing motor that the airframe names. It is not in the mission's file; the
-    /// reader of the mission looks the motor up.
+    /// The expected thrust curve of the landing motor: the certified one of the motor that the airframe names, or what the lot
+    /// tells instead. It is not in the mission's file; the reader of the mission looks the motor up.
     #[serde(skip, default = "ThrustCurve::none")]
     pub motor_curve: ThrustCurve,
+    /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
+    /// and the mass.
+    #[serde(default)]
+    pub lot: Option<Lot>,
+    /// What comes of the lot; `None` without one.
+    #[serde(skip)]
+    pub expected: Option<Expectation>,
     pub gravity_m_s2: f64,
     /// Altitude of the pad above the sea, m.
     pub pad_altitude_m: f64,
@@ -290,6 +298,39 @@ pub struct Mission {
     /// What counts as a landing: the landing paper's Table 2.
     pub touchdown_limits: TouchdownBox,
     pub leg_limits: LegLimits,
+}
+
+impl Mission {
+    /// Whether burns of the motor's lot have confirmed the curve that this mission expects.
+    pub fn is_confirmed(&self) -> bool {
+        self.lot.as_ref().is_some_and(|lot| lot.burns > 0)
+    }
+
+    /// The mission with what its lot tells, where `curve` is the one that the lot's scales are over; without a lot, with that
+    /// curve.
+    #[must_use]
+    pub(crate) fn expecting(mut self, curve: ThrustCurve) -> Self {
+        let Some(lot) = &self.lot else { return Self { motor_curve: curve, ..self } };
+        let mass = &mut self.airframe.mass;
+        mass.loaded_kg = lot.weighed.vehicle_kg.unwrap_or(mass.loaded_kg);
+        let expected = lot.expectation(&self.motor, mass.loaded_kg);
+        let Expectation { impulse, burn_time, .. } = expected;
+        let motor_kg = lot.weighed.motor_kg.unwrap_or_else(|| curve.total_mass_kg());
+        self.motor_curve = curve.scaled(impulse.mean, burn_time.mean).weighing(motor_kg);
+        // The mission considers motors up to so many deviations of what was known before.
+        let narrowed = |[least, most]: [f64; 2], now: f64, before: f64| {
+            let by = if before > 0.0 { now / before } else { 1.0 };
+            [1.0 + (least - 1.0) * by, 1.0 + (most - 1.0) * by]
+        };
+        let (ignition, motor) = (&mut self.ignition, &mut self.motor);
+        let impulse_share = expected.impulse_per_mass_share();
+        ignition.impulse_scales = narrowed(ignition.impulse_scales, impulse_share, motor.impulse_sigma);
+        ignition.burn_time_scales =
+            narrowed(ignition.burn_time_scales, burn_time.share, motor.burn_time_sigma);
+        (motor.impulse_sigma, motor.burn_time_sigma) = (impulse_share, burn_time.share);
+        self.expected = Some(expected);
+        self
+    }
 }
 
 fn at_apogee() -> StartPoint {

@@ -75,6 +75,26 @@ impl ThrustCurve {
         })
     }
 
+    /// This motor with another impulse in another time, as factors.
+    #[must_use]
+    pub fn scaled(&self, impulse: f64, burn_time: f64) -> Self {
+        let point = |point: &ThrustPoint| ThrustPoint {
+            time_s: point.time_s * burn_time,
+            thrust_n: point.thrust_n * impulse / burn_time,
+        };
+        Self {
+            points: self.points.iter().map(point).collect(),
+            impulse_n_s: self.impulse_n_s.iter().map(|before_n_s| before_n_s * impulse).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// This motor with another mass before ignition, kg; the propellant stays.
+    #[must_use]
+    pub fn weighing(self, total_mass_kg: f64) -> Self {
+        Self { total_mass_kg, ..self }
+    }
+
     /// No motor: no thrust at any time, and no mass.
     pub(crate) fn none() -> Self {
         Self {
@@ -243,6 +263,17 @@ mod tests {
         assert_eq!(motor.falls_through_s(40.0), None);
         let two_humps = from_rasp("T 38 200 0 0.1 0.2 M\n1 30\n2 10\n3 30\n4 0").unwrap();
         assert!((two_humps.falls_through_s(20.0).unwrap() - 10.0 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn val_hand_a_scaled_motor() {
+        let found = from_rasp("T40 38 200 P 0.12 0.3 M\n1 40\n3 40\n4 0\n").unwrap().scaled(1.1, 2.0);
+        assert!(
+            (found.total_impulse_n_s() - 132.0).abs() < 1e-9 && (found.burn_time_s() - 8.0).abs() < 1e-12
+        );
+        assert!((found.thrust_at_n(4.0) - 22.0).abs() < 1e-12);
+        assert!((found.mean_thrust_n(0.0, 8.0) - 16.5).abs() < 1e-12);
+        assert!((found.propellant_mass_kg() - 0.12).abs() < 1e-12);
     }
 
     proptest! {

@@ -65,13 +65,69 @@ fn a_named_airframe_keeps_the_line_numbers_in_errors() {
     assert!(message.contains(&format!("at line {line},")), "{message}");
 }
 
+/// mk3's text with this section `[lot]`.
+fn mk3_with(lot: &str) -> Mission {
+    let (_, text) = BUILTIN.iter().find(|(name, _)| *name == "mk3").unwrap();
+    from_toml(&format!("{text}\n[lot]\n{lot}"), "mk3").unwrap()
+}
+
+/// Four burns 2 % above the certified impulse, with the prior's one: 1.016.
 #[test]
-fn another_motor_brings_its_own_curve() {
-    let mission = from_toml(BUILTIN[0].1, BUILTIN[0].0).unwrap();
-    let other = flight::vehicles::mission::with_motor(mission.clone(), "G33").unwrap();
-    assert_eq!(other.airframe.motor, "G33");
-    assert_eq!(other.motor_curve, flight::vehicles::motors::builtin("G33").unwrap());
-    assert_ne!(other.motor_curve, mission.motor_curve);
+fn val_hand_a_lot_moves_the_curve_and_narrows_what_is_expected() {
+    let mk3 = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
+    assert!(!mk3.is_confirmed() && mk3.expected.is_none());
+    let known = mk3_with(
+        "name = \"2609\"\nburns = 4\nimpulse = { mean = 1.02, scatter = 0.005 }\nburn_time = { mean = 1.0, scatter = 0.01 }",
+    );
+    assert!(known.is_confirmed());
+    let impulse = |mission: &Mission| mission.motor_curve.total_impulse_n_s();
+    assert!((impulse(&known) / impulse(&mk3) - 1.016).abs() < 1e-12);
+    assert!((known.motor_curve.burn_time_s() / mk3.motor_curve.burn_time_s() - 1.0).abs() < 1e-12);
+    let (before, now) = (mk3.motor, known.motor);
+    assert!(now.impulse_sigma < before.impulse_sigma && now.burn_time_sigma < before.burn_time_sigma);
+    let width = |[least, most]: [f64; 2]| most - least;
+    let narrowed = width(known.ignition.impulse_scales) / width(mk3.ignition.impulse_scales);
+    assert!((narrowed - now.impulse_sigma / before.impulse_sigma).abs() < 1e-12);
+    assert_eq!(known.airframe.mass, mk3.airframe.mass);
+}
+
+#[test]
+fn a_lot_without_burns_confirms_nothing_and_flies_the_certified_curve() {
+    let mk3 = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
+    let bought = mk3_with("name = \"2609\"\nburns = 0");
+    assert!(!bought.is_confirmed());
+    assert_eq!(bought.motor_curve, mk3.motor_curve);
+    assert!((bought.motor.impulse_sigma - mk3.motor.impulse_sigma).abs() < 1e-12);
+}
+
+#[test]
+fn a_measured_curve_and_the_weights_of_the_day_are_flown() {
+    let measured = mk3_with(
+        "name = \"2609\"\nburns = 1\nweighed = { motor_kg = 0.300, vehicle_kg = 3.32 }\ncurve = \"\"\"\nH45W 38 194 P 0.1557 0.2953 AT\n1 50\n5 40\n7 0\n\"\"\"",
+    );
+    assert!((measured.motor_curve.total_impulse_n_s() - 245.0).abs() < 1e-9);
+    assert_eq!((measured.motor_curve.total_mass_kg(), measured.airframe.mass.loaded_kg), (0.3, 3.32));
+    assert_eq!(measured.airframe.motor, "H45W", "what is certified stays");
+}
+
+#[test]
+fn a_lot_of_another_vehicle_or_with_a_slip_is_refused_by_its_key() {
+    let (_, text) = BUILTIN.iter().find(|(name, _)| *name == "mk3").unwrap();
+    for (lot, words) in [
+        ("burns = 4", "missing field `name`"),
+        ("name = \"a\"\nburns = 4\nimpulse = { mean = 102.0 }", "lot.impulse.mean = 102: must be 0.7 to 1.3"),
+        ("name = \"a\"\nburns = 4\nburn_time = { mean = 1.0, scatter = 1.5 }", "lot.burn_time.scatter = 1.5"),
+        (
+            "name = \"a\"\nburns = 4\ntemperature = { burns_c = 293.0, pad_c = 5.0 }",
+            "lot.temperature.burns_c",
+        ),
+        ("name = \"a\"\nburns = 4\nweighed = { vehicle_kg = 3320.0 }", "lot.weighed.vehicle_kg = 3320"),
+        ("name = \"a\"\nburns = 4\nweighed = { motor_kg = 0.2 }", "lot.weighed.motor_kg = 0.2"),
+        ("name = \"a\"\nburns = 4\ncurve = \"H45X\"", "no motor is named 'H45X'"),
+    ] {
+        let error = from_toml(&format!("{text}\n[lot]\n{lot}"), "mk3").unwrap_err();
+        assert!(full(&error).contains(words), "{}", full(&error));
+    }
 }
 
 /// The two files repeat each other, so that each can be read and changed alone. Until a search finds better numbers for

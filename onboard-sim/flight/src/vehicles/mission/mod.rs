@@ -73,8 +73,13 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         .map_err(|source| MissionError::Estimator { origin: origin.to_owned(), source })?;
     validate::validate(&mission).map_err(|bad| FileError::bad_value(origin, bad))?;
     check_start(&mission, origin)?;
-    let motor = mission.airframe.motor.clone();
-    let mut mission = with_motor(mission, &motor)?;
+    let own = mission.lot.as_ref().and_then(|lot| lot.curve.as_deref());
+    let curve = motors::named(own.unwrap_or(&mission.airframe.motor))?;
+    if let Some(lot) = &mission.lot {
+        let weights = lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg);
+        weights.map_err(|bad| FileError::bad_value(origin, bad.into()))?;
+    }
+    let mut mission = mission.expecting(curve);
     if let Some(launch) = &mut mission.launch {
         launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
     }
@@ -101,16 +106,6 @@ pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
 /// Whether a text is a mission rather than a [profile](super::profile): a mission names or contains an airframe.
 pub fn is_meant(text: &str) -> bool {
     toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
-}
-
-/// The mission with another landing motor: the name of a built-in motor, or the text of a motor file.
-///
-/// # Errors
-/// [`MotorError`] lists the known names, or says what is wrong with the text.
-pub fn with_motor(mut mission: Mission, motor: &str) -> Result<Mission, MotorError> {
-    mission.motor_curve = motors::named(motor)?;
-    motor.clone_into(&mut mission.airframe.motor);
-    Ok(mission)
 }
 
 /// The text with the named built-in airframe appended as a table; `None` if the text names no airframe.

@@ -6,6 +6,7 @@ use crate::control::aim::AimGains;
 use crate::guidance::descent::DescentGains;
 use crate::guidance::ignition::IgnitionSettings;
 use crate::guidance::powered::PoweredSettings;
+use crate::vehicle::lot::Lot;
 use crate::vehicle::mission::{LegLimits, Mission, Start};
 
 use super::super::ranges::{self, Check, angle_below_right, not_negative, positive, require, share};
@@ -18,6 +19,7 @@ pub(super) fn validate(mission: &Mission) -> Check {
     require(!mission.name.trim().is_empty(), "name", "\"\"", "a name")?;
     mission.airframe.validate()?;
     mission.motor.validate()?;
+    mission.lot.as_ref().map_or(Ok(()), Lot::validate)?;
     mission.exhaust.validate()?;
     // From the Moon to twice the Earth.
     require(
