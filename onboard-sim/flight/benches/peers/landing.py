@@ -27,29 +27,33 @@ HARD, SOFT = "hard", "soft"
 PENALTY_PER_M = 1000.0
 
 
-def step_function():
-    """One RK4 step of the planar equations, (state, gimbal) -> state."""
-    state, gimbal = ca.SX.sym("state", 6), ca.SX.sym("gimbal")
+def after(state, gimbal, step_s, thrust_n):
+    """State after one RK4 step of the planar equations."""
 
     def slope(point):
         theta, u, w, q = point[2], point[3], point[4], point[5]
         speed = ca.sqrt(u * u + w * w + 1e-300)
-        push, side = THRUST_N / MASS_KG * ca.cos(gimbal), -THRUST_N / MASS_KG * ca.sin(gimbal)
+        push, side = thrust_n / MASS_KG * ca.cos(gimbal), -thrust_n / MASS_KG * ca.sin(gimbal)
         return ca.vertcat(
             u * ca.cos(theta) + w * ca.sin(theta),
             u * ca.sin(theta) - w * ca.cos(theta),
             q,
             push - DRAG_PER_M * speed * u - GRAVITY_M_S2 * ca.sin(theta) - q * w,
             side + GRAVITY_M_S2 * ca.cos(theta) + q * u,
-            -THRUST_N * ca.sin(gimbal) * ARM_M / INERTIA_KG_M2,
+            -thrust_n * ca.sin(gimbal) * ARM_M / INERTIA_KG_M2,
         )
 
     k1 = slope(state)
-    k2 = slope(state + STEP_S / 2 * k1)
-    k3 = slope(state + STEP_S / 2 * k2)
-    k4 = slope(state + STEP_S * k3)
-    after = state + STEP_S / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return ca.Function("step", [state, gimbal], [after])
+    k2 = slope(state + step_s / 2 * k1)
+    k3 = slope(state + step_s / 2 * k2)
+    k4 = slope(state + step_s * k3)
+    return state + step_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def step_function():
+    """(state, gimbal) -> state after an interval."""
+    state, gimbal = ca.SX.sym("state", 6), ca.SX.sym("gimbal")
+    return ca.Function("step", [state, gimbal], [after(state, gimbal, STEP_S, THRUST_N)])
 
 
 STEP = step_function()

@@ -13,6 +13,7 @@
 //! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at its beginning
 //! space hold               make that solution the plan in space
 //! space warm SAMPLES STATE solve what is left of it
+//! free cold|warm RATIO UNTIL STATE   land with a free final time (`free`): RATIO of thrust to weight, 1 after UNTIL s
 //! quadratic STATE          the problem of one Gauss-Newton step (`quadratic`) at the plan
 //! sweep STATE              time the layers of one iteration at the cold solution
 //! peak                     time the arithmetic of this machine
@@ -22,10 +23,12 @@
 //! Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad. The answer
 //! to `sweep` is the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one
 //! iteration. The answer to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
-//! solve. The answer to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns.
+//! solve; that to `free` is whether it lands, nanoseconds, cost, final time and the inputs; that to `peak` is Gflop/s and
+//! the latencies of addition, multiplication, division and root in ns.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
+mod free;
 mod one_guess;
 mod peak;
 mod quadratic;
@@ -39,6 +42,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
+use free::{Falling, Free};
 use nmpc::dynamics::PlanarState;
 use nmpc::{Problem, Solution, SolverLimits, WarmStart, Workspace, paper, solve, solve_into};
 use one_guess::OneGuess;
@@ -66,6 +70,7 @@ struct Peer {
     last: Solution,
     plan: Solution,
     space: Space,
+    free: Free,
 }
 
 impl Peer {
@@ -77,6 +82,7 @@ impl Peer {
             workspace: Workspace::default(),
             last: Solution::default(),
             plan: Solution::default(),
+            free: Free::default(),
         }
     }
 
@@ -118,10 +124,16 @@ impl Peer {
                 self.timed(&problem, Some(&warm))
             }
             Some("quadratic") => quadratic::answer(&self.problem(state(words)?, paper::HORIZON), &self.plan),
+            Some("free") => {
+                let warm = words.next() == Some("warm");
+                let [over_weight, until_s, state @ ..]: [f64; 8] = numbers(words)?;
+                let landing = self.problem(PlanarState::from_array(state), paper::HORIZON);
+                self.free.answer(warm, &Falling { over_weight, until_s }, landing)
+            }
             Some("space") => self.in_space(words),
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
-            _ => bail!("must start with penalty, cold, hold, warm, quadratic, space, sweep or peak"),
+            _ => bail!("must start with penalty, cold, hold, warm, quadratic, free, space, sweep or peak"),
         }
     }
 
