@@ -25,6 +25,15 @@ const LONGER: usize = 10;
 /// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between limits.
 const STEP_FRACTION_MIN: f64 = 0.1;
 
+/// After so many whole steps in a row with less than the dynamics' curvature the descent creeps along a saddle, and the barrier
+/// is raised. Four, and the steps beside some saddles are too few to leave them: one of 10,000 cold starts of the landing
+/// paper's problem then ends at its cap. Eight, and landings in space take a hundredth more iterations.
+const CREEPS: u32 = 6;
+
+/// If the line search shortens a step to less than this fraction, the Hessian is nearly singular, and the next step has less of
+/// the dynamics' curvature.
+const SHORT_STEP: f64 = 0.1;
+
 /// A barrier problem is solved when its residual is at most this multiple of the barrier.
 const BARRIER_TOLERANCE: f64 = 30.0;
 
@@ -155,7 +164,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     pub(crate) fn descend(&mut self, model: &M, first_barrier: f64, cap: usize) -> SolveEnd {
         let tolerance = model.settings().tolerance;
         let mut barrier = first_barrier;
-        let (mut iterations, mut sweeps, mut raises, mut share) = (0, 0, 0, 0_usize);
+        let (mut iterations, mut sweeps, mut raises, mut crept, mut first) = (0, 0, 0, 0, 0_usize);
         self.differentiate(model);
         let mut residual = self.residual(model);
         self.filter = Filter::starting_at(residual.infeasibility);
@@ -180,7 +189,6 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 self.filter.clear();
             }
             self.newton.assemble(model, &self.conditions, &self.current, barrier);
-            let first = share.saturating_sub(1);
             let right = (first..CURVATURE_SHARES.len()).find(|tried| {
                 sweeps += 1;
                 self.allowance.spend(model.intervals());
@@ -189,7 +197,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let Some(right) = right else {
                 break Status::SubproblemFailed;
             };
-            share = right;
+            first = right.saturating_sub(1);
             self.newton.solve(model, &self.conditions, &self.current, barrier);
 
             let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
@@ -197,25 +205,36 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let jammed = raises == 0
                 && barrier < RAISED_BARRIER
                 && fractions.primal.min(fractions.dual) < STEP_FRACTION_MIN;
-            if jammed || !self.advance(model, barrier, fractions, residual.infeasibility) {
-                if raises >= RAISES {
-                    break Status::Stalled;
-                }
-                raises += 1;
-                barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
-                start::raise(model, &self.conditions, barrier, &mut self.current);
-                self.differentiate(model);
-                residual = self.residual(model);
-                self.filter = Filter::starting_at(residual.infeasibility);
+            let whole = fractions.primal.min(fractions.dual) >= 1.0;
+            crept = if right > 0 && whole { crept + 1 } else { 0 };
+            let creeps = crept >= CREEPS && raises < RAISES;
+            let taken = if jammed || creeps {
+                None
             } else {
+                self.advance(model, barrier, fractions, residual.infeasibility)
+            };
+            if let Some(taken) = taken {
                 residual = self.residual(model);
+                if taken < SHORT_STEP {
+                    first = (right + 1).min(CURVATURE_SHARES.len() - 1);
+                }
+                continue;
             }
+            if raises >= RAISES {
+                break Status::Stalled;
+            }
+            (raises, crept) = (raises + 1, 0);
+            barrier = RAISED_BARRIER.max(RAISING_FACTOR * barrier);
+            start::raise(model, &self.conditions, barrier, &mut self.current);
+            self.differentiate(model);
+            residual = self.residual(model);
+            self.filter = Filter::starting_at(residual.infeasibility);
         };
         SolveEnd { status, iterations, sweeps, residual, ..SolveEnd::BAD }
     }
 
-    /// Line search along the step from `current`. Returns whether a point was accepted; it is then `current`.
-    fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> bool {
+    /// Line search along the step from `current`. Returns the fraction at which a point was accepted; it is then `current`.
+    fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> Option<f64> {
         let slope = self.newton.slope(model, &self.current, barrier);
         let objective = self.current.barrier_objective(model, barrier);
         let now = Measures { infeasibility, objective };
@@ -232,11 +251,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             };
             if self.filter.accepts(now, trial, slope, tried.primal) || tiny && trial.is_finite() {
                 core::mem::swap(&mut self.current, &mut self.trial);
-                return true;
+                return Some(share);
             }
             share *= 0.5;
         }
-        false
+        None
     }
 
     /// Evaluates `current` with its derivatives.
