@@ -155,6 +155,8 @@ impl Shape {
         load
     }
 
+    /// The drag along the axis, and across it strip by strip. The strips are on the axis: with `a` from the centre of gravity
+    /// to the axis and `x` up to the strip, the wind there is `v + rate x (x, a)`.
     fn add_body(
         &self,
         load: &mut Load,
@@ -163,15 +165,26 @@ impl Shape {
         axial_share: f64,
         axis_m: &impl Fn(f64) -> Vector3<f64>,
     ) {
-        let velocity = &flow.velocity_m_s;
+        let (velocity, rate) = (&flow.velocity_m_s, &flow.rate_rad_s);
         let axial_n = -half_density * axial_share * self.axial_area_m2 * length(velocity) * velocity.x;
-        load.add_at(&axis_m(0.0), &Vector3::new(axial_n, 0.0, 0.0));
-        for station_m in self.strip_stations_m {
-            let place_m = axis_m(station_m);
-            let mut across = velocity + flow.rate_rad_s.cross(&place_m);
-            across.x = 0.0;
-            load.add_at(&place_m, &(across * (-half_density * self.strip_area_m2 * length(&across))));
+        let tail_m = axis_m(0.0);
+        load.add_at(&tail_m, &Vector3::new(axial_n, 0.0, 0.0));
+        let (y_m_s, z_m_s) = (velocity.y - rate.x * tail_m.z, velocity.z + rate.x * tail_m.y);
+        let (mut across_n, mut turning_n_m) = ([0.0; 2], [0.0; 2]);
+        let per_strip = -half_density * self.strip_area_m2;
+        let strips = self.strip_stations_m.map(|station_m| {
+            let x_m = station_m + tail_m.x;
+            let (y_m_s, z_m_s) = (y_m_s + rate.z * x_m, z_m_s - rate.y * x_m);
+            let per_speed = per_strip * (y_m_s * y_m_s + z_m_s * z_m_s).sqrt();
+            (x_m, per_speed * y_m_s, per_speed * z_m_s)
+        });
+        for (x_m, y_n, z_n) in strips {
+            across_n = [across_n[0] + y_n, across_n[1] + z_n];
+            turning_n_m = [turning_n_m[0] - x_m * z_n, turning_n_m[1] + x_m * y_n];
         }
+        load.force_n += Vector3::new(0.0, across_n[0], across_n[1]);
+        let roll_n_m = tail_m.y * across_n[1] - tail_m.z * across_n[0];
+        load.moment_n_m += Vector3::new(roll_n_m, turning_n_m[0], turning_n_m[1]);
     }
 
     /// Tubes and struts in every direction: their drag is along the wind where each leg is.

@@ -31,11 +31,18 @@ impl TrueBurn {
     /// Thrust, N; zero before and after the burn.
     pub fn thrust_n(&self, burning_s: f64) -> f64 {
         let curve_s = burning_s / self.burn_time_scale;
-        self.impulse_scale / self.burn_time_scale * self.curve.thrust_at_n(curve_s) * self.shape_at(curve_s).0
+        let curve_n = self.curve.thrust_at_n(curve_s);
+        if curve_n == 0.0 {
+            return 0.0;
+        }
+        self.impulse_scale / self.burn_time_scale * curve_n * self.shape_at(curve_s).0
     }
 
     /// Propellant burnt so far, kg.
     pub fn burnt_kg(&self, burning_s: f64) -> f64 {
+        if burning_s <= 0.0 {
+            return 0.0;
+        }
         let curve_s = burning_s / self.burn_time_scale;
         let more_kg = self.shape_at(curve_s).1 * self.curve.propellant_mass_kg();
         self.curve.propellant_burnt_kg(curve_s) + more_kg

@@ -30,7 +30,7 @@ const NEAR_M: f64 = 0.1;
 /// Number of parts of a step near the ground, where the friction of the feet is stiff.
 const PARTS: usize = 4;
 /// The same while legs give way: their feet are pressed five times as hard, and turn a slim body's roll that much faster.
-const PARTS_GIVING_WAY: usize = 16;
+const PARTS_PRESSED: usize = 16;
 
 /// The commands of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -90,14 +90,31 @@ pub struct World {
     hanging: Option<Hanging>,
 }
 
+/// The air's density near a height.
+#[derive(Debug, Clone, Copy)]
+struct AirHere {
+    height_m: f64,
+    density_kg_m3: f64,
+    gradient_kg_m4: f64,
+}
+
+impl AirHere {
+    fn at(height_m: f64) -> Self {
+        let air = Air::at_height_m(height_m);
+        Self { height_m, density_kg_m3: air.density_kg_m3, gradient_kg_m4: air.density_gradient_kg_m4() }
+    }
+
+    fn density_kg_m3(&self, height_m: f64) -> f64 {
+        self.density_kg_m3 + self.gradient_kg_m4 * (height_m - self.height_m)
+    }
+}
+
 /// Everything that acts within one part of a step.
 struct Acting<'a> {
     shape: &'a Shape,
     configuration: Configuration,
     wind_m_s: Vector3<f64>,
-    density_kg_m3: f64,
-    density_gradient_kg_m4: f64,
-    density_height_m: f64,
+    air: AirHere,
     /// Thrust at the start, middle and end, N.
     thrust_n: [f64; 3],
     thrust_direction: Vector3<f64>,
@@ -109,9 +126,8 @@ struct Acting<'a> {
 
 impl Loads for Acting<'_> {
     fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
-        let above_m = state.position_m.z - self.density_height_m;
         let flow = Flow {
-            density_kg_m3: self.density_kg_m3 + self.density_gradient_kg_m4 * above_m,
+            density_kg_m3: self.air.density_kg_m3(state.position_m.z),
             velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
             rate_rad_s: state.rate_rad_s,
         };
@@ -156,7 +172,7 @@ impl World {
         if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
             self.move_near_ground(time_s);
         } else {
-            self.move_by(time_s, STEP_S, false);
+            self.move_by(time_s, STEP_S, &AirHere::at(self.state.position_m.z), false);
         }
     }
 
@@ -228,9 +244,8 @@ impl World {
         Plume::new(&self.truth, thrust_n, pressure_pa * self.airframe.body.reference_area_m2)
     }
 
-    fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
+    fn move_by(&mut self, from_s: f64, step_s: f64, air: &AirHere, near_ground: bool) {
         let cg_m = self.cg_m();
-        let air = Air::at_height_m(self.state.position_m.z);
         let [pitch_rad, yaw_rad] = [0, 1]
             .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
@@ -246,9 +261,7 @@ impl World {
                 cg_m,
             },
             wind_m_s: self.wind.now_m_s(),
-            density_kg_m3: air.density_kg_m3,
-            density_gradient_kg_m4: air.density_gradient_kg_m4(),
-            density_height_m: self.state.position_m.z,
+            air: *air,
             thrust_n,
             thrust_direction: Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw),
             thrust_place_m: Vector3::new(0.0, self.truth.thrust_offset_m[0], self.truth.thrust_offset_m[1])
@@ -271,14 +284,15 @@ impl World {
     }
 
     fn move_near_ground(&mut self, from_s: f64) {
-        let giving_way = self.touchdown.is_some() && self.airframe.legs.crush.is_some();
-        let parts = if giving_way { PARTS_GIVING_WAY } else { PARTS };
+        let presses = self.touchdown.is_some() && self.ground.presses(&self.state);
+        let parts = if presses { PARTS_PRESSED } else { PARTS };
         let part_s = STEP_S / parts as f64;
+        let air = AirHere::at(self.state.position_m.z);
         let (mut specific_force, mut angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
         for part in 0..parts {
             let time_s = from_s + part_s * part as f64;
             let before = self.state;
-            self.move_by(time_s, part_s, true);
+            self.move_by(time_s, part_s, &air, true);
             specific_force += self.specific_force_m_s2;
             angular_acceleration += self.angular_acceleration_rad_s2;
             let contact = self.ground.contact(&self.state, &self.cg_m());
