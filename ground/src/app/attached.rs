@@ -253,7 +253,7 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
         Request::Report => "no report: this screen has no station".to_owned(),
         Request::Choose(_) => "no vehicle is chosen: this screen has no station".to_owned(),
         Request::RangeTest => "no range test: this screen has no station".to_owned(),
-        Request::WithoutLog => "nothing goes on: this screen has no station".to_owned(),
+        Request::WithoutLog | Request::Untested => "nothing goes on: this screen has no station".to_owned(),
         Request::Download => "no download: this screen has no station".to_owned(),
         Request::Parameters => return,
     };

@@ -283,6 +283,7 @@ mod tests {
             ToStation::Request(Request::RangeTest),
             ToStation::Request(Request::Choose(4_242)),
             ToStation::Request(Request::WithoutLog),
+            ToStation::Request(Request::Untested),
             ToStation::Request(Request::Sign { step: 7, void: true }),
             ToStation::Key("Ctrl-X".to_owned()),
         ];
@@ -374,6 +375,7 @@ mod tests {
             seat().prop_map(|by| Msg::Asked { request: Request::RangeTest, by }),
             (seat(), any::<u32>()).prop_map(|(by, boot)| Msg::Asked { request: Request::Choose(boot), by }),
             seat().prop_map(|by| Msg::Asked { request: Request::WithoutLog, by }),
+            seat().prop_map(|by| Msg::Asked { request: Request::Untested, by }),
             Just(Msg::ScreenQuit),
             option::of(any::<String>()).prop_map(Msg::SimulatorEnded),
         ]

@@ -7,7 +7,9 @@ use protocol::dialect::{MavCmd, MavResult, TdAct, TdInterlock, TdPhase};
 use protocol::identity::Address;
 use serde::{Deserialize, Serialize};
 
-use super::{Ask, GONE_AFTER, LinkState, Model, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words};
+use super::{
+    Ask, GONE_AFTER, LinkState, Model, Prompt, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words,
+};
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little over two
 /// heartbeats.
@@ -340,13 +342,32 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| why_other_mission(model))
         .or_else(|| model.why_checklist(now))
         .or_else(|| why_not_in(model, is_on_pad))
-        // Last: it is the only reason that the crew can overrule.
+        // Last: the crew can overrule these two, each by its word.
+        .or_else(|| why_untested(model))
         .or_else(|| model.why_no_log(now))
 }
 
-/// Whether this reason is that the station's log is unfit, so that the crew may go on without it.
-pub fn is_only_the_log(model: &Model, why: &str, now: Duration) -> bool {
-    model.why_no_log(now).as_deref() == Some(why)
+/// Why a real vehicle's motor is not known well enough: no burn of its lot has confirmed the certified curve, as far as the
+/// vehicle has said. `None` if one has, on a simulated vehicle, and once the crew goes on nevertheless.
+pub fn why_untested(model: &Model) -> Option<String> {
+    let boot = model.vehicle.boot.number();
+    if model.vehicle.is_simulated() || (boot.is_some() && model.untested == boot) {
+        return None;
+    }
+    match model.vehicle.mission() {
+        Some(flown) if flown.motor_burns > 0 => None,
+        Some(_) => Some("motor UNCONFIRMED: no burn of its lot".to_owned()),
+        None => Some("motor not known: no mission told yet".to_owned()),
+    }
+}
+
+/// The dialog by which the crew overrules this reason, if it may.
+pub fn overruled_by(model: &Model, why: &str, now: Duration) -> Option<Prompt> {
+    let is = |reason: Option<String>| reason.as_deref() == Some(why);
+    if is(why_untested(model)) {
+        return Some(Prompt::Untested);
+    }
+    is(model.why_no_log(now)).then_some(Prompt::WithoutLog)
 }
 
 /// Why the ground does not command to start the countdown.

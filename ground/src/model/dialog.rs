@@ -32,6 +32,8 @@ pub enum Prompt {
     Confirm(Ask),
     /// Go on although the station's log is unfit.
     WithoutLog,
+    /// Arm although no burn of the motor's lot has confirmed its curve.
+    Untested,
     TakeCommand,
     Disarm,
     /// Abort a vehicle with another autopilot, after what it would do there was read.
@@ -74,6 +76,7 @@ impl Prompt {
             Self::Start => "start",
             Self::Confirm(_) => "confirmation",
             Self::WithoutLog => "going on without a log",
+            Self::Untested => "going on with an untested motor",
             Self::TakeCommand => "take-over",
             Self::AbortForeign => "abort",
             Self::Disarm => "disarm",
@@ -93,6 +96,7 @@ impl Prompt {
             Self::Start => Some("START"),
             Self::Confirm(_) => Some(CONFIRM_WORD),
             Self::WithoutLog => Some("NOLOG"),
+            Self::Untested => Some("UNTESTED"),
             Self::TakeCommand => Some("TAKE"),
             Self::AbortForeign => Some("ABORT"),
             Self::Quit => Some("QUIT"),

@@ -234,6 +234,8 @@ pub struct Model {
     pub(crate) log_loses_at: Option<Duration>,
     /// The crew goes on although its log has this fault.
     pub(crate) without_log: Option<LogFault>,
+    /// The boot that the crew arms although no burn of its motor's lot has confirmed its curve.
+    pub(crate) untested: Option<u32>,
     pub alarms: Alarms,
     pub pages: Pages,
     pub history: History,
@@ -405,6 +407,8 @@ pub enum Request {
     Choose(u32),
     /// Arm and start although the station's log is unfit.
     WithoutLog,
+    /// Arm although no burn of the motor's lot has confirmed its curve.
+    Untested,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
 }

@@ -121,7 +121,12 @@ impl Vehicle {
             TdStart::TD_START_APOGEE => Some("apogee"),
             TdStart::TD_START_DRONE => Some("drone"),
         };
-        Some(FlownMission { hash: MissionHash(data.hash), name: name(&data.name[..]), start })
+        Some(FlownMission {
+            hash: MissionHash(data.hash),
+            name: name(&data.name[..]),
+            start,
+            motor_burns: data.motor_burns,
+        })
     }
 
     fn converted<M: MessageData, T>(&self, convert: impl FnOnce(&M) -> T) -> Option<Sample<T>> {

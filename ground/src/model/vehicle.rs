@@ -87,6 +87,8 @@ pub struct FlownMission {
     pub hash: MissionHash,
     pub name: String,
     pub start: Option<&'static str>,
+    /// Burns of the landing motor's lot that confirm the curve which the mission expects.
+    pub motor_burns: u8,
 }
 
 impl FlownMission {

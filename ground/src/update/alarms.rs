@@ -10,7 +10,7 @@ use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Danger, Ending, KeepAway, LinkState,
     LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words, is_on_pad,
-    latch_words, refused_frames, why_not_reached, words,
+    latch_words, refused_frames, why_not_reached, why_untested, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -358,12 +358,14 @@ fn call_readiness(model: &mut Model, now: Duration) {
     let failing = words::failed_checks(status.value.checks_failed);
     let no_log = model.why_no_log(now);
     let link = why_not_reached(model, now).is_none() && model.link.uplink.is_proven(now);
-    let go = failing.is_empty() && no_log.is_none() && link;
+    let untested = why_untested(model).is_some();
+    let go = failing.is_empty() && no_log.is_none() && !untested && link;
     let Some(before) = model.called.go.replace(go).filter(|before| *before != go) else { return };
     if before {
         let why = match no_log {
             _ if !failing.is_empty() => failing.join(", "),
             Some(_) => "station log".to_owned(),
+            None if untested => "motor untested".to_owned(),
             None => "link".to_owned(),
         };
         call(model, Amount::Few, format!("no go: {why}"), WRONG);

@@ -16,8 +16,9 @@ use crate::key::Key;
 use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
     KeyOrigin, LOOKS_FOR, LogStanding, LookBack, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
-    Standing, TextEntry, is_only_the_log, palette_entries, quantity, standing, why_not_arm, why_not_check,
+    Standing, TextEntry, overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check,
     why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves,
+    why_untested,
 };
 use crate::update;
 
@@ -190,6 +191,7 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
             Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
         },
         Prompt::WithoutLog => request(model, Request::WithoutLog, now),
+        Prompt::Untested => request(model, Request::Untested, now),
         Prompt::TakeCommand => ask(model, CommandKind::TakeCommand, now),
         Prompt::Hold => ask(model, CommandKind::Hold, now),
         Prompt::Disarm => ask(model, CommandKind::Disarm, now),
@@ -359,18 +361,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
-/// Opens the dialog of a rung of the ladder, or the one that goes on without a log if only that is in the way. If it is
-/// refused, the word that the crew would have typed is swallowed.
+/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word that the crew would have typed is swallowed.
 fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
-    match why_not {
-        None => open(model, prompt, now),
-        Some(why) if is_only_the_log(model, &why, now) => open(model, Prompt::WithoutLog, now),
-        Some(why) => {
-            let why = format!("cannot {verb}: {why}");
-            model.warn(now, why.clone());
-            model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
-        }
+    let Some(why) = why_not else { return open(model, prompt, now) };
+    if let Some(overrules) = overruled_by(model, &why, now) {
+        return open(model, overrules, now);
     }
+    let why = format!("cannot {verb}: {why}");
+    model.warn(now, why.clone());
+    model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
 }
 
 /// Swallows the word that the crew types on after a key that this screen refuses: no letter of it may act as a key.
@@ -479,6 +478,21 @@ pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
     let text =
         format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
     model.record_operator(now, "without log", by, &text);
+    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
+}
+
+/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for [`without_log`]; it counts until
+/// the vehicle's next power-up.
+pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
+    let Some(why) = why_untested(model) else {
+        return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
+    };
+    if let Some(why) = why_not_seat(model, by) {
+        return model.warn(now, format!("not with an untested motor: {why}"));
+    }
+    model.untested = model.vehicle.boot.number();
+    let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
+    model.record_operator(now, "untested motor", by, &text);
     model.tell(now, Speaker::Ground, EventLevel::Warning, text);
 }
 

@@ -240,6 +240,7 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
         Request::WithoutLog => keys::without_log(model, &by, now),
+        Request::Untested => keys::untested(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
     }
 }

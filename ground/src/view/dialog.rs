@@ -11,7 +11,7 @@ use ratatui::widgets::{Block, Clear};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
     AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
-    role_name, why_not_here, words,
+    role_name, why_not_here, why_untested, words,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -67,6 +67,13 @@ pub fn dialog_lines(
             let goes_on = plain("Then arm and start go on without a record, a book and a place.".to_owned());
             let above = vec![theme.line(why, TextRole::Alarm)];
             ("THE STATION'S LOG IS UNFIT", above, vec![goes_on, any_other_key()])
+        }
+        Prompt::Untested => {
+            let why = why_untested(model).unwrap_or_else(|| "Burns confirm it now.".to_owned());
+            let curve = "A certified curve is another lot's: impulse and burn time may differ by 5 and 8 %.";
+            let above = vec![theme.line(why, TextRole::Alarm), plain(curve.to_owned())];
+            let goes_on = plain("Then arming goes on, and the book says who overruled it.".to_owned());
+            ("NO BURN CONFIRMS THE MOTOR", above, vec![goes_on, any_other_key()])
         }
         Prompt::Quit => {
             let goes_on = match model.settings.role {

@@ -15,7 +15,7 @@ use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_
 use crate::model::{
     Acknowledgement, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role, Standing,
     TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself,
-    is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, words,
+    is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, why_untested, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -548,6 +548,7 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
         .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
         .or_else(|| why_other_mission(model))
         .or_else(|| model.why_checklist(now))
+        .or_else(|| why_untested(model))
         .or_else(|| model.why_no_log(now));
     Some(match why {
         Some(why) => (format!("NO-GO: {why}"), TextRole::Caution),

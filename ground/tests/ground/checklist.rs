@@ -274,6 +274,7 @@ fn the_checklist_of_another_mission_is_no_go() {
             hash,
             name: bytes.into(),
             start: TdStart::TD_START_PAD,
+            ..TD_MISSION_DATA::default()
         }));
         upright(&mut rig, 90.0);
         assert_eq!(arms(&mut rig), arms_now, "{}", rig.events());

@@ -221,6 +221,7 @@ fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
         hash: hash.0,
         name: name.into(),
         start: TdStart::TD_START_PAD,
+        ..TD_MISSION_DATA::default()
     }));
     for (columns, rows) in [(80, 24), (120, 36)] {
         let screen = rig.screen(columns, rows);

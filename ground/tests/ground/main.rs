@@ -32,6 +32,7 @@ mod screens;
 mod station_log;
 mod terminal;
 mod two_person;
+mod untested;
 mod uplink;
 mod voice;
 mod who;

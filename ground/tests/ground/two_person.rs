@@ -234,7 +234,12 @@ fn another_mission_is_not_armed_and_both_hashes_are_named() {
     let fly = |rig: &mut Rig, text: &str| {
         let name = characters::<20>("mk2").into();
         let (hash, start) = (MissionHash::of(text).0, TdStart::TD_START_APOGEE);
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash, name, start }));
+        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+            hash,
+            name,
+            start,
+            ..TD_MISSION_DATA::default()
+        }));
         rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
         rig.take_commands()
     };

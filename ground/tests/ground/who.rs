@@ -515,6 +515,8 @@ fn a_heartbeat_alone_does_not_make_a_vehicle_ours() {
     assert_eq!(rig.take_commands(), []);
     assert!(rig.events().contains("it has sent no flight status"), "{}", rig.events());
     rig.flight_status();
+    // Both say that it is simulated: a real one asks for a word about its motor.
+    rig.heartbeat();
     rig.uplink();
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm), "{}", rig.events());

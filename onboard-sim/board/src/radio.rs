@@ -11,7 +11,6 @@ use flight::vehicle::mission::Mission;
 use flight_log::frame::LoggedInput;
 use flight_log::logged::Logged;
 use protocol::frame::Framer;
-use protocol::mission::MissionHash;
 use vehicle_link::endpoint::{UplinkState, VehicleEndpoint};
 use vehicle_link::sensed::SensorWatch;
 use vehicle_link::vehicle::{BatteryFacts, MissionName, VehicleKind, VehicleState};
@@ -61,11 +60,7 @@ impl Crewed {
             .known_as(u16::try_from(on_the_air.uid).unwrap_or(0))
             .over_links(&[on_the_air.budget_bytes_s])
             .of_system(system_id);
-        let name = MissionName {
-            name: on_the_air.mission.clone(),
-            hash: MissionHash::of(toml),
-            start: Some(mission.start.at),
-        };
+        let name = MissionName::of(&on_the_air.mission, toml, mission);
         Self {
             heard: endpoint.heard(0.0),
             endpoint,

@@ -1,9 +1,9 @@
 //! What it is worth to tell a mission of its motor's lot: how often the same vehicles land, told and not told.
 //!
-//! `cargo run --release -p campaign --example lot -- MISSION SET FLIGHTS SEED`
+//! `cargo run --release -p campaign --example lot -- MISSION SET FLIGHTS SEED ROWS`
 //!
 //! The motors of a row are those of a lot, drawn with what is known of it. Each flight is flown by a mission that knows this
-//! lot, and by one that was told less: motor, vehicle, day and chance are the same.
+//! lot, and by one that was told less (ROWS is part of the names of rows; default: all): motor, vehicle, day and chance are the same.
 
 use std::io::Write as _;
 
@@ -35,6 +35,7 @@ fn main() -> anyhow::Result<()> {
     let at = |place: usize, default: &str| arguments.get(place).map_or(default, String::as_str).to_owned();
     let (name, set, flights, seed) =
         (at(0, "mk3"), at(1, "real"), at(2, "1000").parse()?, at(3, "2002").parse()?);
+    let rows = at(4, "");
     let set = Dispersion::from_toml(Dispersion::builtin_toml(&set)?, &set)?;
     let mission = |lot: &str| -> anyhow::Result<Mission> {
         let known = BUILTIN.iter().find(|(known, _)| *known == name);
@@ -52,6 +53,9 @@ fn main() -> anyhow::Result<()> {
         ("15 K colder; not told", &cold, KNOWN),
         ("15 K warmer; not told", &warm, KNOWN),
     ] {
+        if !row.contains(&rows) {
+            continue;
+        }
         let (world, less) = (mission(lot)?, mission(less)?);
         let stand = |pilot: &Mission| -> anyhow::Result<Vec<bool>> {
             let law = Law::of(Controller::Nmpc, pilot);

@@ -48,11 +48,25 @@ pub struct MissionName {
     pub hash: MissionHash,
     /// Where the flight begins, which the hash leaves out.
     pub start: Option<StartPoint>,
+    /// Burns that confirm the curve of its motor.
+    pub motor_burns: u8,
+}
+
+impl MissionName {
+    /// Of a mission that was read from this text.
+    pub fn of(name: &str, text: &str, mission: &Mission) -> Self {
+        Self {
+            name: name.into(),
+            hash: MissionHash::of(text),
+            start: Some(mission.start.at),
+            motor_burns: u8::try_from(mission.motor_burns()).unwrap_or(u8::MAX),
+        }
+    }
 }
 
 impl Default for MissionName {
     fn default() -> Self {
-        Self { name: String::new(), hash: MissionHash::of(""), start: None }
+        Self { name: String::new(), hash: MissionHash::of(""), start: None, motor_burns: 0 }
     }
 }
 

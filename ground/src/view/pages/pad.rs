@@ -10,7 +10,8 @@ use ratatui::text::Line;
 
 use super::{Room, Side, attitude, columns, events, framed, rows, table};
 use crate::model::{
-    Act, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here, words,
+    Act, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here,
+    why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::map::draw_map;
@@ -207,6 +208,8 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     if station_log_fails {
         lines.push(station_log.clone());
     }
+    let motor = motor(model, theme);
+    lines.extend(motor.clone().filter(|_| why_untested(model).is_some()));
     let failing = all.iter_names().filter(|(_, bit)| fails(*bit));
     lines.extend(failing.map(|check| row(" NO ", check, failure(check.1))));
     let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
@@ -217,7 +220,26 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     if !station_log_fails {
         lines.push(station_log);
     }
+    lines.extend(motor.filter(|_| why_untested(model).is_none()));
     lines
+}
+
+/// Whether burns of its lot confirm the landing motor, once the vehicle has said which mission it flies.
+fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
+    let burns = model.vehicle.mission()?.motor_burns;
+    let (word, role, found) = match burns {
+        0 if why_untested(model).is_some() => (" NO ", TextRole::Alarm, "UNCONFIRMED: no burn of its lot"),
+        0 if model.vehicle.is_simulated() => ("    ", TextRole::Plain, "certified, no burn of its lot"),
+        0 => (" !! ", TextRole::Caution, "overruled: UNCONFIRMED, no burn of its lot"),
+        _ => ("    ", TextRole::Plain, "confirmed, burns of its lot:"),
+    };
+    let count = if burns > 0 { format!(" {burns}") } else { String::new() };
+    let found_role = if word == "    " { TextRole::Plain } else { TextRole::Caution };
+    Some(Line::from(vec![
+        theme.span(word, role),
+        theme.plain(" motor       "),
+        theme.span(format!("{found}{count}"), found_role),
+    ]))
 }
 
 /// Whether the checks pass, in words.

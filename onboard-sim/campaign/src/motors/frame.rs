@@ -358,7 +358,7 @@ mod tests {
         let kept = read(&changes);
         assert_eq!((&kept.motor_curve, kept.airframe.mass), (&mission.motor_curve, mass));
         let other = read(&Changes { motor: "G33", keeps_lot: false, ..changes });
-        assert!(other.lot.is_none() && !other.is_confirmed());
+        assert!(other.lot.is_none() && other.motor_burns() == 0);
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 

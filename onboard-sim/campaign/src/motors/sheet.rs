@@ -274,6 +274,7 @@ impl Card {
         rows(
             "What may differ",
             vec![
+                self.confirmed(),
                 row(
                     "Impulse of the motor",
                     format!("{:+.1} to {:+.1} %", 100.0 * (low - 1.0), 100.0 * (high - 1.0)),
@@ -295,6 +296,22 @@ impl Card {
                 ),
             ],
         )
+    }
+
+    /// Whether burns of its lot confirm the motor's curve.
+    fn confirmed(&self) -> Vec<String> {
+        match &self.recipe.mission.lot {
+            Some(lot) if lot.burns > 0 => row(
+                "Motor confirmed by",
+                format!("{} burns of lot {}", lot.burns, lot.name),
+                "the mission expects what they had; another lot is unconfirmed",
+            ),
+            _ => row(
+                "Motor",
+                "UNCONFIRMED".to_owned(),
+                "no burn of its lot confirms the certified curve; arming asks for the word UNTESTED",
+            ),
+        }
     }
 
     fn checks(&self) -> Vec<String> {

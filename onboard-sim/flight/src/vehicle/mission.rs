@@ -301,9 +301,10 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// Whether burns of the motor's lot have confirmed the curve that this mission expects.
-    pub fn is_confirmed(&self) -> bool {
-        self.lot.as_ref().is_some_and(|lot| lot.burns > 0)
+    /// How many burns of the motor's lot have confirmed the curve that this mission expects; of a certified curve alone none
+    /// has.
+    pub fn motor_burns(&self) -> u32 {
+        self.lot.as_ref().map_or(0, |lot| lot.burns)
     }
 
     /// The mission with what its lot tells, where `curve` is the one that the lot's scales are over; without a lot, with that

@@ -261,7 +261,12 @@ pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
         Some(StartPoint::Apogee) => TdStart::TD_START_APOGEE,
         Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
     };
-    MavMessage::TD_MISSION(TD_MISSION_DATA { hash: state.name.hash.0, name, start })
+    MavMessage::TD_MISSION(TD_MISSION_DATA {
+        hash: state.name.hash.0,
+        name,
+        start,
+        motor_burns: state.name.motor_burns,
+    })
 }
 
 pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {

@@ -21,7 +21,6 @@ use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
-use protocol::mission::MissionHash;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
@@ -143,8 +142,7 @@ impl Vehicle {
     /// Sets the name and the text of the mission that it flies.
     #[must_use]
     pub fn of_mission(self, name: &str, text: &str) -> Self {
-        let start = Some(self.sortie.mission().start.at);
-        let mission = MissionName { name: name.to_owned(), hash: MissionHash::of(text), start };
+        let mission = MissionName::of(name, text, self.sortie.mission());
         Self { mission, ..self }
     }
 
