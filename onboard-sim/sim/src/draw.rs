@@ -101,17 +101,20 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
 /// The set, which scatters landing motors as certified curves differ, with the scatter that the mission knows of its lot, and
 /// a vehicle that was weighed. What the set does not scatter stays as it is.
 fn known(mission: &Mission, set: &Dispersion) -> Dispersion {
-    let Some(expected) = &mission.expected else { return *set };
+    let (Some(lot), Some(expected)) = (&mission.lot, &mission.expected) else { return *set };
+    let weighed = lot.weighed.vehicle_kg.map_or(set.mass_share, |_| set.mass_share.min(expected.mass_share));
+    let set = Dispersion { mass_share: weighed, ..*set };
+    if lot.burns == 0 {
+        return set;
+    }
     // The variance of an even distribution is a third of its half-width's square.
     let both = libm::hypot(set.impulse_share, set.impulse_even_share / libm::sqrt(3.0));
     let narrows = if both > 0.0 { expected.impulse.share / both } else { 1.0 };
-    let scatters = set.burn_time_share > 0.0;
     Dispersion {
         impulse_share: set.impulse_share * narrows,
         impulse_even_share: set.impulse_even_share * narrows,
-        burn_time_share: if scatters { expected.burn_time.share } else { 0.0 },
-        mass_share: set.mass_share.min(expected.mass_share),
-        ..*set
+        burn_time_share: if set.burn_time_share > 0.0 { expected.burn_time.share } else { 0.0 },
+        ..set
     }
 }
 
@@ -267,5 +270,44 @@ impl Chance {
     fn normal(&mut self) -> f64 {
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         radius * libm::cos(TAU * self.unit())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(lot: &str, set: &str) -> Truth {
+        let (name, text) = flight::vehicles::mission::BUILTIN[0];
+        let mission = flight::vehicles::mission::from_toml(&format!("{text}{lot}"), name).unwrap();
+        draw(&mission, &Dispersion::builtin(set).unwrap(), 7, 3).truth
+    }
+
+    /// The same draw, as far from the mean as the lot's motors scatter; without burns as far as the set's.
+    #[test]
+    fn a_lot_scatters_as_it_did_on_the_stand() {
+        let lot = "\n[lot]\nname = \"2609\"\nburns = 400\nimpulse = { mean = 1.0, scatter = 0.01 }\nburn_time = { mean = 1.0, scatter = 0.015 }\n";
+        for (set, shares) in [("real", [0.025, 0.04]), ("harsh", [0.05, 0.08])] {
+            let (certified, known) = (truth("", set), truth(lot, set));
+            let off = [certified.impulse_scale, certified.burn_time_scale].map(|scale| scale - 1.0);
+            let now = [known.impulse_scale, known.burn_time_scale].map(|scale| scale - 1.0);
+            // 400 burns know the scatter to a fortieth of it and less.
+            for (place, scatter) in [0.01, 0.015].into_iter().enumerate() {
+                let expected = off[place] * scatter / shares[place];
+                assert!((now[place] / expected - 1.0).abs() < 0.025, "{set}: {} {expected}", now[place]);
+            }
+            assert_eq!(
+                Truth { impulse_scale: 1.0, burn_time_scale: 1.0, ..certified },
+                Truth { impulse_scale: 1.0, burn_time_scale: 1.0, ..known }
+            );
+            assert_eq!(truth("\n[lot]\nname = \"2609\"\nburns = 0\n", set), certified);
+        }
+    }
+
+    #[test]
+    fn a_weighed_vehicle_has_its_weight() {
+        let lot = "\n[lot]\nname = \"2609\"\nburns = 0\nweighed = { vehicle_kg = 3.1 }\n";
+        let (certified, weighed) = (truth("", "real").mass_scale - 1.0, truth(lot, "real").mass_scale - 1.0);
+        assert!((weighed / certified - 0.005 / 3.1 / 0.01).abs() < 1e-9, "{weighed} {certified}");
     }
 }

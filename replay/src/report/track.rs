@@ -129,9 +129,13 @@ pub(super) struct GimbalAxis {
 /// What only the frames of a flight computer tell.
 #[derive(Debug, Clone, Default)]
 pub(super) struct InSpace {
-    /// Impulse and burn time divided by their certified values, as estimated at the end.
+    /// Impulse and burn time divided by what the mission expected, as estimated at the end.
     pub(super) inferred_scales: Option<(f64, f64)>,
-    /// True impulse divided by the certified impulse.
+    /// How far the mission expected the two to be off, as standard deviations.
+    pub(super) expected_sigmas: (f64, f64),
+    /// Burns of its lot that confirm the motor's curve.
+    pub(super) motor_burns: u32,
+    /// True impulse divided by the expected impulse.
     pub(super) true_impulse_scale: Option<f64>,
     /// The plane of the landing in words, as in `124 deg from north`.
     pub(super) plane: String,
@@ -402,7 +406,7 @@ fn in_space(
         .map(|pair| 0.5 * (pair[0].thrust_n + pair[1].thrust_n) * (pair[1].time_s - pair[0].time_s))
         .sum();
     let burnt_out = world.last().is_some_and(|last| last.thrust_n <= 0.0);
-    let certified_n_s = mission.motor_curve.total_impulse_n_s();
+    let expected_n_s = mission.motor_curve.total_impulse_n_s();
     let known = || again.iter().filter_map(|frame| Some((frame.time_s, frame.estimate?)));
     let in_air = |time_s: f64| recording.verdict.as_ref().is_none_or(|verdict| time_s <= verdict.time_s);
     InSpace {
@@ -440,7 +444,9 @@ fn in_space(
             .motor()
             .ignition_s()
             .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
-        true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / certified_n_s),
+        expected_sigmas: (mission.motor.impulse_sigma, mission.motor.burn_time_sigma),
+        motor_burns: mission.motor_burns(),
+        true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / expected_n_s),
     }
 }
 

@@ -49,7 +49,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
         "Path of the landing in its plane",
         "Gimbal pitch, deg",
         "Gimbal yaw, deg",
-        "inferred impulse at the end, of certified",
+        "inferred impulse at the end, of expected",
         "Thrust, N",
         "x at touchdown, m",
         "Wind towards north, m/s",

@@ -92,6 +92,13 @@ fn val_hand_a_lot_moves_the_curve_and_narrows_what_is_expected() {
 }
 
 #[test]
+fn the_lot_on_the_engineers_page_is_one() {
+    let page = include_str!("../../../../ENGINEER.md");
+    let (_, lot) = page.split_once("```toml\n[lot]\n").unwrap();
+    assert_eq!(mk3_with(lot.split_once("```").unwrap().0).motor_burns(), 4);
+}
+
+#[test]
 fn a_lot_without_burns_confirms_nothing_and_flies_the_certified_curve() {
     let mk3 = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
     let bought = mk3_with("name = \"2609\"\nburns = 0");

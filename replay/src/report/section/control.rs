@@ -314,20 +314,74 @@ pub(super) fn thrust(flight: &Flight) -> String {
         Line { name: "inferred", class: "a", points: inferred },
     ];
     let chart = Chart { limits: vec![vehicle.weight_n], full: true, ..flight.over_time("Thrust, N", lines) };
-    table(&["", "#"], &rows)
+    let another = flight.in_space.as_ref().and_then(another_curve);
+    another.map_or_else(String::new, |words| paragraph(&words))
+        + &table(&["", "#"], &rows)
         + &charts(&[chart.svg()])
         + &paragraph("The dashed level is the vehicle's weight.")
+}
+
+/// A motor that is further off than this was another one than the mission expected: one of twenty of its own lot is.
+const ANOTHER_SIGMAS: f64 = 2.0;
+
+/// That the motor flew another curve than expected, if it did, and what had confirmed that curve.
+fn another_curve(in_space: &InSpace) -> Option<String> {
+    let (impulse, burn_time) = in_space.inferred_scales?;
+    let (impulse_sigma, burn_time_sigma) = in_space.expected_sigmas;
+    let off: Vec<String> = [("impulse", impulse, impulse_sigma), ("burn time", burn_time, burn_time_sigma)]
+        .into_iter()
+        .filter(|(_, scale, sigma)| (scale - 1.0).abs() > ANOTHER_SIGMAS * sigma)
+        .map(|(name, scale, sigma)| {
+            format!("{name} {:+.1} %, {:.1} deviations", 100.0 * (scale - 1.0), (scale - 1.0).abs() / sigma)
+        })
+        .collect();
+    let confirmed = match in_space.motor_burns {
+        0 => "No burn of its lot had confirmed the certified curve.".to_owned(),
+        burns => format!("Burns of its lot that had confirmed the curve: {burns}."),
+    };
+    let words = || format!("The motor flew another curve than expected: {}. {confirmed}", off.join("; "));
+    (!off.is_empty()).then(words)
 }
 
 /// Impulse and burn time of the motor.
 fn scales(in_space: &InSpace) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     if let Some((impulse, stretch)) = in_space.inferred_scales {
-        rows.push(vec!["inferred impulse at the end, of certified".to_owned(), format!("{impulse:.4}")]);
-        rows.push(vec!["inferred burn time at the end, of certified".to_owned(), format!("{stretch:.4}")]);
+        rows.push(vec!["inferred impulse at the end, of expected".to_owned(), format!("{impulse:.4}")]);
+        rows.push(vec!["inferred burn time at the end, of expected".to_owned(), format!("{stretch:.4}")]);
     }
     if let Some(scale) = in_space.true_impulse_scale {
-        rows.push(vec!["actual impulse, of certified".to_owned(), format!("{scale:.4}")]);
+        rows.push(vec!["actual impulse, of expected".to_owned(), format!("{scale:.4}")]);
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_two_deviations_off_flew_another_curve() {
+        let of = |scales, motor_burns| {
+            let expected_sigmas = (0.0125, 0.02);
+            another_curve(&InSpace {
+                inferred_scales: Some(scales),
+                expected_sigmas,
+                motor_burns,
+                ..InSpace::default()
+            })
+        };
+        assert_eq!(of((1.02, 0.97), 4), None);
+        assert_eq!(
+            of((0.95, 1.01), 0).as_deref(),
+            Some(
+                "The motor flew another curve than expected: impulse -5.0 %, 4.0 deviations. No burn of its lot had confirmed the \
+                 certified curve."
+            )
+        );
+        assert!(
+            of((0.95, 1.05), 4)
+                .is_some_and(|words| words.contains("; burn time +5.0 %, 2.5 deviations. Burns"))
+        );
+    }
 }
