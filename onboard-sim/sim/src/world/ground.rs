@@ -13,12 +13,10 @@ use crate::world::aero::Load;
 
 /// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no direction.
 const SLIDING_M_S: f64 = 0.05;
-/// Feet that press with more than this, N, turn a slim body's roll faster than steps of a quarter of a millisecond bear: mk3's,
-/// 0.45 m from its axis, at `0.6 * 40 N * (0.45 m)^2 / (0.0207 kg m^2 * 0.05 m/s)` = 4,700 per second, and Runge-Kutta's fourth
-/// order is stable to 2.78 in a step. A vehicle that weighs 31 N presses with less at rest.
-const PRESSES_N: f64 = 40.0;
-/// A vehicle that is faster may press with 32 N more a millisecond later (four feet of 20 N s/m and 20 kN/m each), m/s.
-const FALLS_M_S: f64 = 0.2;
+/// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth order is stable to 2.78.
+const STIFFEST: f64 = 1.5;
+/// Most parts of a step. Legs that crush press mk3's feet with 360 N, and turn its slim body 42,000 times per second.
+const MOST_PARTS: usize = 16;
 /// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
 const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
 /// A vehicle with three feet on the ground that is slower than this, m/s and rad/s, for this time, s, is at rest.
@@ -217,7 +215,6 @@ impl Ground {
 
     /// Legs that are pushed in further than their springs reach at the force that crushes them give way.
     pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
-        let Some(crush) = self.crush else { return };
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;
         for foot in 0..self.feet_m.len() {
@@ -225,6 +222,7 @@ impl Ground {
                 continue;
             };
             self.pressed_n += force_n.norm();
+            let Some(crush) = self.crush else { continue };
             let beyond_m = depth_m - crush.force_n / self.stiffness_n_m;
             let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
             self.given_m[foot] += gives_m;
@@ -233,15 +231,23 @@ impl Ground {
             strain.stroke_used = strain.stroke_used.max(self.given_m[foot] / crush.stroke_m);
             strain.strength_used = strain.strength_used.max(force_n.norm() / crush.strength_n);
         }
+        if self.crush.is_none() {
+            return;
+        }
         let hull_m = self.lowest_m(&self.hull_m, state, cg_m);
         self.strain.clearance_m = self.strain.clearance_m.min(hull_m.max(0.0));
         self.strain.tilt_rad = self.strain.tilt_rad.max(state.tilt_rad());
     }
 
-    /// Whether legs that can give way press so hard, or soon will, that the friction of their feet is stiff.
-    pub(crate) fn presses(&self, state: &RigidState) -> bool {
-        let falls = state.velocity_m_s.norm_squared() > FALLS_M_S * FALLS_M_S;
-        self.crush.is_some() && (falls || self.pressed_n > PRESSES_N)
+    /// Into how many parts a step, s, is to be divided, because the friction of the pressed feet is stiff: at low speed it damps a
+    /// roll by the force times friction, the square of their radius and `1 / SLIDING_M_S`, over the moment of inertia.
+    pub(crate) fn parts(&self, state: &RigidState, roll_inertia_kg_m2: f64, step_s: f64) -> usize {
+        let feet = self.feet_m.len() as f64;
+        let more_n_s_m = feet * (self.damping_n_s_m + self.stiffness_n_m * step_s);
+        let pressed_n = self.pressed_n + more_n_s_m * state.velocity_m_s.norm();
+        let radius_m2 = self.feet_m.iter().map(|foot| foot.yz().norm_squared()).fold(0.0, f64::max);
+        let damping_per_s = self.friction * pressed_n * radius_m2 / (roll_inertia_kg_m2 * SLIDING_M_S);
+        (libm::ceil(damping_per_s * step_s / STIFFEST) as usize).clamp(1, MOST_PARTS)
     }
 
     /// What the legs have borne so far, if they can give way and have met the ground.

@@ -10,8 +10,8 @@ use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::World;
 use super::riding::Stack;
+use super::{AirHere, World};
 use crate::world::aero::{Parachute, Shape};
 use crate::world::ground::Ground;
 use crate::world::hanging::Hanging;
@@ -89,6 +89,7 @@ impl World {
             }),
             fin_links: fin_links_at(airframe, truth, airframe.fins.closed_rad()),
             parachute: Parachute::new(&airframe.parachute),
+            air: AirHere::at(initial.position_m.z),
             wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)
                 .over_height(truth.wind_exponent, truth.wind_veer_rad_m),
             ground: Ground::new(airframe, truth.ground_rise),
@@ -293,6 +294,7 @@ impl World {
             fin_links: core::array::from_fn(|fin| self.fin_links[fin].changed(&other.fin_links[fin])),
             parachute: self.parachute.clone(),
             wind: self.wind.changed(&other.wind),
+            air: self.air,
             steps: self.steps,
             mass: if *airframe == self.airframe && *truth == self.truth { self.mass } else { other.mass },
             specific_force_m_s2: self.specific_force_m_s2,

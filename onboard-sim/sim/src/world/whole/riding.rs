@@ -5,12 +5,12 @@
 //! cm/s) is neglected.
 
 use flight::vehicle::airframe::MassProperties;
-use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::{Booster, Launch, NormalForce};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
 
-use super::World;
+use super::{AirHere, World};
 use crate::world::aero::{Configuration, Flow, Load, Plume, Shape};
 use crate::world::body::{Inertia, Loads};
 use crate::world::ground::RestOutcome;
@@ -25,9 +25,7 @@ struct Acting<'a> {
     stack: &'a Stack,
     area_m2: f64,
     wind_m_s: Vector3<f64>,
-    density_kg_m3: f64,
-    density_gradient_kg_m4: f64,
-    density_height_m: f64,
+    air: AirHere,
     /// Thrust at the start, middle and end, N.
     thrust_n: [f64; 3],
     thrust_place_m: Vector3<f64>,
@@ -37,9 +35,8 @@ struct Acting<'a> {
 
 impl Loads for Acting<'_> {
     fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
-        let above_m = state.position_m.z - self.density_height_m;
         let flow = Flow {
-            density_kg_m3: self.density_kg_m3 + self.density_gradient_kg_m4 * above_m,
+            density_kg_m3: self.air.density_kg_m3(state.position_m.z),
             velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
             rate_rad_s: state.rate_rad_s,
         };
@@ -114,7 +111,6 @@ impl World {
 
     /// The forces of a step.
     fn acting_on<'a>(&'a self, stack: &'a Stack, mass: &StackMass, time_s: f64) -> Acting<'a> {
-        let air = Air::at_height_m(self.state.position_m.z);
         let body = &self.airframe.body;
         let cg_m = mass.cg_m;
         Acting {
@@ -129,9 +125,7 @@ impl World {
             stack,
             area_m2: body.reference_area_m2,
             wind_m_s: self.wind.now_m_s(),
-            density_kg_m3: air.density_kg_m3,
-            density_gradient_kg_m4: air.density_gradient_kg_m4(),
-            density_height_m: self.state.position_m.z,
+            air: self.air,
             thrust_n: [0.0, 0.5, 1.0].map(|share| stack.thrust_n(time_s + share * STEP_S)),
             thrust_place_m: stack.nozzle_m() - cg_m,
             jet_damping_m_s: stack.jet_damping_m_s(cg_m.x),
