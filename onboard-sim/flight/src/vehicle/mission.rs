@@ -1,5 +1,6 @@
 //! Missions: a vehicle, the start of its flight, and its settings, as data.
 
+use alloc::boxed::Box;
 use alloc::string::String;
 
 use serde::Deserialize;
@@ -233,10 +234,10 @@ pub struct Mission {
     /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
     /// and the mass.
     #[serde(default)]
-    pub lot: Option<Lot>,
+    pub lot: Option<Box<Lot>>,
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
-    pub expected: Option<Expectation>,
+    pub expected: Option<Box<Expectation>>,
     pub gravity_m_s2: f64,
     /// Altitude of the pad above the sea, m.
     pub pad_altitude_m: f64,
@@ -307,11 +308,12 @@ impl Mission {
         self.lot.as_ref().map_or(0, |lot| lot.burns)
     }
 
-    /// The mission with what its lot tells, where `curve` is the one that the lot's scales are over; without a lot, with that
-    /// curve.
-    #[must_use]
-    pub(crate) fn expecting(mut self, curve: ThrustCurve) -> Self {
-        let Some(lot) = &self.lot else { return Self { motor_curve: curve, ..self } };
+    /// Puts in what the lot tells, where `curve` is the one that the lot's scales are over; without a lot, that curve.
+    pub(crate) fn expect(&mut self, curve: ThrustCurve) {
+        let Some(lot) = &self.lot else {
+            self.motor_curve = curve;
+            return;
+        };
         let mass = &mut self.airframe.mass;
         mass.loaded_kg = lot.weighed.vehicle_kg.unwrap_or(mass.loaded_kg);
         let expected = lot.expectation(&self.motor, mass.loaded_kg);
@@ -329,8 +331,7 @@ impl Mission {
         ignition.burn_time_scales =
             narrowed(ignition.burn_time_scales, burn_time.share, motor.burn_time_sigma);
         (motor.impulse_sigma, motor.burn_time_sigma) = (impulse_share, burn_time.share);
-        self.expected = Some(expected);
-        self
+        self.expected = Some(Box::new(expected));
     }
 }
 

@@ -62,7 +62,7 @@ pub enum MissionError {
 /// [`MissionError`] names the key and what would be accepted.
 pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     let not_a_mission = |error: toml::de::Error| FileError::not_toml(origin, &error);
-    let mission: Mission = match with_the_named_airframe(text).map_err(not_a_mission)? {
+    let mut mission: Mission = match with_the_named_airframe(text).map_err(not_a_mission)? {
         Some(expanded) => toml::from_str(&expanded),
         None => toml::from_str(text),
     }
@@ -79,7 +79,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         let weights = lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg);
         weights.map_err(|bad| FileError::bad_value(origin, bad.into()))?;
     }
-    let mut mission = mission.expecting(curve);
+    mission.expect(curve);
     if let Some(launch) = &mut mission.launch {
         launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
     }

@@ -19,7 +19,7 @@ pub(super) fn validate(mission: &Mission) -> Check {
     require(!mission.name.trim().is_empty(), "name", "\"\"", "a name")?;
     mission.airframe.validate()?;
     mission.motor.validate()?;
-    mission.lot.as_ref().map_or(Ok(()), Lot::validate)?;
+    mission.lot.as_deref().map_or(Ok(()), Lot::validate)?;
     mission.exhaust.validate()?;
     // From the Moon to twice the Earth.
     require(
