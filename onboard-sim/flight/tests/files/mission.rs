@@ -154,11 +154,11 @@ fn mk3_flies_with_the_numbers_of_mk2() {
         |mission: &Mission| mission.descent.stiffness_m3 / mission.airframe.mass.loaded_pitch_inertia_kg_m2;
     assert!((per_inertia(&mk2) - per_inertia(&mk3)).abs() < 0.001);
     let descent = mk2.descent;
-    // mk3 plans its landing in space.
+    // mk3 plans its landing in space, and homes further.
     assert!(mk3.powered.space.is_some() && mk2.powered.space.is_none());
     let caution_sigmas = mk2.caution_sigmas;
-    let PoweredSettings { interval_s, weights, max_passes, space, solver, .. } = mk2.powered;
-    let powered = PoweredSettings { interval_s, weights, max_passes, space, solver, ..mk3.powered };
+    let PoweredSettings { interval_s, weights, homing, max_passes, space, solver, .. } = mk2.powered;
+    let powered = PoweredSettings { interval_s, weights, homing, max_passes, space, solver, ..mk3.powered };
     assert_eq!(
         Mission {
             name,

@@ -14,7 +14,7 @@ use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
 use crate::guidance::powered::ControlLevel;
-use crate::rules::gate::{GateInput, gate_checks};
+use crate::rules::gate::{self, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::atmosphere::Air;
@@ -403,8 +403,7 @@ impl Pilot {
 
     /// The first check that keeps the gate shut.
     pub(super) fn gate_shut_by(&self, found: &GateInput) -> Option<&'static str> {
-        let checks = gate_checks(&self.model.mission.gate, found);
-        checks.iter().find(|check| !check.passed).map(|check| check.name)
+        gate::shut_by(&self.model.mission.gate, found)
     }
 
     /// The fins have left their closed stop and stand where they are commanded to. In the frame that enters DEPLOY they still
