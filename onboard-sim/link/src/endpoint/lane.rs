@@ -191,8 +191,8 @@ impl Lane {
         self.next_parameter = Some(0);
     }
 
-    /// The frames to send now: vital messages first, then answers, then telemetry by importance, then requested
-    /// messages, then pieces of files. The budget holds in every second.
+    /// The frames to send now: vital messages first, then answers, then texts (in the fall after telemetry), then telemetry by
+    /// importance, then requested messages, then pieces of files. The budget holds in every second.
     pub(super) fn poll(
         &mut self,
         context: &Context,
@@ -248,15 +248,9 @@ impl Lane {
             self.put(frame, now_s, &mut frames);
             self.answers.pop_front();
         }
-        while self.is_line_free(now_s)
-            && let Some(chunk) = self.texts.front().cloned()
-        {
-            let room = self.room_for_answers().min(self.said.room());
-            let Some(frame) = self.encode(&chunk, room) else { break };
-            self.said.take(self.len_of(&frame), now_s);
-            self.answers_briefly.take(self.len_of(&frame), now_s);
-            self.put(frame, now_s, &mut frames);
-            self.texts.pop_front();
+        let falls = vehicle.phase().in_descent() || vehicle.phase().in_landing_burn();
+        if !falls {
+            self.send_texts(now_s, &mut frames);
         }
         for due in due.iter().filter(|due| !due.vital) {
             // The check uses the longest form of the message, so that no frame is built for nothing. Less important
@@ -265,6 +259,10 @@ impl Lane {
                 break;
             }
             self.send(due, context, vehicle, &mut frames);
+        }
+        // In the fall the place of the vehicle does not wait for words.
+        if falls {
+            self.send_texts(now_s, &mut frames);
         }
         while self.requested.len() < MAX_REQUESTED
             && let Some(answer) = files.next_answer(&self.links)
@@ -286,6 +284,20 @@ impl Lane {
         }
         self.send_pieces(now_s, files, &mut frames);
         frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
+    }
+
+    /// Sends texts within their share.
+    fn send_texts(&mut self, now_s: f64, frames: &mut Vec<Frame>) {
+        while self.is_line_free(now_s)
+            && let Some(chunk) = self.texts.front().cloned()
+        {
+            let room = self.room_for_answers().min(self.said.room());
+            let Some(frame) = self.encode(&chunk, room) else { break };
+            self.said.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, frames);
+            self.texts.pop_front();
+        }
     }
 
     /// Sends pieces of files in all the room that is left, evenly spread.

@@ -1,7 +1,7 @@
 //! The vehicle's end of MAVLink, without sockets: frames in, frames out.
 //!
 //! In every second each link carries at most its budget, whatever is requested. Vital messages go first, then answers
-//! and texts within their own shares, then telemetry, then requested messages.
+//! and texts within their own shares, then telemetry, then requested messages. In the fall texts follow telemetry.
 
 mod lane;
 pub mod meant;

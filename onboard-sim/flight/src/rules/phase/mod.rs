@@ -371,16 +371,17 @@ impl Mode {
     /// Time until the vehicle may be approached, s, 0 if it may be now; `None` while this is unknown: armed, in the
     /// air, or with a burning motor.
     pub fn approach_wait_s(&self, time_s: f64) -> Option<f64> {
-        let until = |end_s: f64| Some((end_s - time_s).max(0.0));
+        // Never longer than the wait itself, as a sum of times could be by rounding.
+        let left = |since_s: f64, wait_s: f64| Some((wait_s - (time_s - since_s)).max(0.0));
         match (self.phase, self.motor_status(time_s)) {
             (Phase::Safe | Phase::PadIdle, _) => Some(self.pad_wait_remaining_s(time_s).unwrap_or(0.0)),
             // The vehicle is never SAFED before the wait is over.
             (Phase::Safed, _) | (Phase::Touchdown, MotorStatus::Burnt) => Some(0.0),
             (Phase::Touchdown, MotorStatus::Live | MotorStatus::PinIn) => {
-                until(self.entered_at_s + MISFIRE_WAIT_S)
+                left(self.entered_at_s, MISFIRE_WAIT_S)
             }
             (Phase::Touchdown, MotorStatus::Hot) => match self.motor {
-                Motor::BurntOut { at_s } => until(at_s + MOTOR_HOT_S),
+                Motor::BurntOut { at_s } => left(at_s, MOTOR_HOT_S),
                 _ => None,
             },
             _ => None,

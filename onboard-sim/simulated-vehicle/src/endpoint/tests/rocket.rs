@@ -107,7 +107,7 @@ fn its_standard_rates_fit_the_radio_signed_or_not() {
 
 /// Twenty commands a second that are refused with a text, all the way from apogee to the ground.
 #[test]
-fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals_cost_few_positions() {
+fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals_cost_no_position() {
     let mut airborne = Airborne::let_go("field");
     let mut ground = Encoder::new(GROUND);
     let mut sent = Vec::new();
@@ -140,8 +140,7 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
     let span_s = at_s[at_s.len() - 1] - at_s[0];
     assert!(span_s > flown_s - 0.3, "{span_s} of {flown_s} s");
     let hz = (at_s.len() - 1) as f64 / span_s;
-    // Without the refusals it is 8.0; with them 120 of 124 positions are sent. More than one in twenty would be missed.
-    assert!((7.6..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
+    assert!((7.8..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
 }
 
 #[test]
