@@ -361,7 +361,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
-/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word that the crew would have typed is swallowed.
+/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word
+/// that the crew would have typed is swallowed.
 fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
     let Some(why) = why_not else { return open(model, prompt, now) };
     if let Some(overrules) = overruled_by(model, &why, now) {

@@ -213,7 +213,8 @@ impl Ground {
         Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n))
     }
 
-    /// Legs that are pushed in further than their springs reach at the force that crushes them give way.
+    /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at the force that crushes them
+    /// give way.
     pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;

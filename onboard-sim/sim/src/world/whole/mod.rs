@@ -160,7 +160,7 @@ impl World {
     pub fn step(&mut self, actuators: &Actuators) {
         let time_s = self.time_s();
         self.command(actuators, time_s);
-        let time_steps = self.steps;
+        let wind_changes = self.steps.is_multiple_of(WIND_STEPS);
         self.steps += 1;
         if self.rest.is_some() {
             return;
@@ -172,7 +172,7 @@ impl World {
         }
         let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
         self.parachute.step(time_s, airspeed_m_s);
-        if time_steps.is_multiple_of(WIND_STEPS) {
+        if wind_changes {
             self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * WIND_STEPS as f64);
         }
         self.air.follow(self.state.position_m.z);
