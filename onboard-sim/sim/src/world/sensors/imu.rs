@@ -37,6 +37,8 @@ pub struct ImuParams {
     pub vibration_deg_s: f64,
     /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
     pub vibration_bias_mg: f64,
+    /// Gyro bias while the motor burns, each axis, deg/s: vibration that the sensor rectifies.
+    pub vibration_bias_deg_s: f64,
     /// Misalignment of the unit in the vehicle, about each axis, degrees.
     pub mounting_deg: f64,
     /// Distance of the unit from the centre of gravity, each axis, m.
@@ -58,6 +60,7 @@ impl Default for ImuParams {
             vibration_g: 0.0,
             vibration_deg_s: 0.0,
             vibration_bias_mg: 0.0,
+            vibration_bias_deg_s: 0.0,
             mounting_deg: 0.0,
             off_cg_m: 0.0,
         }
@@ -78,6 +81,7 @@ impl ImuParams {
             ("imu.vibration_g", self.vibration_g),
             ("imu.vibration_deg_s", self.vibration_deg_s),
             ("imu.vibration_bias_mg", self.vibration_bias_mg),
+            ("imu.vibration_bias_deg_s", self.vibration_bias_deg_s),
             ("imu.mounting_deg", self.mounting_deg),
             ("imu.off_cg_m", self.off_cg_m),
         ])
@@ -111,14 +115,19 @@ impl Sensors {
         let gyro_white = self.imu_noise.next3() * (imu.gyro_noise_deg_s_sqrt_hz.to_radians() * spread);
         let (shaken_rad_s, shaken_m_s2) =
             if burning { self.flaws.vibration(&self.params) } else { (Vector3::zeros(), Vector3::zeros()) };
+        let (rectified_rad_s, rectified_m_s2) = if burning {
+            (self.flaws.burning_bias_rad_s, self.flaws.burning_bias_m_s2)
+        } else {
+            (Vector3::zeros(), Vector3::zeros())
+        };
         let gyro = self.flaws.unit_from_body * mean(&mut self.rate_sum_rad_s)
+            + rectified_rad_s
             + shaken_rad_s
             + self.errors.gyro_bias_rad_s
             + faults.gyro_bias_step_rad_s
             + gyro_white;
 
         let force_white = self.imu_noise.next3() * (imu.accelerometer_noise_mg_sqrt_hz * milli_g * spread);
-        let rectified_m_s2 = if burning { self.flaws.burning_bias_m_s2 } else { Vector3::zeros() };
         let felt_m_s2 = self.flaws.unit_from_body * mean(&mut self.force_sum_m_s2);
         let force = felt_m_s2.component_mul(&self.accelerometer_scale)
             + self.flaws.cross_axis * felt_m_s2

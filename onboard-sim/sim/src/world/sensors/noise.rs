@@ -97,6 +97,8 @@ pub(super) struct Flaws {
     pub(super) unit_m: Vector3<f64>,
     /// Accelerometer bias while the motor burns, m/s^2.
     pub(super) burning_bias_m_s2: Vector3<f64>,
+    /// Gyro bias while the motor burns, rad/s.
+    pub(super) burning_bias_rad_s: Vector3<f64>,
     pub(super) gnss_tag_s: f64,
     pub(super) barometer_late_s: f64,
     pub(super) barometer_plume_m: f64,
@@ -147,6 +149,7 @@ impl Flaws {
                 Vector3::new(0.0, drawn.next(), drawn.next()) * lidar.beam_deg.to_radians(),
             ),
             grass_m: between(lidar.grass_m, drawn.unit()),
+            burning_bias_rad_s: drawn.next3() * imu.vibration_bias_deg_s.to_radians(),
             velocity_wander: [(); 3].map(|()| {
                 Wander::new(gnss.velocity_wander_m_s, gnss.velocity_wander_correlation_s, &mut satellites)
             }),

@@ -179,6 +179,28 @@ fn vibration_shakes_the_unit_while_the_motor_burns() {
 }
 
 #[test]
+fn the_burning_motor_shifts_the_gyros_bias_by_the_stated_size() {
+    let imu = ImuParams { vibration_bias_deg_s: 0.5, ..quiet().imu };
+    let params = SensorParams { imu, ..quiet() };
+    let n = 400;
+    let squares: f64 = (0..n)
+        .map(|seed| {
+            let mut sensors = Sensors::new(&params, seed, 0.0).unwrap();
+            let mut gyro = |burning: bool| {
+                one_frame(&mut sensors, &SensorTruth { burning, ..falling(10.0, 50.0) }).imu.gyro_rad_s
+            };
+            assert!(gyro(false).norm() < 1e-12);
+            let [lit, later] = [gyro(true), gyro(true)];
+            assert_eq!(lit, later, "it stays");
+            lit.norm_squared() / 3.0
+        })
+        .sum();
+    // Four standard errors of 1,200 numbers are 8 %.
+    let sigma_deg_s = libm::sqrt(squares / n as f64).to_degrees();
+    assert!((sigma_deg_s / 0.5 - 1.0).abs() < 0.08, "{sigma_deg_s}");
+}
+
+#[test]
 fn late_samples_wrong_tags_dust_dropouts_and_switches() {
     let quiet = quiet();
     let params = SensorParams {
