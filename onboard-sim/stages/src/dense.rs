@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::array::from_fn;
 use pulp::Simd;
 
-use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value, slope_before};
+use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
 /// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and `pulled_u`, and the other
 /// fields if derivatives are asked for.
@@ -115,26 +115,9 @@ impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
         before: &mut [[f64; NX]; NX],
         slope: &mut [f64; NX],
     ) -> Option<Feedback<NX, NU>> {
-        let ((own_curvature, own_slope), (_, input_slope)) = (stage.state_terms, stage.input_terms);
         after.add_times(&stage.defect, slope);
-        let (pulled_x, pulled_u) = self.pull(slope);
-        let Hessian { mut xx, ux, uu } = self.square(after, stage.share);
-        let factor = stage.factor(uu)?;
-        let reduced = factor.reduce(ux);
-        let scaled = factor.scale(&reduced);
-        let push = factor.scale(&factor.reduce(from_fn(|i| [input_slope[i] + pulled_u[i]])));
-        let offset = factor.restore(push).map(|[value]| value);
-        for (scaled, reduced) in scaled.iter().zip(&reduced) {
-            for i in 0..NX {
-                for j in 0..NX {
-                    xx[i][j] -= scaled[i] * reduced[j];
-                }
-            }
-        }
-        own_curvature.add_to(&mut xx);
-        *before = xx;
-        *slope = slope_before(own_slope, &pulled_x, &reduced, &push);
-        Some(Feedback { gain: factor.restore(scaled), offset, reduced, factor })
+        let pulled = self.pull(slope);
+        stage.without_inputs(self.square(after, stage.share), &pulled, before, slope)
     }
 
     #[inline(always)]
@@ -218,7 +201,8 @@ impl<const N: usize> Factor<N> {
     pub(crate) fn reduce<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
         for i in 1..N {
             for j in 0..i {
-                rows[i] = from_fn(|w| rows[i][w] - self.lower[i][j] * rows[j][w]);
+                let row = rows[j];
+                add_multiple(&mut rows[i], -self.lower[i][j], &row);
             }
         }
         rows
@@ -227,7 +211,13 @@ impl<const N: usize> Factor<N> {
     /// The inverse of `D`, times `rows`.
     #[inline(always)]
     pub(crate) fn scale<const W: usize>(&self, rows: &[[f64; W]; N]) -> [[f64; W]; N] {
-        from_fn(|i| rows[i].map(|value| value * self.inverse[i]))
+        let mut scaled = *rows;
+        for (row, inverse) in scaled.iter_mut().zip(&self.inverse) {
+            for entry in row {
+                *entry *= inverse;
+            }
+        }
+        scaled
     }
 
     /// The inverse of `L'`, times `rows`.
@@ -235,7 +225,8 @@ impl<const N: usize> Factor<N> {
     pub(crate) fn restore<const W: usize>(&self, mut rows: [[f64; W]; N]) -> [[f64; W]; N] {
         for i in (0..N).rev() {
             for j in i + 1..N {
-                rows[i] = from_fn(|w| rows[i][w] - self.lower[j][i] * rows[j][w]);
+                let row = rows[j];
+                add_multiple(&mut rows[i], -self.lower[j][i], &row);
             }
         }
         rows

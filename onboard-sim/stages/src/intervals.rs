@@ -106,6 +106,37 @@ impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage
         own.add_to(&mut by_inputs);
         Factor::of(by_inputs, &from_fn(|i| LEAST_CURVATURE * (1.0 + own.diagonal(i))))
     }
+
+    /// Eliminates the inputs: from the second derivative by state and inputs that comes through the node after the interval, and
+    /// the slopes that do, to the value function of the node before it. `None` as in [`Interval::eliminate`].
+    #[inline(always)]
+    pub fn without_inputs(
+        &self,
+        Hessian { mut xx, ux, uu }: Hessian<NX, NU>,
+        (pulled_x, pulled_u): &([f64; NX], [f64; NU]),
+        before: &mut [[f64; NX]; NX],
+        slope: &mut [f64; NX],
+    ) -> Option<Feedback<NX, NU>> {
+        let ((own_curvature, own_slope), (_, input_slope)) = (self.state_terms, self.input_terms);
+        let factor = self.factor(uu)?;
+        let reduced = factor.reduce(ux);
+        let scaled = factor.scale(&reduced);
+        let push = factor.scale(&factor.reduce(from_fn(|i| [input_slope[i] + pulled_u[i]])));
+        let offset = factor.restore(push).map(|[value]| value);
+        for i in 0..NX {
+            let mut row = xx[i];
+            for (scaled, reduced) in scaled.iter().zip(&reduced) {
+                for j in 0..NX {
+                    row[j] -= scaled[i] * reduced[j];
+                }
+            }
+            xx[i] = row;
+        }
+        own_curvature.add_to(&mut xx);
+        *before = xx;
+        *slope = slope_before(own_slope, pulled_x, &reduced, &push);
+        Some(Feedback { gain: factor.restore(scaled), offset, reduced, factor })
+    }
 }
 
 /// The feedback of the inputs at a stage: `du = -(offset + gain dx)`.

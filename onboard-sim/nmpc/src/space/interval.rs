@@ -4,11 +4,9 @@
 //! of the interval, `p + h p'/2 + h^2 p''/6`, and the products of rates are those of the mean rates, `p' + h p''/2`, both
 //! with the gimbal's part of `p''`. The drag sees the velocity that an upright thrust would give in the middle; the gain
 //! sideways, left out there, makes 0.2 m/s in a landing of 3.8 s, which the next plan sees.
-//!
 
-use stages::{Dense, Hessian};
-
-use super::{Drag, INPUTS, Nose, Push, STATES, SpaceProblem, State, Vector, dot, plus, times};
+use super::stage::{ACCELERATIONS, Bend, DIRECTIONS, SpaceInterval};
+use super::{Drag, INPUTS, Nose, Push, SpaceProblem, State, Vector, dot, plus, times};
 
 /// What an interval is computed from: nose, rates and air at their means.
 struct Middle<'a> {
@@ -108,55 +106,57 @@ impl<'a> Middle<'a> {
         ]
     }
 
-    /// Writes the derivatives of the end by state and input.
-    fn slopes(&self, u: &[f64; INPUTS], a: &mut [[f64; STATES]; STATES], b: &mut [[f64; INPUTS]; STATES]) {
+    /// The derivatives of the accelerations.
+    fn slopes(&self, u: &[f64; INPUTS]) -> [[f64; DIRECTIONS]; ACCELERATIONS] {
         let Self { push, nose, air, drag, lean_by_gimbal, rate_by_gimbal, step_s: h, .. } = self;
         let Nose { sin_p, cos_p, n, e_p, e_r, m } = nose;
         let t = push.thrust_m_s2;
-        let by_v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-            .map(|unit| times(push.per_kg, &air.by_velocity(drag, n, &unit)));
+        let by_v = air.by_velocity(drag, n);
         let thrust_p = plus(e_p, u[0], n);
         let thrust_r = plus(&times(cos_p + u[0] * sin_p, e_r), -u[1], m);
         let by_p = plus(&times(t, &thrust_p), push.per_kg, &air.by_nose(drag, n, e_p));
         let by_r = plus(&times(t, &thrust_r), push.per_kg, &air.by_nose(drag, n, &times(*cos_p, e_r)));
         let by_fins = times(self.by_fins() * air.speed, &air.v);
-        let half = 0.5 * h * h;
-        *a = [[0.0; STATES]; STATES];
-        *b = [[0.0; INPUTS]; STATES];
-        for i in 0..3 {
-            for (row, share, unit) in [(i, half, *h), (3 + i, *h, 1.0)] {
-                for (entry, column) in a[row][3..6].iter_mut().zip(&by_v) {
-                    *entry = share * column[i];
-                }
-                a[row][3 + i] += unit;
-                a[row][6] = share * by_p[i];
-                a[row][7] = share * by_r[i];
-                a[row][8] = share * 0.5 * h * by_p[i];
-                a[row][9] = share * 0.5 * h * by_r[i];
-                b[row] = [
-                    share * (lean_by_gimbal * by_p[i] - t * e_p[i]),
-                    share * (lean_by_gimbal * by_r[i] - t * e_r[i]),
-                    share * by_fins[i],
-                ];
-            }
-            a[i][i] = 1.0;
-        }
+        let of_place = |i: usize| {
+            [
+                push.per_kg * by_v[i][0],
+                push.per_kg * by_v[i][1],
+                push.per_kg * by_v[i][2],
+                by_p[i],
+                by_r[i],
+                0.5 * h * by_p[i],
+                0.5 * h * by_r[i],
+                lean_by_gimbal * by_p[i] - t * e_p[i],
+                lean_by_gimbal * by_r[i] - t * e_r[i],
+                by_fins[i],
+            ]
+        };
         let by = self.turning(u);
-        for (row_p, share, unit) in [(6, half, *h), (8, *h, 1.0)] {
-            let row_r = row_p + 1;
-            a[row_p][6] = share * by.p_by_p;
-            a[row_p][8] = share * 0.5 * h * by.p_by_p + unit;
-            a[row_p][9] = share * by.p_by_r_rate;
-            a[row_r][6] = share * by.r_by_p;
-            a[row_r][8] = share * (by.r_by_p_rate + 0.5 * h * by.r_by_p);
-            a[row_r][9] = share * by.r_by_r_rate + unit;
-            b[row_p][0] = share * (push.turning_rad_s2 + lean_by_gimbal * by.p_by_p);
-            b[row_p][1] = share * rate_by_gimbal * by.p_by_r_rate;
-            b[row_r][0] = share * (lean_by_gimbal * by.r_by_p + rate_by_gimbal * by.r_by_p_rate);
-            b[row_r][1] = share * (push.turning_rad_s2 / cos_p + rate_by_gimbal * by.r_by_r_rate);
-        }
-        a[6][6] += 1.0;
-        a[7][7] += 1.0;
+        let of_p = [
+            0.0,
+            0.0,
+            0.0,
+            by.p_by_p,
+            0.0,
+            0.5 * h * by.p_by_p,
+            by.p_by_r_rate,
+            push.turning_rad_s2 + lean_by_gimbal * by.p_by_p,
+            rate_by_gimbal * by.p_by_r_rate,
+            0.0,
+        ];
+        let of_r = [
+            0.0,
+            0.0,
+            0.0,
+            by.r_by_p,
+            0.0,
+            by.r_by_p_rate + 0.5 * h * by.r_by_p,
+            by.r_by_r_rate,
+            lean_by_gimbal * by.r_by_p + rate_by_gimbal * by.r_by_p_rate,
+            push.turning_rad_s2 / cos_p + rate_by_gimbal * by.r_by_r_rate,
+            0.0,
+        ];
+        [of_place(0), of_place(1), of_place(2), of_p, of_r]
     }
 
     /// Acceleration by the fins' share, over minus the product of speed and velocity, 1/m.
@@ -164,36 +164,36 @@ impl<'a> Middle<'a> {
         -self.problem.drag.fins * self.push.per_kg
     }
 
-    /// Writes the second derivatives of `lambda' F`.
-    fn curvature(&self, u: &[f64; INPUTS], lambda: &State, out: &mut Hessian<STATES, INPUTS>) {
+    /// The second derivatives of `lambda' F`.
+    fn bend(&self, u: &[f64; INPUTS], lambda: &State) -> Bend {
+        const LEANS: usize = 3;
+        const FINS: usize = DIRECTIONS - 1;
         let h = self.step_s;
         let half = 0.5 * h * h;
         let l = plus(&times(h, &[lambda[3], lambda[4], lambda[5]]), half, &[lambda[0], lambda[1], lambda[2]]);
         let l_leans = [h * lambda[8] + half * lambda[6], h * lambda[9] + half * lambda[7]];
         let by_air = air_curvature(&self.drag, &self.air, &self.nose, &l, self.push.per_kg);
         let c = self.outwards(self.by_means(u, &l, l_leans, &by_air));
-        for (row, from) in out.xx[6..].iter_mut().zip(&c) {
-            row[6..].copy_from_slice(&from[..4]);
-        }
-        for (row, from) in out.ux.iter_mut().zip(&c[4..]) {
-            row[6..].copy_from_slice(&from[..4]);
-        }
-        for (row, from) in out.uu.iter_mut().zip(&c[4..]) {
-            row[..2].copy_from_slice(&from[4..]);
+        let mut bend = [[0.0; DIRECTIONS]; DIRECTIONS];
+        for (row, from) in bend[LEANS..FINS].iter_mut().zip(&c) {
+            row[LEANS..FINS].copy_from_slice(from);
         }
         let l_v = dot(&l, &self.air.v) / self.air.speed;
         for i in 0..3 {
-            out.xx[3 + i][3..6].copy_from_slice(&by_air[i][..3]);
-            out.ux[2][3 + i] = self.by_fins() * (self.air.speed * l[i] + l_v * self.air.v[i]);
+            bend[i][..3].copy_from_slice(&by_air[i][..3]);
+            let by_fins = self.by_fins() * (self.air.speed * l[i] + l_v * self.air.v[i]);
+            let mut crossed = |direction: usize, value: f64| {
+                (bend[i][direction], bend[direction][i]) = (value, value);
+            };
+            crossed(FINS, by_fins);
             for lean in 0..2 {
                 let value = by_air[i][3 + lean];
-                for (column, value) in [(6 + lean, value), (8 + lean, 0.5 * h * value)] {
-                    out.xx[3 + i][column] = value;
-                    out.xx[column][3 + i] = value;
-                }
-                out.ux[lean][3 + i] = self.lean_by_gimbal * value;
+                crossed(LEANS + lean, value);
+                crossed(LEANS + 2 + lean, 0.5 * h * value);
+                crossed(LEANS + 4 + lean, self.lean_by_gimbal * value);
             }
         }
+        bend
     }
 
     /// Second derivatives by (mean p, mean r, mean rates, gimbal).
@@ -268,26 +268,13 @@ pub(super) fn evaluated(
     x: &State,
     u: &[f64; INPUTS],
     lambda: &State,
-    out: &mut Dense<STATES, INPUTS>,
+    out: &mut SpaceInterval,
 ) {
     let middle = Middle::of(problem, k, x, u);
+    out.step_s = problem.step_s;
     out.end = middle.end(x, u);
-    middle.slopes(u, &mut out.a, &mut out.b);
-    middle.curvature(u, lambda, &mut out.curvature);
-}
-
-/// `A' lambda` and `B' lambda`, with `A` and `B` as they were last evaluated.
-pub(super) fn pulled(interval: &mut Dense<STATES, INPUTS>, lambda: &State) {
-    let (mut by_x, mut by_u) = ([0.0; STATES], [0.0; INPUTS]);
-    for (i, lambda) in lambda.iter().enumerate() {
-        for (sum, entry) in by_x.iter_mut().zip(&interval.a[i]) {
-            *sum += lambda * entry;
-        }
-        for (sum, entry) in by_u.iter_mut().zip(&interval.b[i]) {
-            *sum += lambda * entry;
-        }
-    }
-    (interval.pulled_x, interval.pulled_u) = (by_x, by_u);
+    out.by = middle.slopes(u);
+    out.bend = middle.bend(u, lambda);
 }
 
 // The air's force and its derivatives.
@@ -326,30 +313,30 @@ impl Air {
         Self { force, v, speed, along, across, across_speed }
     }
 
-    /// Change of the force by a change of the velocity.
-    pub(super) fn by_velocity(&self, drag: &Drag, n: &Vector, dv: &Vector) -> Vector {
-        let d_speed = dot(&self.v, dv) / self.speed;
-        let d_along = dot(dv, n);
-        let d_across = plus(dv, -d_along, n);
-        let even = plus(&times(self.speed, dv), d_speed, &self.v);
-        let axial = self.along * d_speed + self.speed * d_along;
-        plus(&plus(&times(-drag.fins, &even), -drag.axial * axial, n), -drag.crossflow, &self.bent(&d_across))
+    /// Derivative of the force (rows) by the velocity.
+    fn by_velocity(&self, drag: &Drag, n: &Vector) -> [Vector; 3] {
+        let Self { v, speed, along, across, across_speed, .. } = self;
+        let even = -(drag.fins * speed + drag.crossflow * across_speed);
+        let by_n = drag.crossflow * across_speed - drag.axial * speed;
+        let mut by = [[0.0; 3]; 3];
+        for i in 0..3 {
+            let by_v = -(drag.fins * v[i] + drag.axial * along * n[i]) / speed;
+            let by_across = -drag.crossflow * across[i] / across_speed;
+            for j in 0..3 {
+                by[i][j] = by_v * v[j] + by_n * n[i] * n[j] + by_across * across[j];
+            }
+            by[i][i] += even;
+        }
+        by
     }
 
     /// Change of the force by a change of the nose.
-    pub(super) fn by_nose(&self, drag: &Drag, n: &Vector, dn: &Vector) -> Vector {
+    fn by_nose(&self, drag: &Drag, n: &Vector, dn: &Vector) -> Vector {
         let d_along = dot(&self.v, dn);
         let d_part = plus(&times(d_along, n), self.along, dn);
-        plus(&times(-drag.axial * self.speed, &d_part), drag.crossflow, &self.bent(&d_part))
-    }
-
-    /// Change of `|across| across`.
-    fn bent(&self, d_across: &Vector) -> Vector {
-        plus(
-            &times(self.across_speed, d_across),
-            dot(&self.across, d_across) / self.across_speed,
-            &self.across,
-        )
+        let even = drag.crossflow * self.across_speed - drag.axial * self.speed;
+        let bent = drag.crossflow * dot(&self.across, &d_part) / self.across_speed;
+        plus(&times(even, &d_part), bent, &self.across)
     }
 }
 
@@ -400,16 +387,22 @@ pub(super) fn air_curvature(drag: &Drag, air: &Air, nose: &Nose, l: &Vector, fac
         sum[i][3] += first[1] * nose.e_p[i];
         sum[i][4] += first[1] * n_r[i];
     }
-    let turned = plus(&times(first[1], v), first[2], l);
-    sum[3][3] -= dot(&turned, &nose.n);
-    sum[3][4] += dot(&turned, &n_pr);
-    sum[4][4] += dot(&turned, &n_rr);
+    let along = plus(&times(first[1], v), first[2], l);
+    sum[3][3] -= dot(&along, &nose.n);
+    sum[3][4] += dot(&along, &n_pr);
+    sum[4][4] += dot(&along, &n_rr);
+    let mut turned = [[0.0; 5]; 4];
+    for (sums, row) in turned.iter_mut().zip(&second) {
+        for (value, slopes) in row.iter().zip(&slopes) {
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                *sum += value * slope;
+            }
+        }
+    }
     for i in 0..5 {
         for j in i..5 {
-            for (one, row) in second.iter().enumerate() {
-                for (other, value) in row.iter().enumerate() {
-                    sum[i][j] += value * slopes[one][i] * slopes[other][j];
-                }
+            for (slopes, turned) in slopes.iter().zip(&turned) {
+                sum[i][j] += slopes[i] * turned[j];
             }
             sum[i][j] *= -factor;
             sum[j][i] = sum[i][j];

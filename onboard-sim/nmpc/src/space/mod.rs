@@ -18,15 +18,17 @@
 //! small; their second order in the thrust is left out (0.3 % at 4.5 degrees).
 
 mod interval;
+mod stage;
 #[cfg(test)]
 mod tests;
 
 use alloc::vec::Vec;
 use core::array::from_fn;
 use core::f64::consts::TAU;
-use stages::{Condition, DenseIntervals, InputRange, Model, Settings};
+use stages::{Condition, InputRange, Interval as _, Model, Settings};
 pub use stages::{Outcome, Start, Status};
 
+use self::stage::SpaceIntervals;
 use crate::problem::SolverLimits;
 
 /// Number of states and inputs.
@@ -232,7 +234,7 @@ impl SpaceProblem {
 }
 
 impl Model<STATES, INPUTS> for SpaceProblem {
-    type Intervals = DenseIntervals<STATES, INPUTS>;
+    type Intervals = SpaceIntervals;
     type StateCurvature = State;
     type InputCurvature = [f64; INPUTS];
 
@@ -318,7 +320,7 @@ impl Model<STATES, INPUTS> for SpaceProblem {
             } else {
                 into.end = interval::end(self, k, state, input);
             }
-            interval::pulled(into, costate);
+            into.pulled = (&*into).pull(costate);
         }
     }
 

@@ -1,7 +1,10 @@
+use std::array::from_fn;
 use std::f64::consts::TAU;
 
-use stages::{Dense, Hessian, Status};
+use pulp::Scalar;
+use stages::{DenseIntervals, Feedback, Hessian, Interval as _, Intervals as _, Stage, Status};
 
+use super::stage::SpaceInterval;
 use super::{Drag, End, INPUTS, Push, STATES, SpaceProblem, SpaceWorkspace, Start, State, Weights, interval};
 use crate::paper;
 use crate::problem::SolverLimits;
@@ -174,66 +177,97 @@ fn the_rest_of_a_plan_is_optimal_and_a_disturbed_one_soon_is() {
     assert!(3 * kicked.iterations < cold.iterations, "{} after {}", kicked.iterations, cold.iterations);
 }
 
+/// Some interval of a landing, away from rest, at a state and an input one after the other.
+fn evaluated(model: &SpaceProblem, both: &[f64; STATES + INPUTS]) -> SpaceInterval {
+    let costate = [1.0, -2.0, 3.0, 0.5, 1.5, -2.5, 0.7, -0.6, 0.8, 1.2];
+    let (state, input) = halves(both);
+    let mut out = SpaceInterval::ZERO;
+    interval::evaluated(model, 3, &state, &input, &costate, &mut out);
+    out.pulled = (&out).pull(&costate);
+    out
+}
+
+const SOMEWHERE: [f64; STATES + INPUTS] =
+    [0.3, 0.2, 9.0, 2.0, -1.5, -6.0, 0.5, -0.4, 0.9, -1.1, 0.03, -0.05, 0.4];
+
+fn halves(both: &[f64; STATES + INPUTS]) -> (State, [f64; INPUTS]) {
+    let (state, input) = both.split_at(STATES);
+    (state.try_into().unwrap(), input.try_into().unwrap())
+}
+
+fn unit(j: usize) -> (State, [f64; INPUTS]) {
+    let mut unit = [0.0; STATES + INPUTS];
+    unit[j] = 1.0;
+    halves(&unit)
+}
+
 #[test]
 fn derivatives_are_those_of_differences() {
     const CHANGE: f64 = 1e-6;
     let model = problem(1.6);
-    let state = [0.3, 0.2, 9.0, 2.0, -1.5, -6.0, 0.5, -0.4, 0.9, -1.1];
-    let input = [0.03, -0.05, 0.4];
-    let costate = [1.0, -2.0, 3.0, 0.5, 1.5, -2.5, 0.7, -0.6, 0.8, 1.2];
-    let at = |both: &[f64; STATES + INPUTS]| {
-        let (state, input) = both.split_at(STATES);
-        let mut out = Dense {
-            end: [0.0; STATES],
-            pulled_x: [0.0; STATES],
-            pulled_u: [0.0; INPUTS],
-            a: [[0.0; STATES]; STATES],
-            b: [[0.0; INPUTS]; STATES],
-            curvature: Hessian {
-                xx: [[0.0; STATES]; STATES],
-                ux: [[0.0; STATES]; INPUTS],
-                uu: [[0.0; INPUTS]; INPUTS],
-            },
-        };
-        interval::evaluated(
-            &model,
-            3,
-            state.try_into().unwrap(),
-            input.try_into().unwrap(),
-            &costate,
-            &mut out,
-        );
-        interval::pulled(&mut out, &costate);
-        out
-    };
-    let mut both = [0.0; STATES + INPUTS];
-    both[..STATES].copy_from_slice(&state);
-    both[STATES..].copy_from_slice(&input);
-    let exact = at(&both);
+    let exact = evaluated(&model, &SOMEWHERE);
     for j in 0..STATES + INPUTS {
         let moved = |change: f64| {
-            let mut moved = both;
+            let mut moved = SOMEWHERE;
             moved[j] += change;
-            at(&moved)
+            evaluated(&model, &moved)
         };
         let (ahead, behind) = (moved(CHANGE), moved(-CHANGE));
         let slope = |ahead: f64, behind: f64| (ahead - behind) / (2.0 * CHANGE);
-        for i in 0..STATES {
-            let own = if j < STATES { exact.a[i][j] } else { exact.b[i][j - STATES] };
+        let (dx, du) = unit(j);
+        for (i, own) in (&exact).push(&dx, &du).into_iter().enumerate() {
             let found = slope(ahead.end[i], behind.end[i]);
             assert!((found - own).abs() < 1e-7, "{i} by {j}: {own} for {found}");
         }
-        let gradient = |at: &Dense<STATES, INPUTS>| [&at.pulled_x[..], &at.pulled_u[..]].concat();
-        for (i, (ahead, behind)) in gradient(&ahead).into_iter().zip(gradient(&behind)).enumerate() {
-            let c = &exact.curvature;
-            let own = match (i < STATES, j < STATES) {
-                (true, true) => c.xx[i][j],
-                (false, true) => c.ux[i - STATES][j],
-                (true, false) => c.ux[j - STATES][i],
-                (false, false) => c.uu[i - STATES][j - STATES],
-            };
-            let found = slope(ahead, behind);
+        let all = |(by_state, by_input): (State, [f64; INPUTS])| [&by_state[..], &by_input[..]].concat();
+        let bent = all((&exact).curve(1.0, &dx, &du));
+        for (i, (ahead, behind)) in all(ahead.pulled).into_iter().zip(all(behind.pulled)).enumerate() {
+            let (own, found) = (bent[i], slope(ahead, behind));
             assert!((found - own).abs() < 1e-6, "curvature {i} by {j}: {own} for {found}");
         }
+    }
+}
+
+/// The sweep's elimination, and that of the whole matrices which the interval stands for.
+#[test]
+fn an_interval_is_eliminated_like_its_whole_matrices() {
+    let interval = evaluated(&problem(1.6), &SOMEWHERE);
+    let mut whole = DenseIntervals::default();
+    whole.resize(1);
+    let dense = &mut whole.0[0];
+    for j in 0..STATES + INPUTS {
+        let (dx, du) = unit(j);
+        let (moved, (bent_x, bent_u)) = ((&interval).push(&dx, &du), (&interval).curve(1.0, &dx, &du));
+        for i in 0..STATES {
+            if j < STATES {
+                (dense.a[i][j], dense.curvature.xx[i][j]) = (moved[i], bent_x[i]);
+            } else {
+                dense.b[i][j - STATES] = moved[i];
+            }
+        }
+        for (i, bent) in bent_u.into_iter().enumerate() {
+            let Hessian { ux, uu, .. } = &mut dense.curvature;
+            *if j < STATES { &mut ux[i][j] } else { &mut uu[i][j - STATES] } = bent;
+        }
+    }
+    // Any numbers.
+    let number = |i: usize| libm::sin(1.0 + 7.0 * i as f64);
+    let value: [State; STATES] = from_fn(|i| from_fn(|j| number(i + j) + if i == j { 20.0 } else { 0.0 }));
+    let stage = Stage {
+        defect: from_fn(number),
+        share: 0.5,
+        state_terms: (&[1.0; STATES], &from_fn(|i| number(10 + i))),
+        input_terms: (&[2.0; INPUTS], &from_fn(|i| number(20 + i))),
+    };
+    let slope = from_fn(|i| number(30 + i));
+    let (mut one, mut other) = ((value, slope), (value, slope));
+    let found = (&interval).eliminate(Scalar, &stage, &value, &mut one.0, &mut one.1).unwrap();
+    let expected = (&whole.0[0]).eliminate(Scalar, &stage, &value, &mut other.0, &mut other.1).unwrap();
+    let all = |(value, slope): ([State; STATES], State), feedback: Feedback<STATES, INPUTS>| {
+        let Feedback { gain, offset, .. } = feedback;
+        [value.as_flattened(), &slope[..], gain.as_flattened(), &offset[..]].concat()
+    };
+    for (found, expected) in all(one, found).into_iter().zip(all(other, expected)) {
+        assert!((found - expected).abs() < 1e-9, "{found} for {expected}");
     }
 }
