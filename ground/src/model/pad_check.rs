@@ -130,6 +130,7 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, f64, usize) {
     let (unit, factor, decimals) = match value.item {
         item if (item as u32) < 18 && item as u32 % 3 == 2 => ("ms", 1e3, 0),
         item if (item as u32) < 18 => ("deg", DEG, 1),
+        I::TD_PAD_CHECK_ITEM_RAIL_LEAN => ("deg", DEG, 1),
         I::TD_PAD_CHECK_ITEM_GYRO_BIAS | I::TD_PAD_CHECK_ITEM_GYRO_NOISE => ("deg/s", DEG, 2),
         I::TD_PAD_CHECK_ITEM_GRAVITY => ("m/s2", 1.0, 2),
         I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => ("m/s2", 1.0, 3),

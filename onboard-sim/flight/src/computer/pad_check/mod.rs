@@ -152,6 +152,7 @@ impl PadCheck {
                 }
                 let hangs = mission.start.at == StartPoint::Drone;
                 self.findings.extend(still.findings(mission, arming, hangs));
+                self.findings.extend(still.lean_from_the_rail(mission));
             }
         }
         self.findings.extend(findings_of_switches(&seen.switches, mission, arming));
@@ -235,6 +236,8 @@ pub enum Item {
     GnssSpeed,
     /// The last range; on a pad it may be too near to be measured.
     LidarRange,
+    /// On a rail: angle between the vertical as the inertial unit feels it and as the mission's rail has it.
+    RailLean,
     IgniterContinuity,
     BoosterWire,
     PinOut,
@@ -259,6 +262,7 @@ impl Item {
             Self::GnssFixes => 37,
             Self::GnssSpeed => 38,
             Self::LidarRange => 39,
+            Self::RailLean => 40,
             Self::IgniterContinuity => 48,
             Self::BoosterWire => 49,
             Self::PinOut => 50,
@@ -286,6 +290,7 @@ impl Item {
             Self::GnssFixes => "GNSS fixes".into(),
             Self::GnssSpeed => "GNSS speed".into(),
             Self::LidarRange => "lidar".into(),
+            Self::RailLean => "lean from the rail".into(),
             Self::IgniterContinuity => "igniter continuity".into(),
             Self::BoosterWire => "booster wire".into(),
             Self::PinOut => "pin".into(),

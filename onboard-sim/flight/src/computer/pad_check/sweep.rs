@@ -12,7 +12,7 @@ use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{FELT_AT_REST_M_S2, STILL_RAD_S};
 use crate::vehicle::airframe::{Airframe, Servo};
-use crate::vehicle::mission::{ArmingLimits, Mission};
+use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 
 /// A surface stays at an end for this long after it should have arrived, s: a servo at half its rate arrives late, and
 /// yet is seen to arrive. mk2's longest way takes 0.3 s.
@@ -205,6 +205,11 @@ const SPREAD_MOST: f64 = 2.0;
 /// One fix a second: without one in its second the pad's watch knows no speed, and arming is refused.
 const FIXES_LEAST: f64 = STILL_FRAMES as f64 * FRAME_S;
 
+/// A rail is levelled with a bubble, degrees, about each axis.
+const RAIL_LEVEL_DEG: f64 = 1.0;
+/// A rail and a mount as they should be pass in 99 of 100 checks (Rayleigh: 1 - exp(-3^2 / 2)).
+const LEAN_SIGMAS: f64 = 3.0;
+
 /// Mean and sum of squared differences from it (Welford 1962), of one number.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 struct Spread {
@@ -314,5 +319,17 @@ impl Still {
             Item::GnssFixes => found,
             item => Finding::only_shown(item, found.value),
         })
+    }
+
+    /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter doubts its attitude by the
+    /// mount's stated misalignment, and no sensor shows it in flight.
+    pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<Finding> {
+        let launch = mission.launch.as_ref().filter(|_| mission.start.at == StartPoint::Pad)?;
+        let rail = launch.standing(mission.airframe.mass.loaded_cg_station_m).world_from_body;
+        let up = rail.inverse_transform_vector(&Vector3::z());
+        let felt = Vector3::from(self.force_m_s2.map(|spread| spread.mean));
+        let lean_rad = libm::atan2(felt.cross(&up).norm(), felt.dot(&up));
+        let stated_rad = libm::hypot(RAIL_LEVEL_DEG, mission.estimator.mounting_deg).to_radians();
+        Some(Finding::at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
     }
 }

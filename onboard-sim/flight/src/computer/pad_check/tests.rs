@@ -131,7 +131,7 @@ fn failing(check: &PadCheck) -> Vec<Item> {
 fn a_sound_vehicle_passes_and_every_item_has_its_value() {
     let check = checked(NOTHING_WRONG, 1.0, SWITCHES, true);
     assert_eq!((check.state(), check.run(), check.progress_percent()), (CheckState::Passed, 1, 100));
-    assert_eq!(check.findings().len(), 3 * SURFACES + 8 + 6);
+    assert_eq!(check.findings().len(), 3 * SURFACES + 9 + 6);
     for found in check.findings() {
         let shown = matches!(found.item, Item::LidarRange);
         assert!(shown || found.value.is_finite(), "{found:?}");
@@ -149,7 +149,7 @@ fn a_sound_vehicle_passes_and_every_item_has_its_value() {
 fn without_motion_no_surface_is_told_to_move() {
     let check = checked(NOTHING_WRONG, 1.0, SWITCHES, false);
     assert_eq!(check.state(), CheckState::Passed);
-    assert_eq!(check.findings().len(), 8 + 6);
+    assert_eq!(check.findings().len(), 9 + 6);
 }
 
 #[test]
@@ -177,7 +177,34 @@ fn each_sensor_and_switch_is_judged() {
     assert_eq!(still(1.0, PadSwitches { log_running: false, ..SWITCHES }), [Item::LogRunning]);
     assert_eq!(still(1.0, PadSwitches { log_space_bytes: 1 << 20, ..SWITCHES }), [Item::LogSpace]);
     assert_eq!(still(1.0, PadSwitches { pin_out: true, ..SWITCHES }), [], "the pin is only shown");
-    assert_eq!(still(f64::NAN, SWITCHES).len(), 6, "no number passes");
+    assert_eq!(still(f64::NAN, SWITCHES).len(), 7, "no number passes");
+}
+
+/// A mount that is 4 degrees askew looks like a rail that leans by 4 degrees: the crew looks at both.
+#[test]
+fn a_mount_that_leans_further_than_stated_fails() {
+    let lean = |deg: f64, mounting_deg: f64, at: StartPoint| {
+        let mut mission = mission();
+        mission.estimator.mounting_deg = mounting_deg;
+        mission.start.at = at;
+        let (sin, cos) = libm::sincos(deg.to_radians());
+        let mut still = Still::default();
+        for frame in 0..sweep::STILL_FRAMES {
+            let mut measured = at_rest(frame, 1.0);
+            measured.imu.specific_force_m_s2 = Vector3::new(9.8 * cos, 0.0, 9.8 * sin);
+            still.take(&measured);
+        }
+        still.lean_from_the_rail(&mission)
+    };
+    let on_a_rail = |deg, mounting_deg| lean(deg, mounting_deg, StartPoint::Pad).unwrap();
+    let found = on_a_rail(2.0, 0.3);
+    assert!((found.value.to_degrees() - 2.0).abs() < 1e-9, "{found:?}");
+    // Three times the root of 1 and 0.09.
+    assert!((found.most.to_degrees() - 3.132).abs() < 1e-3, "{found:?}");
+    assert_eq!(found.verdict, Verdict::Ok);
+    assert_eq!(on_a_rail(4.0, 0.3).verdict, Verdict::NotOk);
+    assert_eq!(on_a_rail(4.0, 1.0).verdict, Verdict::Ok, "a mount that is stated as askew");
+    assert!(lean(4.0, 0.3, StartPoint::Apogee).is_none(), "no rail");
 }
 
 #[test]
