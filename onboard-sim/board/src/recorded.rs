@@ -1,5 +1,6 @@
 //! Flies the frames that arrive, and answers each with what this machine decided.
 
+use alloc::boxed::Box;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
@@ -53,7 +54,8 @@ pub enum FlyError {
 pub struct Board {
     kind: VehicleKind,
     reader: Reader,
-    flying: Option<Flying>,
+    /// Apart: a large thing that is moved stands on the stack twice.
+    flying: Option<Box<Flying>>,
     frames: u64,
 }
 
@@ -100,8 +102,8 @@ impl Board {
         while let Some(mut frame) = self.reader.next_record::<Frame>() {
             let begin = frame.begin.take();
             if let Some(begin) = begin.filter(|begin| self.flight() != Some(begin.flight)) {
-                self.flying =
-                    Some(Flying::power_up(self.kind, &begin, watch.saved()).map_err(FlyError::Begin)?);
+                let flying = Flying::power_up(self.kind, &begin, watch.saved());
+                self.flying = Some(Box::new(flying.map_err(FlyError::Begin)?));
                 watch.is_set_up();
             }
             let flying = self.flying.as_mut().ok_or(FlyError::Empty)?;

@@ -38,14 +38,13 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Iterate<M, 
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
-    /// Makes room for a problem; allocates only if no earlier problem was this long.
+    /// Makes room for the point, not for its intervals; allocates only if no earlier problem was this long.
     pub(crate) fn resize(&mut self, intervals: usize, conditions: usize) {
         self.states.resize(intervals + 1, [0.0; NX]);
         self.inputs.resize(intervals, [0.0; NU]);
         self.costates.resize(intervals + 1, [0.0; NX]);
         self.limits.resize(intervals, [Limits::default(); NU]);
         self.elastics.resize(conditions, Elastic::default());
-        self.intervals.resize(intervals);
     }
 
     /// Moves to the point of another iterate of the same size. The intervals there are not evaluated yet.

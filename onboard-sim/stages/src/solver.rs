@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::barrier::LAST_BARRIER;
+use crate::intervals::Intervals as _;
 use crate::iterate::{Iterate, Residual};
 use crate::model::{Condition, Model};
 use crate::newton::{Filter, Fractions, Measures, Newton};
@@ -63,7 +64,8 @@ pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) conditions: Vec<Condition>,
     pub(crate) current: Iterate<M, NX, NU>,
     pub(crate) trial: Iterate<M, NX, NU>,
-    other: Iterate<M, NX, NU>,
+    /// The best result of a cold solve so far; its intervals have no room.
+    best: Iterate<M, NX, NU>,
     pub(crate) newton: Newton<M, NX, NU>,
     pub(crate) sides: Sides<NU>,
     filter: Filter,
@@ -77,7 +79,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Workspace<M
             conditions: Vec::new(),
             current: Iterate::default(),
             trial: Iterate::default(),
-            other: Iterate::default(),
+            best: Iterate::default(),
             newton: Newton::default(),
             sides: Sides::default(),
             filter: Filter::default(),
@@ -104,9 +106,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         self.conditions.clear();
         model.append_conditions(&mut self.conditions);
         let (intervals, conditions) = (model.intervals(), self.conditions.len());
-        for iterate in [&mut self.current, &mut self.trial, &mut self.other] {
+        for iterate in [&mut self.current, &mut self.trial] {
             iterate.resize(intervals, conditions);
+            iterate.intervals.resize(intervals);
         }
+        self.best.resize(intervals, conditions);
         self.newton.resize(intervals, conditions);
         self.sides.resize(intervals, conditions);
         self.scratch.resize(intervals + 1, [0.0; NX]);
@@ -134,11 +138,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let merit = self.current.merit(model, &self.conditions);
             if best.is_none_or(|(_, least)| merit < least) && merit.is_finite() {
                 best = Some((outcome, merit));
-                core::mem::swap(&mut self.current, &mut self.other);
+                self.best.move_to(&self.current);
             }
         }
         let Some((best, merit)) = best else {
-            core::mem::swap(&mut self.current, &mut self.other);
+            self.current.move_to(&self.best);
             return SolveEnd { iterations, sweeps, ..SolveEnd::BAD };
         };
         if best.status != Status::Converged
@@ -146,7 +150,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             && !self.allowance.is_spent()
         {
             // It creeps along a saddle. From where it ended, with the slacks opened again, it gets time to find the way down.
-            self.current.move_to(&self.other);
+            self.current.move_to(&self.best);
             start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
             let mut again = self.descend(model, RAISED_BARRIER, LONGER * cap);
             iterations += again.iterations;
@@ -156,7 +160,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 return SolveEnd { iterations, sweeps, ..again };
             }
         }
-        core::mem::swap(&mut self.current, &mut self.other);
+        self.current.move_to(&self.best);
         SolveEnd { iterations, sweeps, ..best }
     }
 

@@ -9,6 +9,7 @@ mod prediction;
 mod step;
 mod vehicle_model;
 
+use alloc::boxed::Box;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +57,8 @@ pub(super) struct Pointed {
 #[derive(Debug, Clone, Serialize)]
 pub struct Pilot {
     model: VehicleModel,
-    estimator: Estimator,
+    /// Apart: a pilot is moved when it is made, and its memory on a board's stack is short.
+    estimator: Box<Estimator>,
     estimate: Option<Estimate>,
     ascent: AscentWatch,
     /// Height at which the fall begins or began, m.
@@ -92,7 +94,7 @@ impl Pilot {
             motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
         };
         Self {
-            estimator: Estimator::new(&mission.estimator, uncertainty, time_s, believed),
+            estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
             estimate: None,
             ascent: AscentWatch::default(),
             apogee_m: match mission.start.at {
@@ -122,7 +124,7 @@ impl Pilot {
     pub(super) fn stand(&mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) {
         let config = &self.model.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
-        self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
+        *self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
     }
 
     /// The vehicle has left its rail.
@@ -301,8 +303,8 @@ impl Pilot {
                 believed.position_m +=
                     believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
                 believed.velocity_m_s += acceleration_m_s2 * lost_s;
-                Estimator::new(&mission.estimator, &uncertainty, time_s, &believed)
-                    .with_gyro_bias(estimate.gyro_bias_rad_s)
+                let estimator = Estimator::new(&mission.estimator, &uncertainty, time_s, &believed);
+                Box::new(estimator.with_gyro_bias(estimate.gyro_bias_rad_s))
             },
         );
         let SavedPilot {

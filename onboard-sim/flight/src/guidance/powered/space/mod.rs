@@ -59,12 +59,16 @@ pub(super) struct SpaceGuidance {
     /// The flown plan's motion in the plane of the report.
     #[serde(skip)]
     projected: Vec<PlanarState>,
+    /// Intervals that all of these have room for. A landing that needs more gets longer ones, so that no flight allocates.
+    #[serde(skip)]
+    room: Option<usize>,
 }
 
 impl SpaceGuidance {
-    /// Forgets its plans, and keeps their room.
+    /// Forgets its plans, and keeps their room: no plan has more intervals than the last.
     pub(super) fn forget(&mut self) {
         if let Some(flown) = self.flown.take() {
+            self.room = Some(flown.intervals());
             self.trial = flown.clone();
             self.unused = flown;
         }
@@ -131,8 +135,9 @@ impl SpaceGuidance {
         let height_m = state.position_m.z - situation.feet_below_cg_m;
         let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, height_m)?;
         let mut final_time_s = self.left_s(time_s).unwrap_or(earliest_s).clamp(earliest_s, latest_s);
+        let most = self.room.unwrap_or(MOST_INTERVALS);
         let intervals =
-            (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
+            (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, most);
 
         let pushes = self.problem.take().map_or_else(|| Vec::with_capacity(MOST_INTERVALS), |old| old.pushes);
         let mut problem = SpaceProblem { pushes, ..posed(situation, settings, space, state) };

@@ -29,8 +29,12 @@ impl SpacePlan {
         self.step_s
     }
 
+    pub(super) fn intervals(&self) -> usize {
+        self.inputs.len()
+    }
+
     pub(super) fn length_s(&self) -> f64 {
-        self.step_s * self.inputs.len() as f64
+        self.step_s * self.intervals() as f64
     }
 
     pub(super) fn left_s(&self, time_s: f64) -> f64 {
