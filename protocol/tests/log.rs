@@ -168,18 +168,23 @@ proptest! {
         file.extend(bytes);
         prop_assert!(read(&file).damage.is_some());
     }
+}
 
-    /// A flipped bit costs a chunk or the rest of the log, but never changes a message, because checksums protect all
-    /// of them.
-    #[test]
-    fn a_flipped_bit_never_changes_a_message(at in any::<prop::sample::Index>(), bit in 0u32..8) {
-        let records: Vec<_> = (0..30).map(operator).collect();
-        let mut bytes = written(&records);
-        let whole: Vec<_> = read(&bytes).messages.into_iter().map(|(_, data)| data).collect();
-        let place = at.index(bytes.len());
-        bytes[place] ^= 1u8 << bit;
-        for (_, data) in read(&bytes).messages {
-            prop_assert!(whole.contains(&data));
+/// A flipped bit costs a chunk or the rest of the log, but never changes a message, because checksums protect all of
+/// them.
+#[test]
+fn no_flipped_bit_changes_a_message() {
+    let records: Vec<_> = (0..12).map(operator).collect();
+    let good = written(&records);
+    let whole = read(&good);
+    assert_eq!((whole.messages.len(), whole.damage), (12, None));
+    for place in 0..good.len() {
+        for bit in 0..8 {
+            let mut bytes = good.clone();
+            bytes[place] ^= 1 << bit;
+            let found = read(&bytes).messages;
+            let changed = found.iter().find(|message| !whole.messages.contains(message));
+            assert_eq!(changed, None, "bit {bit} of byte {place}");
         }
     }
 }

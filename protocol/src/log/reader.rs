@@ -120,6 +120,8 @@ pub struct LogReader<R: Read> {
     /// Of everything before the end mark of the data.
     checksum: crc32fast::Hasher,
     saw_data_end: bool,
+    /// Its messages are in chunks.
+    is_chunked: bool,
     /// Messages so far.
     messages: u64,
     /// The summary says how many messages the log has.
@@ -145,6 +147,7 @@ impl<R: Read> LogReader<R> {
             channels: BTreeMap::new(),
             checksum: crc32fast::Hasher::new(),
             saw_data_end: false,
+            is_chunked: false,
             messages: 0,
             is_counted: false,
             damage: None,
@@ -265,8 +268,13 @@ impl<R: Read> LogReader<R> {
         } else {
             self.checksum.update(record);
         }
+        self.is_chunked |= opcode == op::CHUNK;
         if unpacked > RECORD_LIMIT_BYTES as u64 {
             self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes: unpacked });
+        } else if opcode == op::MESSAGE && self.is_chunked {
+            // One flipped bit makes a message of a chunk's index.
+            let damage = self.corrupt("a message beside the chunks, which no checksum protects");
+            self.note(damage);
         } else {
             self.parser.notify_read(HEAD_BYTES + count);
         }
@@ -369,6 +377,11 @@ impl<R: Read> LogReader<R> {
                     metadata: channel.metadata,
                 };
                 self.channels.insert(channel.id, known);
+                None
+            }
+            McapRecord::Message { header, .. } if !self.channels.contains_key(&header.channel_id) => {
+                let damage = self.corrupt("a message of a channel that is not in the log");
+                self.note(damage);
                 None
             }
             McapRecord::Message { header, data } => {
