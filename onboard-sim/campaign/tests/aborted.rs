@@ -10,6 +10,7 @@ use sim::recipe::Recipe;
 
 /// An abort at a random moment of the burn, which lasts at least 4.4 s from the command to the ground.
 const IN_THE_BURN: &str = "abort@ignition+0..4.4";
+const LATEST_S: f64 = 4.4;
 /// A seed whose flights were not used for tuning.
 const SEED: u64 = 21;
 
@@ -32,7 +33,10 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
         (0..FLIGHTS).map(|number| tally::fly(&recipe, number).unwrap()).collect::<Vec<Row>>()
     };
     let (alone, aborted) = (fly(None), fly(Some(IN_THE_BURN)));
-    assert!(aborted.iter().all(|row| row.faults == 1 && !row.parachute));
+    // A flight that fails may be on the ground before its abort would come.
+    let came = |row: &Row| row.faults == 1 || row.burn_time_at_contact_s.is_some_and(|at_s| at_s < LATEST_S);
+    assert!(aborted.iter().all(|row| came(row) && !row.parachute));
+    assert!(aborted.iter().filter(|row| row.faults == 1).count() >= 3 * 39);
     assert!(landed(&alone) >= 3 * 38, "{} of 120 left alone", landed(&alone));
     // One in forty is chance.
     assert!(landed(&aborted) + 3 >= landed(&alone), "{} aborted, {}", landed(&aborted), landed(&alone));

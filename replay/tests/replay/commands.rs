@@ -1,5 +1,6 @@
 //! Tests the other subcommands: exit codes, formats, and the messages if there is no answer.
 
+use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::computer_v1::ComputerFrame;
 
@@ -135,7 +136,10 @@ fn an_unreadable_log_does_not_hide_the_others() {
 fn a_frame_is_shown_and_a_missing_frame_exits_2() {
     let recording = MK2.recording();
     let frames = &recording.frames;
-    let in_burn = |frame: &&ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
+    let in_burn = |frame: &&ComputerFrame| {
+        frame.output.phase == u32::from(Phase::Powered.index())
+            && frame.output.level == u32::from(ControlLevel::Converged.index())
+    };
     let planning = frames.iter().filter(in_burn).nth(40).unwrap().input.frame.next_multiple_of(10);
     let planning = (recording.release_frame + planning).to_string();
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
@@ -158,12 +162,15 @@ fn a_frame_is_shown_and_a_missing_frame_exits_2() {
 }
 
 /// The reference solver and its Clarabel share only the equations of motion with the solver that flies. They find the plan
-/// that flew, or settle on a dearer branch.
+/// that flew, if its solve converged, or settle on a dearer branch.
 #[test]
 fn val_clarabel_finds_no_better_plan_than_the_one_that_flew() {
     let recording = MK2.recording();
     let (_, frames) = recording.replayable_frames().unwrap();
-    let in_burn = |frame: &&ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
+    let in_burn = |frame: &&ComputerFrame| {
+        frame.output.phase == u32::from(Phase::Powered.index())
+            && frame.output.level == u32::from(ControlLevel::Converged.index())
+    };
     let planning =
         frames.iter().filter(in_burn).map(|frame| frame.input.frame).filter(|frame| frame % 10 == 0);
     let mut same = 0;
