@@ -137,7 +137,7 @@ fn dot<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
 
 /// Adds a multiple of a row.
 #[inline(always)]
-fn add_multiple<const N: usize>(sum: &mut [f64; N], factor: f64, row: &[f64; N]) {
+pub fn add_multiple<const N: usize>(sum: &mut [f64; N], factor: f64, row: &[f64; N]) {
     for (entry, value) in sum.iter_mut().zip(row) {
         *entry += factor * value;
     }

@@ -7,7 +7,7 @@ use core::array::from_fn;
 use core::fmt::Debug;
 use pulp::Simd;
 
-use crate::dense::Factor;
+use crate::dense::{Factor, add_multiple};
 
 /// All intervals of a horizon, evaluated at a point: where each ends, and its derivatives.
 ///
@@ -123,14 +123,10 @@ impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage
         let scaled = factor.scale(&reduced);
         let push = factor.scale(&factor.reduce(from_fn(|i| [input_slope[i] + pulled_u[i]])));
         let offset = factor.restore(push).map(|[value]| value);
-        for i in 0..NX {
-            let mut row = xx[i];
+        for (i, row) in xx.iter_mut().enumerate() {
             for (scaled, reduced) in scaled.iter().zip(&reduced) {
-                for j in 0..NX {
-                    row[j] -= scaled[i] * reduced[j];
-                }
+                add_multiple(row, -scaled[i], reduced);
             }
-            xx[i] = row;
         }
         own_curvature.add_to(&mut xx);
         *before = xx;

@@ -79,7 +79,7 @@ pub use self::intervals::Value;
 pub use self::intervals::{Feedback, Stage};
 pub use self::model::Condition;
 pub use self::start::{Outcome, Status};
-pub use dense::{Dense, DenseIntervals};
+pub use dense::{Dense, DenseIntervals, add_multiple};
 pub use intervals::{Hessian, Interval, Intervals};
 pub use model::{InputRange, Model, Settings};
 pub use solver::Workspace;

@@ -33,17 +33,13 @@ fn close(fit: &Fit, name: &str, truth: f64, bar: f64) {
 
 #[test]
 fn val_simulation_a_field_flight_is_known_within_the_bars() {
-    // In some flights the gimbal is asked too little for its play to be seen.
-    let (recipe, fit) = (1..=8)
-        .find_map(|seed| {
-            let recipe = Recipe { seed, ..Recipe::built_in("mk2", "field").unwrap() };
-            let flown = crate::from_apogee::fly_recipe(&recipe);
-            let fit = fits(&[flown.log.to_str().unwrap()]).0.swap_remove(0);
-            fit.get("gimbal_play").is_some().then_some((recipe, fit))
-        })
-        .unwrap();
-    let fit = &fit;
-    let truth = draw(&recipe.mission, &recipe.dispersion, recipe.seed, 3).truth;
+    // In the same flight of seed 2 the gimbal is asked too little for its play to be seen.
+    let recipe = Recipe { seed: 3, ..Recipe::built_in("mk2", "field").unwrap() };
+
+    let truth = draw(&recipe.mission, &recipe.dispersion, 3, 3).truth;
+    let flown = crate::from_apogee::fly_recipe(&recipe);
+    let (found, _) = fits(&[flown.log.to_str().unwrap()]);
+    let fit = &found[0];
     let per_mass = |scale: f64| scale / truth.mass_scale;
     close(fit, "thrust_scale", per_mass(truth.impulse_scale), 0.01);
     close(fit, "burn_time_scale", truth.burn_time_scale, 0.01);

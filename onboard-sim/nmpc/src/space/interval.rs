@@ -5,6 +5,8 @@
 //! with the gimbal's part of `p''`. The drag sees the velocity that an upright thrust would give in the middle; the gain
 //! sideways, left out there, makes 0.2 m/s in a landing of 3.8 s, which the next plan sees.
 
+use stages::add_multiple;
+
 use super::stage::{ACCELERATIONS, Bend, DIRECTIONS, SpaceInterval};
 use super::{Drag, INPUTS, Nose, Push, SpaceProblem, State, Vector, dot, plus, times};
 
@@ -394,9 +396,7 @@ pub(super) fn air_curvature(drag: &Drag, air: &Air, nose: &Nose, l: &Vector, fac
     let mut turned = [[0.0; 5]; 4];
     for (sums, row) in turned.iter_mut().zip(&second) {
         for (value, slopes) in row.iter().zip(&slopes) {
-            for (sum, slope) in sums.iter_mut().zip(slopes) {
-                *sum += value * slope;
-            }
+            add_multiple(sums, *value, slopes);
         }
     }
     for i in 0..5 {

@@ -14,7 +14,7 @@
 
 use alloc::vec::Vec;
 use pulp::Simd;
-use stages::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value};
+use stages::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value, add_multiple};
 
 use super::{INPUTS, STATES, State};
 
@@ -118,14 +118,6 @@ fn products<const M: usize, const N: usize>(rows: &[[f64; N]; M], vector: &[f64;
         }
     }
     products
-}
-
-/// Adds a multiple of a row.
-#[inline(always)]
-fn add_multiple<const N: usize>(sum: &mut [f64; N], factor: f64, row: &[f64; N]) {
-    for (entry, value) in sum.iter_mut().zip(row) {
-        *entry += factor * value;
-    }
 }
 
 /// The directions of a state and an input.
