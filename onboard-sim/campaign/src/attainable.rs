@@ -45,9 +45,14 @@ impl Window {
 /// gaining speed have such landings, and for them the window is metres wide.
 const TRIED: usize = 24;
 
+/// The flight's vertical motion; `None` if the mission does not know its motor's curve.
+fn vertical(mission: &Mission, drawn: &Draw) -> Option<Vertical> {
+    Some(Vertical::new(&mission.airframe, drawn.truth.curve(mission).ok()?.as_ref(), &drawn.truth))
+}
+
 /// The window of a flight whose fall begins in this state; `None` if it lands from no height.
 pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
-    let vertical = Vertical::new(&mission.airframe, &mission.motor_curve, &drawn.truth);
+    let vertical = vertical(mission, drawn)?;
     let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
     let vertical_m_s = fall.velocity_m_s.z.min(0.0);
     let fall = Fall::new(&vertical, apogee_m, vertical_m_s, drawn.truth.ignition_delay_s)?;
@@ -78,7 +83,7 @@ pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Wind
 /// The window in heights of the feet where the thrust begins, m, instead of where it is commanded.
 pub fn onset_window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
     let Window { low_m, high_m } = window(mission, drawn, fall)?;
-    let vertical = Vertical::new(&mission.airframe, &mission.motor_curve, &drawn.truth);
+    let vertical = vertical(mission, drawn)?;
     let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
     let fall = Fall::new(&vertical, apogee_m, fall.velocity_m_s.z.min(0.0), drawn.truth.ignition_delay_s)?;
     Some(Window { low_m: fall.onset(low_m).0, high_m: fall.onset(high_m).0 })

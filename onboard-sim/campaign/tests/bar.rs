@@ -8,9 +8,12 @@ use flight::guidance::baseline::Controller;
 use sim::recipe::Recipe;
 
 fn flown(dispersion: &str, controller: Controller, flights: u64) -> Vec<Row> {
-    let recipe = Recipe { controller, ..Recipe::built_in("mk2", dispersion).unwrap() };
-    let rows: Vec<Row> = (0..flights).map(|number| tally::fly(&recipe, number).unwrap()).collect();
-    assert!(rows.iter().all(|row| !row.ignition_outside_gate), "{dispersion}");
+    flown_by(&Recipe { controller, ..Recipe::built_in("mk2", dispersion).unwrap() }, flights)
+}
+
+fn flown_by(recipe: &Recipe, flights: u64) -> Vec<Row> {
+    let rows: Vec<Row> = (0..flights).map(|number| tally::fly(recipe, number).unwrap()).collect();
+    assert!(rows.iter().all(|row| !row.ignition_outside_gate), "{}", recipe.mission.name);
     rows
 }
 
@@ -27,4 +30,18 @@ fn regress_flights_with_field_dispersions_land_on_their_legs_and_the_baselines_d
     let by_nmpc = landed(Controller::Nmpc);
     assert!(by_nmpc >= 18, "{by_nmpc} of 20");
     assert_eq!([Controller::OpenLoop, Controller::Oscillating].map(landed), [0, 0]);
+}
+
+/// A motor with the other curve of its name, of which nobody told the vehicle. Of 300 such flights 289 stand; 228 did before it knew
+/// that there is another.
+#[test]
+fn regress_a_motor_that_turns_out_to_be_the_other_of_its_name_is_landed_on() {
+    let mut recipe = Recipe::built_in("mk3", "real").unwrap();
+    recipe.dispersion.mismatch.other_curve = [1.0, 1.0];
+    let standing = |recipe: &Recipe| flown_by(recipe, 20).iter().filter(|row| row.legs).count();
+    let known = standing(&recipe);
+    assert!(known >= 18, "{known} of 20");
+    recipe.dispersion.mismatch.other_curve = [0.5, 0.5];
+    let between = standing(&recipe);
+    assert!(between >= 18, "{between} of 20");
 }

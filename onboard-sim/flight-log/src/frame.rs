@@ -6,7 +6,6 @@ use flight::computer::crew::{Asked, Ending, Request};
 use flight::computer::pilot::{Pilot, Sensed};
 use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
 use flight::estimation::estimator::AidStatus;
-use flight::estimation::motor_estimate::MotorEstimate;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::arming::Uplink;
 use flight::rules::outputs::{Line, Outputs};
@@ -212,7 +211,7 @@ pub fn thought_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
     let estimate = pilot.estimate()?;
     let aids = pilot.estimator().aids();
     Some(flight_v1::Estimate {
-        motor: motor_to_log(pilot.motor()),
+        motor: motor_to_log(pilot),
         barometer: aid_to_log(&aids.barometer),
         gnss_velocity: aid_to_log(&aids.gnss_velocity),
         gnss_position: aid_to_log(&aids.gnss_position),
@@ -229,7 +228,8 @@ fn aid_to_log(status: &AidStatus) -> Option<flight_v1::AidStatus> {
 }
 
 /// The motor's estimate as a record; none before ignition.
-fn motor_to_log(motor: &MotorEstimate) -> Option<flight_v1::MotorEstimate> {
+fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
+    let motor = pilot.motor();
     let ignition_s = motor.ignition_s()?;
     let [
         impulse_scale_sigma,
@@ -249,6 +249,7 @@ fn motor_to_log(motor: &MotorEstimate) -> Option<flight_v1::MotorEstimate> {
         ignition_sigma_s,
         air_scale_sigma,
         shape_deviation_sigma,
+        other_curve: pilot.other_curve().map(str::to_owned),
     })
 }
 

@@ -57,6 +57,7 @@ pub mod estimation {
 
     pub mod estimator;
     pub mod motor_estimate;
+    pub mod other_curves;
 }
 
 pub mod guidance {

@@ -61,6 +61,8 @@ pub struct Mismatch {
     /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations are larger than fast
     /// ones; the impulse stays.
     pub thrust_shape_share: f64,
+    /// How far the curve lies on the way from the mission's to the last of its other ones, 0 to 1.
+    pub other_curve: [f64; 2],
     /// Probability that the motor chuffs: it burns for 0.1 s, goes out for 0.2 s, and burns on.
     pub chuff_share: f64,
     /// Time in which the thrust rises to its curve's, s.

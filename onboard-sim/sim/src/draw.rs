@@ -203,7 +203,9 @@ fn mismatched(truth: &Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u
         + chance.between(sigma.leg_drag_m2))
     .max(-legs.drag_area_m2);
     let inertia_split = (sigma.inertia_split_share * chance.normal()).clamp(-0.3, 0.3);
+    let other_curve = chance.between(sigma.other_curve);
     Truth {
+        other_curve,
         chuff_s,
         thrust_rise_s,
         thrust_offset_m,

@@ -474,6 +474,9 @@ impl Sortie {
         self.measured().filter(|_| !self.dead)?;
         let motor = self.pilot().motor();
         motor.ignition_s()?;
+        if self.pilot().other_curve().is_some() {
+            return None;
+        }
         let truth = self.world().truth();
         motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
     }

@@ -299,7 +299,8 @@ impl<'a> Prepared<'a> {
         let truth = truth_with(&other_draw.unwrap_or(self.truth), &of_truth)?;
         let world = rerun.flight.world();
         if truth != *world.truth() || true_mission.airframe != *world.airframe() {
-            let changed = world.changed(&true_mission.airframe, &true_mission.motor_curve, &truth)?;
+            let changed =
+                world.changed(&true_mission.airframe, truth.curve(&true_mission)?.as_ref(), &truth)?;
             *rerun.flight.world_mut() = changed;
         }
         Ok(rerun)

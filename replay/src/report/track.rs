@@ -131,6 +131,8 @@ pub(super) struct GimbalAxis {
 pub(super) struct InSpace {
     /// Impulse and burn time divided by what the mission expected, as estimated at the end.
     pub(super) inferred_scales: Option<(f64, f64)>,
+    /// The motor of another curve that the burn turned out to have.
+    pub(super) other_curve: Option<String>,
     /// How far the mission expected the two to be off, as standard deviations.
     pub(super) expected_sigmas: (f64, f64),
     /// Burns of its lot that confirm the motor's curve.
@@ -440,10 +442,8 @@ fn in_space(
                 Some((frame.time_s, [wind.x, -wind.y]))
             })
             .collect(),
-        inferred_scales: pilot
-            .motor()
-            .ignition_s()
-            .map(|_| (pilot.motor().impulse_scale(), pilot.motor().burn_time_stretch())),
+        inferred_scales: pilot.motor().ignition_s().map(|_| pilot.scales().into()),
+        other_curve: pilot.other_curve().map(str::to_owned),
         expected_sigmas: (mission.motor.impulse_sigma, mission.motor.burn_time_sigma),
         motor_burns: mission.motor_burns(),
         true_impulse_scale: (burnt_out && impulse_n_s > 0.0).then(|| impulse_n_s / expected_n_s),

@@ -198,7 +198,7 @@ pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, Explai
             state: state.to_array(),
             time_since_ignition_s: pilot.burning_s(time_s).unwrap_or(0.0),
             gimbal_applied_rad: held.map_or_else(Vec::new, |held| held.output.gimbal_rad.clone()),
-            thrust_scale: pilot.motor().impulse_scale(),
+            thrust_scale: pilot.scales()[0],
         },
         level: level_of(&again.output).map_or("unknown", ControlLevel::name),
         recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),

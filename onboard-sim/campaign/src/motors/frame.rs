@@ -159,7 +159,7 @@ pub struct Changes<'a> {
     pub summary: &'a str,
     /// Name of a built-in motor, or the text of a motor file.
     pub motor: &'a str,
-    /// Whether the motor is the one whose lot the mission may know.
+    /// Whether the motor is the one whose lot, and other motors of that name, the mission may know.
     pub keeps_lot: bool,
     pub mass: Mass,
     /// Height of the centre of gravity above the pad at which the flight begins, m.
@@ -224,6 +224,7 @@ pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, Miss
         weighed.and_then(|weighed| weighed.remove("vehicle_kg"));
     } else {
         mission.remove("lot");
+        mission.remove("other_motors");
     }
     let at = mission.get("start").and_then(|start| start.get("at")).and_then(Value::as_str);
     let section = if at == Some(StartPoint::Drone.name()) { "drop" } else { "start" };
@@ -339,8 +340,8 @@ mod tests {
     /// With its own motor a mission keeps what is known of the lot, but not the weight of another ballast; with another one
     /// nothing of it.
     #[test]
-    fn a_lot_stays_with_its_motor() {
-        let (name, text) = flight::vehicles::mission::BUILTIN[0];
+    fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
+        let (name, text) = flight::vehicles::mission::BUILTIN[1];
         let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.15 }";
         let text = format!("{text}\n[lot]\n{lot}\n");
         let mission = flight::vehicles::mission::from_toml(&text, name).unwrap();
@@ -359,6 +360,7 @@ mod tests {
         assert_eq!((&kept.motor_curve, kept.airframe.mass), (&mission.motor_curve, mass));
         let other = read(&Changes { motor: "G33", keeps_lot: false, ..changes });
         assert!(other.lot.is_none() && other.motor_burns() == 0);
+        assert!(kept.other_motors == ["HP-H45W"] && other.other_curves.is_empty());
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 

@@ -484,13 +484,14 @@ fn seen_in_flight(
         }
         Sign::Impulse => {
             let sigma = motor.sigmas()[0];
-            let off = (motor.impulse_scale() - 1.0).abs();
+            let [impulse, _] = pilot.scales();
+            let off = (impulse - 1.0).abs();
             let known = burns
                 && !watcher.astray
                 && off > IMPULSE_SIGMAS * mission.motor.impulse_sigma
                 && off > 2.0 * sigma;
             let lit_s = motor.ignition_s().unwrap_or(time_s);
-            known.then(|| Seen { size: off, ..seen(lit_s, motor.impulse_scale(), 1.0, "") })
+            known.then(|| Seen { size: off, ..seen(lit_s, impulse, 1.0, "") })
         }
         Sign::BurntOutEarly => {
             let MotorStage::EndedEarly { at_s } = motor.stage() else { return None };

@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 use alloc::string::String;
+use alloc::vec::Vec;
 
 use serde::Deserialize;
 
@@ -231,6 +232,12 @@ pub struct Mission {
     /// tells instead. It is not in the mission's file; the reader of the mission looks the motor up.
     #[serde(skip, default = "ThrustCurve::none")]
     pub motor_curve: ThrustCurve,
+    /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts of motor files.
+    #[serde(default)]
+    pub other_motors: Vec<String>,
+    /// These curves, and before each the one half way to it. The reader of the mission looks them up.
+    #[serde(skip)]
+    pub other_curves: Vec<ThrustCurve>,
     /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
     /// and the mass.
     #[serde(default)]
@@ -306,6 +313,12 @@ impl Mission {
     /// has.
     pub fn motor_burns(&self) -> u32 {
         self.lot.as_ref().map_or(0, |lot| lot.burns)
+    }
+
+    /// The prior of a motor with another curve than the expected one: nobody has burnt any of its lot.
+    pub(crate) fn unknown_motor(&self) -> MotorPrior {
+        let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();
+        MotorPrior { impulse_sigma, burn_time_sigma, ..self.motor }
     }
 
     /// Puts in what the lot tells, where `curve` is the one that the lot's scales are over; without a lot, that curve.

@@ -3,6 +3,7 @@
 //! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact. Propellant burns in
 //! proportion to the delivered impulse (a constant exhaust velocity).
 
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -87,6 +88,30 @@ impl ThrustCurve {
             impulse_n_s: self.impulse_n_s.iter().map(|before_n_s| before_n_s * impulse).collect(),
             ..self.clone()
         }
+    }
+
+    /// The motor whose thrust and masses lie this share of the way from this one's to another's, named after both.
+    #[must_use]
+    pub fn towards(&self, other: &Self, share: f64) -> Self {
+        let between = |here: f64, there: f64| here + share * (there - here);
+        let mut times_s: Vec<f64> =
+            [&self.points, &other.points].into_iter().flatten().map(|p| p.time_s).collect();
+        times_s.sort_by(f64::total_cmp);
+        times_s.dedup();
+        let points = times_s.into_iter().map(|time_s| ThrustPoint {
+            time_s,
+            thrust_n: between(self.thrust_at_n(time_s), other.thrust_at_n(time_s)),
+        });
+        let data = MotorData {
+            name: format!("{} towards {}", self.name, other.name),
+            manufacturer: self.manufacturer.clone(),
+            diameter_m: self.diameter_m,
+            length_m: self.length_m,
+            propellant_mass_kg: between(self.propellant_mass_kg, other.propellant_mass_kg),
+            total_mass_kg: between(self.total_mass_kg, other.total_mass_kg),
+            points: points.collect(),
+        };
+        Self::new(data).unwrap_or_else(|| self.clone())
     }
 
     /// This motor with another mass before ignition, kg; the propellant stays.
@@ -274,6 +299,25 @@ mod tests {
         assert!((found.thrust_at_n(4.0) - 22.0).abs() < 1e-12);
         assert!((found.mean_thrust_n(0.0, 8.0) - 16.5).abs() < 1e-12);
         assert!((found.propellant_mass_kg() - 0.12).abs() < 1e-12);
+    }
+
+    #[test]
+    fn val_hand_a_motor_half_way_has_the_mean_of_both_at_every_time() {
+        let (here, there) = (trapezium(), from_rasp("S 38 200 P 0.06 0.5 M\n0.1 60\n2 60\n2.1 0\n").unwrap());
+        let middle = here.towards(&there, 0.5);
+        for (time_s, thrust_n) in
+            [(0.05, 16.0), (0.1, 32.0), (1.0, 50.0), (2.05, 35.0), (3.5, 10.0), (4.0, 0.0)]
+        {
+            assert!((middle.thrust_at_n(time_s) - thrust_n).abs() < 1e-9, "{time_s}");
+        }
+        // 120 N s, and 60 N over 2.1 s less twice half a tenth of a second: 120 N s.
+        assert!((middle.total_impulse_n_s() - 120.0).abs() < 1e-9);
+        assert!(
+            (middle.propellant_mass_kg() - 0.09).abs() < 1e-12
+                && (middle.total_mass_kg() - 0.4).abs() < 1e-12
+        );
+        assert_eq!(middle.name(), "T40 towards S");
+        assert_eq!(here.towards(&there, 0.0).impulse_to_n_s(3.0), here.impulse_to_n_s(3.0));
     }
 
     proptest! {

@@ -20,6 +20,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("H42", include_str!("../../vehicles/motors/Cesaroni_186H42-10A.eng")),
     ("H45W", include_str!("../../vehicles/motors/AeroTech_H45.eng")),
     ("H53", include_str!("../../vehicles/motors/Cesaroni_234H53-12A.eng")),
+    ("HP-H45W", include_str!("../../vehicles/motors/AeroTech_HP-H45W.eng")),
     ("I243", include_str!("../../vehicles/motors/Cesaroni_382I243-13A.eng")),
 ];
 

@@ -2,6 +2,7 @@ use flight::estimation::estimator::EstimatorConfig;
 use flight::guidance::powered::PoweredSettings;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::site::Site;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::mission::{BUILTIN, from_toml, is_meant};
 
 #[test]
@@ -92,6 +93,16 @@ fn val_hand_a_lot_moves_the_curve_and_narrows_what_is_expected() {
 }
 
 #[test]
+fn other_motors_and_the_curves_half_way_to_them_are_looked_up() {
+    let mk3 = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
+    let names: Vec<&str> = mk3.other_curves.iter().map(ThrustCurve::name).collect();
+    assert_eq!(names, ["H45W towards HP-H45W", "HP-H45W"]);
+    let (_, text) = BUILTIN.iter().find(|(name, _)| *name == "mk3").unwrap();
+    let wrong = from_toml(&text.replace("\"HP-H45W\"", "\"HP-H46W\""), "mk3").unwrap_err().to_string();
+    assert!(wrong.starts_with("no motor is named 'HP-H46W'; these are built in: F10"), "{wrong}");
+}
+
+#[test]
 fn the_lot_on_the_engineers_page_is_one() {
     let page = include_str!("../../../../ENGINEER.md");
     let (_, lot) = page.split_once("```toml\n[lot]\n").unwrap();
@@ -157,6 +168,8 @@ fn mk3_flies_with_the_numbers_of_mk2() {
     // mk3 plans its landing in space, and homes further.
     assert!(mk3.powered.space.is_some() && mk2.powered.space.is_none());
     let caution_sigmas = mk2.caution_sigmas;
+    // Only mk3 knows that two motors bear the name of its own.
+    let (other_motors, other_curves) = (mk2.other_motors.clone(), mk2.other_curves.clone());
     let PoweredSettings { interval_s, weights, homing, max_passes, space, solver, .. } = mk2.powered;
     let powered = PoweredSettings { interval_s, weights, homing, max_passes, space, solver, ..mk3.powered };
     assert_eq!(
@@ -166,6 +179,8 @@ fn mk3_flies_with_the_numbers_of_mk2() {
             airframe,
             estimator,
             drop,
+            other_motors,
+            other_curves,
             leg_limits,
             descent,
             caution_sigmas,

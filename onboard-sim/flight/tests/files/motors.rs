@@ -12,6 +12,7 @@ fn val_catalogue_impulse_of_the_builtin_motors() {
         ("H42", 186.0, 0.005),
         ("H45W", 289.0, 0.01),
         ("H53", 234.2, 0.005),
+        ("HP-H45W", 320.0, 0.01),
     ] {
         let motor = builtin(name).unwrap();
         let found = motor.total_impulse_n_s();
@@ -34,7 +35,7 @@ fn the_error_for_an_unknown_name_lists_the_known_names() {
     let error = builtin("Z99").unwrap_err().to_string();
     assert_eq!(
         error,
-        "no motor is named 'Z99'; these are built in: F10, F13-RCT, F15, F16-RCJ, F30, G12, G33, H42, H45W, H53, I243"
+        "no motor is named 'Z99'; these are built in: F10, F13-RCT, F15, F16-RCJ, F30, G12, G33, H42, H45W, H53, HP-H45W, I243"
     );
 }
 

@@ -150,7 +150,7 @@ pub(super) fn gimbal(state: &VehicleState<'_>) -> MavMessage {
 pub(super) fn controller(state: &VehicleState<'_>) -> Option<MavMessage> {
     let (tick, level, report) = state.controller()?;
     let solve_time_s = state.solve_time_s();
-    let thrust_scale = state.airborne().map_or(1.0, |_| state.computer.pilot().motor().impulse_scale());
+    let thrust_scale = state.airborne().map_or(1.0, |_| state.computer.pilot().scales()[0]);
     let microseconds = |s: f64| libm::round(1e6 * s);
     Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
         time_boot_ms: boot_ms(state.time_s),

@@ -1,7 +1,13 @@
 //! How the true vehicle and the weather of one flight differ from the nominal data, and what can break. A campaign
 //! draws these values for each flight.
 
+use std::borrow::Cow;
+
+use flight::vehicle::mission::Mission;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use serde::{Deserialize, Serialize};
+
+use super::whole::WorldError;
 
 /// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -11,6 +17,8 @@ pub struct Truth {
     pub impulse_scale: f64,
     /// True burn time over the motor file's.
     pub burn_time_scale: f64,
+    /// The motor's curve lies this share of the way from the mission's to the last of its other curves.
+    pub other_curve: f64,
     /// Time from the ignition command to the first thrust, s.
     pub ignition_delay_s: f64,
     /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
@@ -107,6 +115,24 @@ pub const SHAPE_TERMS: usize = 5;
 pub const SHAPE_MOST: f64 = 0.19;
 
 impl Truth {
+    /// The curve that the scales are over.
+    ///
+    /// # Errors
+    /// [`WorldError::Truth`] if it lies on the way to another curve and the mission has no other.
+    pub fn curve<'a>(&self, mission: &'a Mission) -> Result<Cow<'a, ThrustCurve>, WorldError> {
+        let share = self.other_curve;
+        match mission.other_curves.last() {
+            _ if share == 0.0 => Ok(Cow::Borrowed(&mission.motor_curve)),
+            Some(other) if (0.0..=1.0).contains(&share) => {
+                Ok(Cow::Owned(mission.motor_curve.towards(other, share)))
+            }
+            other => {
+                let required = if other.is_some() { "0 to 1" } else { "0: the mission has no other_motors" };
+                Err(WorldError::Truth { key: "other_curve", found: share, required })
+            }
+        }
+    }
+
     /// Height of the ground below a place, m.
     pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
         self.ground_rise[0] * x_m + self.ground_rise[1] * y_m
@@ -118,6 +144,7 @@ impl Default for Truth {
         Self {
             impulse_scale: 1.0,
             burn_time_scale: 1.0,
+            other_curve: 0.0,
             ignition_delay_s: 0.15,
             chuff_s: [0.0; 2],
             thrust_rise_s: 0.0,

@@ -339,7 +339,11 @@ fn another_curve(in_space: &InSpace) -> Option<String> {
         0 => "No burn of its lot had confirmed the certified curve.".to_owned(),
         burns => format!("Burns of its lot that had confirmed the curve: {burns}."),
     };
-    let words = || format!("The motor flew another curve than expected: {}. {confirmed}", off.join("; "));
+    let nearest = in_space.other_curve.as_ref().map_or_else(String::new, |name| {
+        format!(" Half a second after its ignition the flight computer took it for {name}.")
+    });
+    let off = off.join("; ");
+    let words = || format!("The motor flew another curve than expected: {off}.{nearest} {confirmed}");
     (!off.is_empty()).then(words)
 }
 
@@ -379,6 +383,15 @@ mod tests {
                  certified curve."
             )
         );
+        let known = another_curve(&InSpace {
+            inferred_scales: Some((1.11, 0.85)),
+            expected_sigmas: (0.027, 0.04),
+            other_curve: Some("HP-H45W".to_owned()),
+            ..InSpace::default()
+        });
+        let words =
+            "deviations. Half a second after its ignition the flight computer took it for HP-H45W. No burn";
+        assert!(known.as_ref().is_some_and(|known| known.contains(words)), "{known:?}");
         assert!(
             of((0.95, 1.05), 4)
                 .is_some_and(|words| words.contains("; burn time +5.0 %, 2.5 deviations. Burns"))

@@ -20,6 +20,7 @@ use crate::computer::Input;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
+use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::baseline::{Baseline, Law};
 use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
 use crate::rules::phase::Mode;
@@ -92,6 +93,10 @@ impl Pilot {
             mission: mission.clone(),
             mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
             motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
+            others: OtherCurves::new(
+                mission.other_curves.len(),
+                &MotorPrior { frame_s, ..mission.unknown_motor() },
+            ),
         };
         Self {
             estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
@@ -175,9 +180,23 @@ impl Pilot {
         &self.prediction
     }
 
-    /// The landing motor as certified.
+    /// The landing motor's curve: the expected one, or another that its burn has turned out to have.
     pub fn curve(&self) -> &ThrustCurve {
-        &self.model.mission.motor_curve
+        self.model.curve()
+    }
+
+    /// The motor's name if its burn has turned out to have another curve than the expected one.
+    pub fn other_curve(&self) -> Option<&str> {
+        self.model.others.chosen().map(|_| self.curve().name())
+    }
+
+    /// Impulse and burn time of the motor as estimated over those of the expected curve.
+    pub fn scales(&self) -> [f64; 2] {
+        let (motor, curve, expected) = (self.motor(), self.curve(), &self.mission().motor_curve);
+        [
+            motor.impulse_scale() * (curve.total_impulse_n_s() / expected.total_impulse_n_s()),
+            motor.burn_time_stretch() * (curve.burn_time_s() / expected.burn_time_s()),
+        ]
     }
 
     /// The motor as estimated in flight, and the scale of the aerodynamic forces.
@@ -257,6 +276,7 @@ impl Pilot {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
+    other_curve: Option<usize>,
     estimate: Option<Estimate>,
     ascent: AscentWatch,
     apogee_m: f64,
@@ -271,6 +291,7 @@ impl Pilot {
     pub(super) fn saved(&self) -> SavedPilot {
         SavedPilot {
             motor: self.model.motor,
+            other_curve: self.model.others.chosen(),
             estimate: self.estimate,
             ascent: self.ascent,
             apogee_m: self.apogee_m,
@@ -309,6 +330,7 @@ impl Pilot {
         );
         let SavedPilot {
             motor,
+            other_curve,
             estimate,
             ascent,
             apogee_m,
@@ -331,6 +353,9 @@ impl Pilot {
             ..self.clone()
         };
         resumed.model.motor = motor;
+        if motor.ignition_s().is_some() {
+            resumed.model.others = OtherCurves::chosen_before(other_curve);
+        }
         resumed
     }
 }

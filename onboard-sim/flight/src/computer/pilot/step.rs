@@ -201,7 +201,7 @@ impl Pilot {
             gimbal_rad: self.gimbal_rad,
             may_burn: burning,
         };
-        self.model.motor.update(&self.model.mission.motor_curve, &sample);
+        self.model.learn(&sample);
     }
 
     fn update_prediction(&mut self, estimate: &Estimate, density_kg_m3: f64) {

@@ -5,7 +5,8 @@ use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use crate::estimation::estimator::Estimate;
-use crate::estimation::motor_estimate::MotorEstimate;
+use crate::estimation::motor_estimate::{MotorEstimate, MotorSample};
+use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation};
 use crate::guidance::vertical::{Band, Column, share_for};
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
@@ -13,6 +14,7 @@ use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use crate::vehicle::rigid::RigidState;
+use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// The vehicle as the pilot knows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,6 +26,8 @@ pub(super) struct VehicleModel {
     pub(super) mass: MassModel,
     /// Estimated motor and scale of the aerodynamic forces.
     pub(super) motor: MotorEstimate,
+    /// Whether the motor has another curve than the expected one.
+    pub(super) others: OtherCurves,
 }
 
 // The mission, its motor and its masses come from the profile in the log; they do not change in flight.
@@ -37,7 +41,23 @@ pub(super) struct Burning {
     pub(super) lands_in_place: bool,
 }
 
+fn curve<'a>(mission: &'a Mission, others: &OtherCurves) -> &'a ThrustCurve {
+    let other = others.chosen().and_then(|index| mission.other_curves.get(index));
+    other.unwrap_or(&mission.motor_curve)
+}
+
 impl VehicleModel {
+    /// The motor's curve: the expected one, or another that its burn has turned out to have.
+    pub(super) fn curve(&self) -> &ThrustCurve {
+        curve(&self.mission, &self.others)
+    }
+
+    /// Learns motor and drag from a frame.
+    pub(super) fn learn(&mut self, sample: &MotorSample) {
+        self.motor.update(curve(&self.mission, &self.others), sample);
+        self.others.update(&mut self.motor, &self.mission.other_curves, sample);
+    }
+
     pub(super) fn airframe(&self) -> &Airframe {
         &self.mission.airframe
     }
@@ -75,7 +95,7 @@ impl VehicleModel {
 
     /// Whether the whole burn time has passed. A motor that went out early is not called burnt out before that either.
     pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
-        let whole_s = self.motor.burn_time_stretch() * self.mission.motor_curve.burn_time_s();
+        let whole_s = self.motor.burn_time_stretch() * self.curve().burn_time_s();
         self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
     }
 
@@ -84,7 +104,7 @@ impl VehicleModel {
     }
 
     pub(super) fn burn(&self) -> Burn<'_> {
-        self.motor.burn(&self.mission.motor_curve)
+        self.motor.burn(self.curve())
     }
 
     /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected from now until its
@@ -101,7 +121,7 @@ impl VehicleModel {
             (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
             burn.fading_n_s(burning_s, until_s),
         ];
-        self.motor.doubted(&self.mission.motor_curve, derivatives, sigmas)
+        self.motor.doubted(self.curve(), derivatives, sigmas)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {

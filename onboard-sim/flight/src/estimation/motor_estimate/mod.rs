@@ -158,6 +158,9 @@ pub struct MotorEstimate {
     starved_frames: u32,
     /// How long the motor had burnt when it chuffed, s; 0 if it did not.
     chuffed_s: f64,
+    /// Sum of the misfits of the burn's frames, and how many were compared.
+    misfit: f64,
+    compared: u32,
 }
 
 // The prior is constant; everything that changes is in the mean and the covariance.
@@ -216,7 +219,15 @@ impl MotorEstimate {
             felt_at_s: 0.0,
             starved_frames: 0,
             chuffed_s: 0.0,
+            misfit: 0.0,
+            compared: 0,
         }
+    }
+
+    /// How badly the burn's frames fit the curve: minus twice the logarithm of their likelihood, but for a constant, as the mean
+    /// of a frame. Infinite before the first.
+    pub fn misfit(&self) -> f64 {
+        if self.compared == 0 { f64::INFINITY } else { self.misfit / f64::from(self.compared) }
     }
 
     /// State of the motor.
@@ -446,6 +457,11 @@ impl MotorEstimate {
             + gust_n * gust_n * frames(GUST_LASTS_S);
         let with = self.covariance * sensitivity;
         let variance = product(&sensitivity, &with) + noise;
+        let missed = innovation_n * innovation_n / variance;
+        if self.stage == MotorStage::Burning {
+            self.misfit += missed.min(GATE_SIGMAS * GATE_SIGMAS) + libm::log(variance);
+            self.compared += 1;
+        }
         if innovation_n * innovation_n > GATE_SIGMAS * GATE_SIGMAS * variance {
             return;
         }

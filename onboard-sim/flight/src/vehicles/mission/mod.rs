@@ -80,6 +80,10 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         weights.map_err(|bad| FileError::bad_value(origin, bad.into()))?;
     }
     mission.expect(curve);
+    for other in &mission.other_motors {
+        let other = motors::named(other)?;
+        mission.other_curves.extend([mission.motor_curve.towards(&other, 0.5), other]);
+    }
     if let Some(launch) = &mut mission.launch {
         launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
     }
