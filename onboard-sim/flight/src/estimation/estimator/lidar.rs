@@ -7,6 +7,9 @@ use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
 /// 20 in 0.2 s.
 const ASKEW_SAMPLES: f64 = 20.0;
+/// Ranges that do not fit the estimate must agree with each other by this before they are believed instead of it, m: two
+/// hundredths of a second apart the estimate's error changes by centimetres, and an outlier by metres.
+const AGREES_M: f64 = 0.5;
 /// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
 /// ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
@@ -45,17 +48,24 @@ impl Estimator {
         let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
         let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
         // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
-        let correction = self.correct(&sensitivity[..known], measured_m - slant_m, noise, |index| {
-            !(ATTITUDE..ATTITUDE + 3).contains(&index)
-        });
+        let take = |estimator: &mut Self| {
+            estimator.correct(&sensitivity[..known], measured_m - slant_m, noise, |index| {
+                !(ATTITUDE..ATTITUDE + 3).contains(&index)
+            })
+        };
+        let before_m = self.aids.lidar.innovation;
+        let correction = take(self);
         self.aids.lidar.take(&correction);
+        let agrees = (correction.innovation - before_m).abs() < AGREES_M;
+        if agrees && self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
+            self.aids.lidar.refused_in_a_row = 0;
+            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
+            // At once: the barometer's next sample would end the doubt at the height that no range fits.
+            take(self);
+        }
         if measured_m.is_finite() {
             let late_m = self.nominal.lidar_late_s * climb_m_s;
             self.heights.take_lidar(&self.config, measured_m * nose.z + late_m, nose.z);
-        }
-        if self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
-            self.aids.lidar.refused_in_a_row = 0;
-            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
         }
     }
 }

@@ -226,6 +226,53 @@ fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
     assert!(expecting_m.abs() < trusting_m.abs(), "{expecting_m} m, trusting {trusting_m} m");
 }
 
+/// Hovers 5 m over the ground where barometer and satellites say 8 m, and from `first` on measures the ranges to the ground, the
+/// tenth of which is `tenth_m`. Returns the estimated heights after each frame from then on.
+fn heights_with_ranges_from(first: u64, tenth_m: f64) -> Vec<f64> {
+    let mut estimator = at(8.0);
+    (1..first + 40)
+        .map(|frame| {
+            let measured = hovering(frame);
+            let fix = |fix: GnssFix| GnssFix { position_m: Vector3::z() * 8.0, ..fix };
+            let range_m = if frame == first + 18 { tenth_m } else { 4.6 };
+            let measurements = Measurements {
+                pressure_altitude_m: measured.pressure_altitude_m.map(|_| 8.0),
+                gnss: measured.gnss.map(fix),
+                lidar_range_m: measured.lidar_range_m.filter(|_| frame >= first).map(|_| range_m),
+                ..measured
+            };
+            estimator.step(&measurements, &VEHICLE).state.position_m.z
+        })
+        .skip(first as usize - 1)
+        .collect()
+}
+
+/// Whichever of the frames has the barometer's sample: it must not end the doubt at its own height.
+#[test]
+fn ranges_that_agree_for_a_tenth_of_a_second_are_believed_at_once() {
+    for first in [402, 404] {
+        let heights_m = heights_with_ranges_from(first, 4.6);
+        assert!(
+            heights_m[..18].iter().all(|height_m| (height_m - 8.0).abs() < 0.1),
+            "{first}: {heights_m:?}"
+        );
+        assert!(
+            heights_m[18..].iter().all(|height_m| (height_m - 5.0).abs() < 0.3),
+            "{first}: {heights_m:?}"
+        );
+        // The tenth is an outlier: the next two decide.
+        let heights_m = heights_with_ranges_from(first, 9.0);
+        assert!(
+            heights_m[..22].iter().all(|height_m| (height_m - 8.0).abs() < 0.1),
+            "{first}: {heights_m:?}"
+        );
+        assert!(
+            heights_m[22..].iter().all(|height_m| (height_m - 5.0).abs() < 0.3),
+            "{first}: {heights_m:?}"
+        );
+    }
+}
+
 /// The doubt of the gyro's bias grows once, when the motor lights.
 #[test]
 fn the_landing_motor_may_shift_the_gyros_bias() {
