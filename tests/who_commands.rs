@@ -186,7 +186,9 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
     screen.type_until(b"0AARM\r", "ARM acknowledged: accepted");
     assert!(!other.was_sent(ARM), "the other vehicle was armed, too");
     screen.type_bytes(b"\x18\r");
-    screen.wait_for("acknowledged accepted");
+    let is_aborted =
+        |row: &String| row.contains("ABORT ") && row.contains("acknowledged accepted  observed yes");
+    screen.wait_until("observed abort", |window| window.rows().iter().any(is_aborted).then_some(()));
     screen.wait_until("the abort at the other vehicle", |_| other.was_sent(ABORT).then_some(()));
     vehicle.signal(Signal::SIGTERM);
     assert_eq!(vehicle.wait().code, Some(4));
