@@ -410,7 +410,11 @@ pub(super) mod sample {
 mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
 
+    use super::Pilot;
     use crate::computer::pilot::sample::{falling, input, released};
+    use crate::estimation::estimator::StartUncertainty;
+    use crate::estimation::motor_estimate::MotorSample;
+    use crate::vehicle::rigid::RigidState;
 
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
@@ -429,5 +433,37 @@ mod tests {
         let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
         let expected = estimate.state.world_from_body * turned;
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
+    }
+
+    /// A restart in the burn keeps the curve that the motor was found to have; one in the fall leaves the choice open.
+    #[test]
+    fn a_restart_keeps_the_choice_of_the_curve() {
+        let mission = crate::vehicles::mission::builtin("mk3").unwrap().unwrap();
+        let powered_up = || {
+            let uncertainty = StartUncertainty::at_apogee();
+            Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &uncertainty)
+        };
+        let mut pilot = powered_up();
+        let other = mission.other_curves.last().unwrap();
+        for frame in 1..=200_u32 {
+            let time_s = f64::from(frame) * 0.005;
+            pilot.model.learn(&MotorSample {
+                time_s,
+                axial_specific_force_m_s2: other.thrust_at_n(time_s - 0.1) / 3.3,
+                mass_kg: 3.3,
+                axial_air_force_n: 0.0,
+                gimbal_rad: [0.0; 2],
+                may_burn: true,
+            });
+            if frame == 10 {
+                assert_eq!(
+                    powered_up().resumed(&pilot.saved(), time_s).model.others,
+                    powered_up().model.others
+                );
+            }
+        }
+        let resumed = powered_up().resumed(&pilot.saved(), 1.2);
+        assert_eq!((resumed.other_curve(), resumed.curve()), (Some("HP-H45W"), other));
+        assert_eq!(resumed.scales().map(f64::to_bits), pilot.scales().map(f64::to_bits));
     }
 }
