@@ -32,8 +32,8 @@ fn regress_flights_with_field_dispersions_land_on_their_legs_and_the_baselines_d
     assert_eq!([Controller::OpenLoop, Controller::Oscillating].map(landed), [0, 0]);
 }
 
-/// A motor with the other curve of its name, of which nobody told the vehicle. Of 300 such flights 289 stand; 228 did before it knew
-/// that there is another.
+/// The vehicle expects the certified curve, and its motor has the other one of its name, or one half way. Of 300 flights with the
+/// other one 289 stand; 228 did before the mission named it.
 #[test]
 fn regress_a_motor_that_turns_out_to_be_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();

@@ -54,6 +54,7 @@ pub mod estimation {
     //!
     //! * [`estimator`] finds state and wind from the sensors.
     //! * [`motor_estimate`] finds impulse, burn time and ignition of the motor.
+    //! * [`other_curves`] finds out which of the known thrust curves the motor has.
 
     pub mod estimator;
     pub mod motor_estimate;

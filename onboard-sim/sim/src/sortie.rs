@@ -466,7 +466,8 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
-    /// `None` if the pilot gets the truth instead of an estimate, and before the motor has lit. The accelerometer cannot
+    /// `None` if the pilot gets the truth instead of an estimate, before the motor has lit, and where its scales are over another
+    /// curve than the truth's. The accelerometer cannot
     /// tell more impulse from less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales

@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use super::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
+use crate::vehicle::mission::Mission;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// When the curve is chosen, s since the thrust began: the landing then has to waste, or to save, all that the curves differ by.
@@ -38,6 +39,12 @@ impl OtherCurves {
     /// Which of the other curves the motor has; `None` for the expected one.
     pub fn chosen(&self) -> Option<usize> {
         self.chosen
+    }
+
+    /// The curve that the motor is taken to have.
+    pub fn flown<'a>(&self, mission: &'a Mission) -> &'a ThrustCurve {
+        let other = self.chosen.and_then(|index| mission.other_curves.get(index));
+        other.unwrap_or(&mission.motor_curve)
     }
 
     /// Takes the sample that `motor` has just taken under the expected curve, and replaces `motor` if it has another one.
@@ -95,8 +102,7 @@ mod tests {
                 gimbal_rad: [0.0; 2],
                 may_burn: time_s > LIT_S - 0.2,
             };
-            let flown = others.chosen().and_then(|index| mission.other_curves.get(index));
-            motor.update(flown.unwrap_or(&mission.motor_curve), &sample);
+            motor.update(others.flown(&mission), &sample);
             others.update(&mut motor, &mission.other_curves, &sample);
             let since_s = time_s - LIT_S;
             assert!(since_s > CHOSEN_AFTER_S - 0.02 || others.filters.len() == 2, "{since_s}");

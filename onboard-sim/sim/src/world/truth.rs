@@ -118,19 +118,20 @@ impl Truth {
     /// The curve that the scales are over.
     ///
     /// # Errors
-    /// [`WorldError::Truth`] if it lies on the way to another curve and the mission has no other.
+    /// [`WorldError::Truth`] if the share is not 0 to 1, or not 0 and the mission has no other curve.
     pub fn curve<'a>(&self, mission: &'a Mission) -> Result<Cow<'a, ThrustCurve>, WorldError> {
         let share = self.other_curve;
-        match mission.other_curves.last() {
-            _ if share == 0.0 => Ok(Cow::Borrowed(&mission.motor_curve)),
-            Some(other) if (0.0..=1.0).contains(&share) => {
-                Ok(Cow::Owned(mission.motor_curve.towards(other, share)))
-            }
-            other => {
-                let required = if other.is_some() { "0 to 1" } else { "0: the mission has no other_motors" };
-                Err(WorldError::Truth { key: "other_curve", found: share, required })
-            }
+        let refuse = |required| Err(WorldError::Truth { key: "other_curve", found: share, required });
+        if share == 0.0 {
+            return Ok(Cow::Borrowed(&mission.motor_curve));
         }
+        let Some(other) = mission.other_curves.last() else {
+            return refuse("0 (the mission has no other_motors)");
+        };
+        if !(0.0..=1.0).contains(&share) {
+            return refuse("0 to 1");
+        }
+        Ok(Cow::Owned(mission.motor_curve.towards(other, share)))
     }
 
     /// Height of the ground below a place, m.

@@ -41,20 +41,15 @@ pub(super) struct Burning {
     pub(super) lands_in_place: bool,
 }
 
-fn curve<'a>(mission: &'a Mission, others: &OtherCurves) -> &'a ThrustCurve {
-    let other = others.chosen().and_then(|index| mission.other_curves.get(index));
-    other.unwrap_or(&mission.motor_curve)
-}
-
 impl VehicleModel {
     /// The motor's curve: the expected one, or another that its burn has turned out to have.
     pub(super) fn curve(&self) -> &ThrustCurve {
-        curve(&self.mission, &self.others)
+        self.others.flown(&self.mission)
     }
 
     /// Learns motor and drag from a frame.
     pub(super) fn learn(&mut self, sample: &MotorSample) {
-        self.motor.update(curve(&self.mission, &self.others), sample);
+        self.motor.update(self.others.flown(&self.mission), sample);
         self.others.update(&mut self.motor, &self.mission.other_curves, sample);
     }
 

@@ -143,6 +143,13 @@ fn data_out_of_range_are_refused() {
     assert_eq!(refuse(&truth, &start), "truth.mass_scale is NaN; 0.1 to 10 is accepted");
     let truth = Truth { cg_offset_m: [0.0, 5.0, 0.0], ..Truth::default() };
     assert_eq!(refuse(&truth, &start), "truth.cg_offset_m is 5; -0.1 to 0.1 is accepted");
+    let [mk2, mk3] = ["mk2", "mk3"].map(|name| flight::vehicles::mission::builtin(name).unwrap().unwrap());
+    for (mission, other_curve, required) in
+        [(&mk2, 0.5, "0 (the mission has no other_motors)"), (&mk3, 1.5, "0 to 1")]
+    {
+        let refused = Truth { other_curve, ..Truth::default() }.curve(mission).unwrap_err().to_string();
+        assert_eq!(refused, format!("truth.other_curve is {other_curve}; {required} is accepted"));
+    }
     let mut nowhere = start;
     nowhere.position_m.x = f64::INFINITY;
     assert!(refuse(&Truth::default(), &nowhere).starts_with("the initial state is "));
