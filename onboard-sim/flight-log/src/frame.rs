@@ -1,5 +1,6 @@
 //! The flight computer's frames as log records, and back, bit for bit.
 
+use alloc::borrow::ToOwned as _;
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, Request};
