@@ -126,7 +126,10 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     let mut first = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
     screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", " ARMED ");
-    screen.type_until(b"0SSTART\r", "START acknowledged: accepted");
+    screen.type_until(b"0SSTART\r", "START  commanded");
+    screen.wait_until("the countdown", |window| {
+        window.row_with(" START  commanded ")?.contains("observed yes").then_some(())
+    });
     let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
