@@ -10,7 +10,7 @@ use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 pub use flight_log::again::FrameError;
-use flight_log::again::RecordedComputer;
+use flight_log::again::{RecordedComputer, mission_flown};
 use flight_log::frame::{LoggedInput, level_of, phase_of, start_to_log};
 use nmpc::SolveStatus;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
@@ -103,15 +103,8 @@ impl LoggedComputer {
         settings: &[Setting],
     ) -> Result<Schedule<Mission>, SettingError> {
         Schedule::of(settings, |so_far| {
-            let mut mission = mission_with(mission_toml, so_far)?;
             let set = |path: &str| so_far.iter().any(|setting| setting.path == path);
-            if !set("steered") {
-                mission.steered = start.steered;
-            }
-            if !set("ignition.fixed_height_m") {
-                mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
-            }
-            Ok(mission)
+            Ok(mission_flown(mission_with(mission_toml, so_far)?, start, set))
         })
     }
 

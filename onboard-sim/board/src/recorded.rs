@@ -167,7 +167,7 @@ impl Flying {
     fn power_up(kind: VehicleKind, begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
         let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
         let mission = flight::vehicles::mission::from_toml(&begin.toml, "mission");
-        let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start);
+        let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start, |_| false);
         let computer = RecordedComputer::started(&mission, &begin.start, controller);
         let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, &mission, &begin.toml));
         Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })

@@ -171,7 +171,7 @@ fn val_safety_md_the_abort_table_is_the_same() {
 /// `hazard` on the mission that is written flies the flights of the card, from the pad.
 #[test]
 fn what_a_card_says_is_flown_again_from_its_mission() {
-    let recipe = Recipe { seed: 5, ..Recipe::built_in("mk2", "real").unwrap() };
+    let recipe = Recipe { seed: 5, ..Recipe::built_in("mk3", "real").unwrap() };
     let mut windy = recipe.clone();
     windy.dispersion.wind_m_s = [4.0; 2];
     let (motor, curve) = (recipe.mission.airframe.motor.clone(), recipe.mission.motor_curve.clone());
@@ -197,6 +197,10 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
         text.contains(
             "Fewer than 100 flights were flown in each wind, or one did not come down: no radius, no rate"
         ),
+        "{text}"
+    );
+    assert!(
+        text.contains("Lay the landing pad downwind of the rail: 7 m for each m/s of that wind."),
         "{text}"
     );
     for row in aborts(StartPoint::Pad).concat() {

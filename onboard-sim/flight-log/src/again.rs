@@ -45,10 +45,27 @@ pub struct RecordedComputer {
     rehearsed: bool,
 }
 
-/// The mission as it was flown: the start record may change two of its values.
-pub fn mission_flown(mission: Mission, start: &ComputerStart) -> Mission {
-    let mut mission = Mission { steered: start.steered, ..mission };
-    mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
+/// The mission as it was flown, with the values that its start record adds, but for the keys that are `decided` otherwise.
+pub fn mission_flown(mut mission: Mission, start: &ComputerStart, decided: impl Fn(&str) -> bool) -> Mission {
+    if !decided("steered") {
+        mission.steered = start.steered;
+    }
+    if !decided("ignition.fixed_height_m") {
+        mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
+    }
+    if let (Some(launch), Some(foot_m)) = (&mut mission.launch, &start.rail_m) {
+        let rail = &mut launch.rail;
+        // The crew has placed it.
+        for (key, value, found) in [
+            ("launch.rail.x_m", &mut rail.x_m, foot_m.x),
+            ("launch.rail.y_m", &mut rail.y_m, foot_m.y),
+            ("launch.rail.upwind_s", &mut rail.upwind_s, 0.0),
+        ] {
+            if !decided(key) {
+                *value = found;
+            }
+        }
+    }
     mission
 }
 

@@ -33,6 +33,10 @@ pub struct Dispersion {
     pub wind_m_s: [f64; 2],
     /// Gust intensity, as a multiple of the military standard's.
     pub gust_scale: f64,
+    /// Error of the wind that the crew measures before it places the rail: of its speed, m/s.
+    pub measured_wind_m_s: f64,
+    /// Of its direction, degrees.
+    pub measured_wind_deg: f64,
     pub apogee_height_m: f64,
     /// Horizontal position of apogee, m, in each axis.
     pub apogee_place_m: f64,

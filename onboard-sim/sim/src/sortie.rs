@@ -23,7 +23,7 @@ use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
 use crate::dispersion::Dispersion;
-use crate::draw::{Draw, draw};
+use crate::draw::{Draw, draw, rail_moved_m};
 use crate::fault::{Breakage, Injector};
 use crate::limits::Limits;
 use crate::outcome::Outcome;
@@ -394,6 +394,14 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
     let law = Law::of(recipe.controller, &mission);
     mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
+    if let Some(rail) = mission.launch.as_mut().map(|launch| &mut launch.rail)
+        && rail.upwind_s != 0.0
+    {
+        let [x_m, y_m] = rail_moved_m(rail, &recipe.dispersion, &drawn.truth, recipe.seed, number);
+        rail.x_m += x_m;
+        rail.y_m += y_m;
+        rail.upwind_s = 0.0;
+    }
     (mission, law, drawn)
 }
 

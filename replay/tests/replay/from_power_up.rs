@@ -73,10 +73,11 @@ pub(crate) fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
 }
 
-/// A vehicle, and the header of its log.
+/// A vehicle, and the header of its log. Of those on a rail the one whose crew places the rail upwind.
 fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
-    let recipe = Recipe { faults, ..Recipe::built_in("mk2", "field").unwrap().starting_at(start).unwrap() };
+    let name = if start == StartPoint::Pad { "mk3" } else { "mk2" };
+    let recipe = Recipe { faults, ..Recipe::built_in(name, "field").unwrap().starting_at(start).unwrap() };
     let header = flight_log::sortie::header("test", &recipe, 0, 0);
     (Vehicle::on_the_pad(&RocketFlight { recipe, number: 0 }).unwrap(), header)
 }

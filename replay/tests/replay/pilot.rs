@@ -89,6 +89,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         gyro_bias_rad_s: None,
+        rail_m: None,
     };
     Fall { start, frames }
 });

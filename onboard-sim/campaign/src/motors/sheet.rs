@@ -334,12 +334,20 @@ impl Card {
             ),
             format!("Measure the continuity of {igniters}; the pin stays in until the pad is clear."),
             "Move fins and gimbal through their travel; each returns to its mark.".to_owned(),
-            "Load mission.toml; the ground station shows its name and no failed self-test.".to_owned(),
             "Measure the wind for ten minutes; the front says who stands where in it.".to_owned(),
+            "Load mission.toml; the ground station shows its name and no failed self-test.".to_owned(),
             format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
             "After the flight: a motor that was not lit is live. Nobody approaches for 60 s; then the pin first."
                 .to_owned(),
         ];
+        let on_rail = mission.launch.as_ref().filter(|_| self.start == StartPoint::Pad);
+        if let Some(upwind_s) = on_rail.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0)
+        {
+            checks.insert(6, format!(
+                "Lay the landing pad downwind of the rail: {upwind_s:.0} m for each m/s of that wind. Write where the rail then stands, from \
+                 the middle of the pad, into mission.toml, [launch.rail]: x_m to the north, y_m to the west.",
+            ));
+        }
         if let Some(crush) = airframe.legs.crush {
             checks.insert(2, format!(
                 "Each leg: its block new and unmarked, its foot free to rise by {:.0} mm. A block that has given way is replaced.",

@@ -33,6 +33,23 @@ pub struct Rail {
     pub tilt_deg: f64,
     /// Direction of the tilt in the world, from x towards y, degrees.
     pub towards_deg: f64,
+    /// Where its foot stands, from the middle of the landing pad, to the north, m.
+    #[serde(default)]
+    pub x_m: f64,
+    /// To the west, m.
+    #[serde(default)]
+    pub y_m: f64,
+    /// The crew places it upwind of the landing pad by this time times the mean wind at 10 m that it measures, s, and writes
+    /// where it stands into `x_m` and `y_m`. A simulated crew adds that to them, and then sets this to zero.
+    #[serde(default)]
+    pub upwind_s: f64,
+}
+
+impl Rail {
+    /// Where its foot stands, world, m.
+    pub fn foot_m(&self) -> Vector3<f64> {
+        Vector3::new(self.x_m, self.y_m, 0.0)
+    }
 }
 
 /// The booster stage, and the air on the whole stack. Coefficients are on the reference area of the vehicle's body.
@@ -85,13 +102,14 @@ impl Booster {
 }
 
 impl Launch {
-    /// The vehicle on the rail, at rest: its centre of gravity at a station, m, above the pad at the origin.
+    /// The vehicle on the rail, at rest: its centre of gravity at a station, m.
     pub fn standing(&self, cg_station_m: f64) -> RigidState {
         let (sin, cos) = libm::sincos(self.rail.towards_deg.to_radians());
         let axis = Vector3::new(-sin, cos, 0.0) * self.rail.tilt_deg.to_radians();
         let world_from_body = UnitQuaternion::from_scaled_axis(axis) * upright();
+        let along_m = self.booster.above_lower_end_m(cg_station_m);
         RigidState {
-            position_m: world_from_body * Vector3::x() * self.booster.above_lower_end_m(cg_station_m),
+            position_m: self.rail.foot_m() + world_from_body * Vector3::x() * along_m,
             world_from_body,
             ..RigidState::upright(0.0)
         }
@@ -110,6 +128,10 @@ impl Launch {
         // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
         within("launch.rail.tilt_deg", rail.tilt_deg, 0.0..=30.0, "0 to 30")?;
         within("launch.rail.towards_deg", rail.towards_deg, -360.0..=360.0, "-360 to 360")?;
+        // Farther away lies beyond the largest fence.
+        within("launch.rail.x_m", rail.x_m, -1000.0..=1000.0, "-1000 to 1000")?;
+        within("launch.rail.y_m", rail.y_m, -1000.0..=1000.0, "-1000 to 1000")?;
+        within("launch.rail.upwind_s", rail.upwind_s, -60.0..=60.0, "-60 to 60")?;
         within("launch.separate_before_apogee_s", self.separate_before_apogee_s, 0.0..=10.0, "0 to 10")?;
         within("launch.booster.length_m", booster.length_m, 0.05..=3.0, "0.05 to 3")?;
         within("launch.booster.dry_kg", booster.dry_kg, 0.01..=20.0, "0.01 to 20")?;
@@ -158,6 +180,11 @@ mod tests {
         // A metre above the lower end, 30 degrees from the vertical towards y.
         assert!((standing.position_m - Vector3::new(0.0, 0.5, 0.866_025_403_784)).norm() < 1e-9);
         assert!((standing.nose_in_world() - standing.position_m).norm() < 1e-9);
+        // The pad may lie elsewhere.
+        (launch.rail.x_m, launch.rail.y_m) = (-20.0, 5.0);
+        let moved = launch.standing(0.4);
+        assert!((moved.position_m - Vector3::new(-20.0, 5.5, 0.866_025_403_784)).norm() < 1e-9);
+        assert_eq!(moved.world_from_body, standing.world_from_body);
     }
 
     #[test]

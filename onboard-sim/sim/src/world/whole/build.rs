@@ -116,9 +116,9 @@ impl World {
     pub fn on_rail(mut self, launch: &Launch, truth: &AscentTruth) -> Self {
         let [about_x, about_y] = truth.rail_lean_rad;
         let lean = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
-        let standing = launch.standing(self.cg_m().x);
+        let (standing, foot_m) = (launch.standing(self.cg_m().x), launch.rail.foot_m());
         self.state = RigidState {
-            position_m: lean * standing.position_m,
+            position_m: foot_m + lean * (standing.position_m - foot_m),
             world_from_body: lean * standing.world_from_body,
             ..standing
         };
