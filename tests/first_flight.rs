@@ -49,7 +49,7 @@ fn a_first_flight_goes_as_its_page_says() {
     screen.type_until(b"SSTART\r", "START  commanded");
     // A busy machine may leave the radio silent for a second, which holds the countdown: then it is started again, and armed, if
     // nobody started it for long.
-    while screen.wait_within(COUNTDOWN, |window| (!window.shows("On the pad")).then_some(())).is_none() {
+    while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
         if screen.window().shows(" disarmed On the pad") {
             screen.type_until(b"AARM\r", " ARMED ");
         }
