@@ -54,12 +54,9 @@ pub fn mission_flown(mut mission: Mission, start: &ComputerStart, decided: impl 
         mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
     }
     if let (Some(launch), Some(foot_m)) = (&mut mission.launch, &start.rail_m) {
-        let rail = &mut launch.rail;
-        // The crew has placed it.
         for (key, value, found) in [
-            ("launch.rail.x_m", &mut rail.x_m, foot_m.x),
-            ("launch.rail.y_m", &mut rail.y_m, foot_m.y),
-            ("launch.rail.upwind_s", &mut rail.upwind_s, 0.0),
+            ("launch.rail.x_m", &mut launch.rail.x_m, foot_m.x),
+            ("launch.rail.y_m", &mut launch.rail.y_m, foot_m.y),
         ] {
             if !decided(key) {
                 *value = found;

@@ -6,7 +6,6 @@ use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use crate::world::wind::Wind;
 use crate::world::{AscentTruth, Hanging};
 use flight::vehicle::airframe::Legs;
-use flight::vehicle::launch::Rail;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -144,10 +143,10 @@ fn ascended(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> As
     }
 }
 
-/// How far the crew of flight `number` moves its rail into the wind that it measures, world, x and y, m; from a generator of its
-/// own.
-pub(crate) fn rail_moved_m(
-    rail: &Rail,
+/// Where the crew of flight `number` places a rail that should stand upwind of the pad by a time, s, times the wind: by the wind
+/// that it measures, x and y, m. It measures from a generator of its own.
+pub(crate) fn rail_upwind_m(
+    upwind_s: f64,
     sigma: &Dispersion,
     truth: &Truth,
     seed: u64,
@@ -159,7 +158,7 @@ pub(crate) fn rail_moved_m(
     let measured_m_s = (truth.wind_m_s + sigma.measured_wind_m_s * chance.normal()).max(0.0);
     let towards_rad = truth.wind_towards_rad + sigma.measured_wind_deg.to_radians() * chance.normal();
     let (sin, cos) = libm::sincos(towards_rad);
-    [cos, sin].map(|downwind| -downwind * measured_m_s * rail.upwind_s)
+    [cos, sin].map(|downwind| -downwind * measured_m_s * upwind_s)
 }
 
 /// How the vehicle of flight `number` hangs, from a generator of its own; `None` without a drone.
@@ -328,17 +327,15 @@ mod tests {
     /// A crew that measures well walks 7 m for each m/s, against the wind; one that does not, not always to the same place.
     #[test]
     fn the_rail_stands_upwind_of_the_pad() {
-        let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
-        let rail = Rail { upwind_s: 7.0, ..mission.launch.unwrap().rail };
         let day =
             |wind_m_s| Truth { wind_m_s, wind_towards_rad: 0.5 * core::f64::consts::PI, ..Truth::default() };
         let well = Dispersion::builtin("none").unwrap();
-        let [x_m, y_m] = rail_moved_m(&rail, &well, &day(4.0), 7, 3);
+        let [x_m, y_m] = rail_upwind_m(7.0, &well, &day(4.0), 7, 3);
         assert!(x_m.abs() < 1e-9 && (y_m + 28.0).abs() < 1e-9, "{x_m} {y_m}");
-        let [x_m, y_m] = rail_moved_m(&rail, &well, &day(0.0), 7, 3);
+        let [x_m, y_m] = rail_upwind_m(7.0, &well, &day(0.0), 7, 3);
         assert!(x_m.abs() < 1e-9 && y_m.abs() < 1e-9, "{x_m} {y_m}");
         let rough = Dispersion::builtin("real").unwrap();
-        let walked = |number| rail_moved_m(&rail, &rough, &day(4.0), 7, number);
+        let walked = |number| rail_upwind_m(7.0, &rough, &day(4.0), 7, number);
         let mean_y_m = (0..400).map(|number| walked(number)[1]).sum::<f64>() / 400.0;
         // The mean of cosines of errors of 20 degrees is 0.94; 7 m of scatter over the root of 400 is 0.35 m.
         assert!((mean_y_m + 0.94 * 28.0).abs() < 1.05, "{mean_y_m}");

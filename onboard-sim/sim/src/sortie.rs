@@ -23,7 +23,7 @@ use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
 use crate::dispersion::Dispersion;
-use crate::draw::{Draw, draw, rail_moved_m};
+use crate::draw::{Draw, draw, rail_upwind_m};
 use crate::fault::{Breakage, Injector};
 use crate::limits::Limits;
 use crate::outcome::Outcome;
@@ -396,11 +396,10 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
     if let Some(rail) = mission.launch.as_mut().map(|launch| &mut launch.rail)
         && rail.upwind_s != 0.0
+        && rail.foot_m() == Vector3::zeros()
     {
-        let [x_m, y_m] = rail_moved_m(rail, &recipe.dispersion, &drawn.truth, recipe.seed, number);
-        rail.x_m += x_m;
-        rail.y_m += y_m;
-        rail.upwind_s = 0.0;
+        [rail.x_m, rail.y_m] =
+            rail_upwind_m(rail.upwind_s, &recipe.dispersion, &drawn.truth, recipe.seed, number);
     }
     (mission, law, drawn)
 }

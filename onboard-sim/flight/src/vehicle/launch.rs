@@ -40,7 +40,7 @@ pub struct Rail {
     #[serde(default)]
     pub y_m: f64,
     /// The crew places it upwind of the landing pad by this time times the mean wind at 10 m that it measures, s, and writes
-    /// where it stands into `x_m` and `y_m`. A simulated crew adds that to them, and then sets this to zero.
+    /// where it stands into `x_m` and `y_m`. A simulated crew does so where both are zero.
     #[serde(default)]
     pub upwind_s: f64,
 }
