@@ -154,7 +154,12 @@ fn a_lot_of_another_vehicle_or_with_a_slip_is_refused_by_its_key() {
 #[test]
 fn mk3_flies_with_the_numbers_of_mk2() {
     let read = |name: &str| flight::vehicles::mission::builtin(name).expect("built in").expect("sound");
-    let (mk2, mk3) = (read("mk2"), read("mk3"));
+    let (mk2, mut mk3) = (read("mk2"), read("mk3"));
+    // Only mk3's crew places its rail upwind.
+    if let Some(launch) = &mut mk3.launch {
+        assert!(launch.rail.upwind_s > 0.0);
+        launch.rail.upwind_s = 0.0;
+    }
     let (name, summary, airframe) = (mk2.name.clone(), mk2.summary.clone(), mk2.airframe.clone());
     assert!(mk3.estimator.gnss_age_jitter_s > 0.0 && mk3.estimator.barometer_suction > 0.0);
     let estimator = EstimatorConfig { gnss_age_jitter_s: 0.0, barometer_suction: 0.0, ..mk3.estimator };
