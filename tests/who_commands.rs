@@ -127,9 +127,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", " ARMED ");
     screen.type_until(b"0SSTART\r", "START  commanded");
-    screen.wait_until("the countdown", |window| {
-        window.row_with(" START  commanded ")?.contains("observed yes").then_some(())
-    });
+    screen.wait_for_fact("START", "observed yes");
     let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
@@ -189,9 +187,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
     screen.type_until(b"0AARM\r", "ARM acknowledged: accepted");
     assert!(!other.was_sent(ARM), "the other vehicle was armed, too");
     screen.type_bytes(b"\x18\r");
-    let is_aborted =
-        |row: &String| row.contains("ABORT ") && row.contains("acknowledged accepted  observed yes");
-    screen.wait_until("observed abort", |window| window.rows().iter().any(is_aborted).then_some(()));
+    screen.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     screen.wait_until("the abort at the other vehicle", |_| other.was_sent(ABORT).then_some(()));
     vehicle.signal(Signal::SIGTERM);
     assert_eq!(vehicle.wait().code, Some(4));

@@ -112,6 +112,14 @@ impl Terminal {
         self.keyboard.write_all(bytes).expect("a terminal that takes keys");
     }
 
+    /// Waits until the facts about a command contain these words, and returns the facts:
+    /// ` ABORT  commanded 12.3 s x4  acknowledged waiting  observed yes`.
+    pub fn wait_for_fact(&self, name: &str, words: &str) -> String {
+        self.wait_until(&format!("{name}: {words}"), |window| {
+            window.facts_about(name).filter(|facts| facts.contains(words))
+        })
+    }
+
     /// Types these keys with a pause between them, as a person does.
     pub fn type_by_hand(&mut self, keys: &[u8]) {
         for (k, key) in keys.iter().enumerate() {

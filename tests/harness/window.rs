@@ -93,6 +93,11 @@ impl Window {
         self.rows().into_iter().find(|row| row.contains(words))
     }
 
+    /// The row with the facts about a command.
+    pub fn facts_about(&self, command: &str) -> Option<String> {
+        self.row_with(&format!(" {command:<6} commanded "))
+    }
+
     /// Whether a row contains these words.
     pub fn shows(&self, words: &str) -> bool {
         self.row_with(words).is_some()

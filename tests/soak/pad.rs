@@ -119,10 +119,7 @@ impl Pad {
     /// An abort is still possible: it is the last thing that the pad is asked for.
     pub(crate) fn close(mut self) -> Result<Vec<String>, Failure> {
         self.screen.type_bytes(b"\x18\r");
-        self.screen.wait_until("an observed abort", |window| {
-            let row = window.row_with(" ABORT  commanded ")?;
-            row.contains("observed yes").then_some(())
-        });
+        self.screen.wait_for_fact("ABORT", "observed yes");
         let log = format!("/proc/{}/cwd/disk/station.mcap", self.station.pid());
         let info = Running::to_end(program(Program::Replay).args(["info", &log]));
         say(&format!("aborted; replay info of the log on the full disk\n{}", info.output))?;

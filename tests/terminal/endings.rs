@@ -29,15 +29,6 @@ fn whole_log(path: &Path, topic: &str) -> Vec<String> {
     found
 }
 
-/// Waits for the facts about the abort, not about the arming before it.
-fn wait_for_abort(screen: &Terminal) {
-    screen.wait_until("an abort that was seen", |window| {
-        window
-            .row_with(" ABORT  commanded ")
-            .filter(|facts| facts.contains("acknowledged accepted  observed yes"))
-    });
-}
-
 #[test]
 fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     type Ending = fn(&mut Terminal);
@@ -80,7 +71,7 @@ fn while_armed_the_screen_quits_only_by_a_typed_word_and_the_station_continues()
     let mut second = Terminal::start(&ground(rig.folder.path(), &["attach"]), SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
-    wait_for_abort(&second);
+    second.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     rig.terminal.signal(Signal::SIGTERM);
     assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
     whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
@@ -100,12 +91,12 @@ fn after_a_hangup_the_station_continues_and_another_screen_shows_everything() {
     second.wait_for("the terminal is gone");
     second.type_by_hand(b"0");
     second.type_bytes(b"\x18\r");
-    wait_for_abort(&second);
+    second.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     // A watching screen can neither abort nor end the station.
     let watch = ground(rig.folder.path(), &["attach", "--watch"]);
     let mut third = Terminal::start(&watch, SIZE, false);
     third.wait_for("WATCHING only");
-    wait_for_abort(&third);
+    third.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     for screen in [&mut second, &mut third] {
         screen.type_by_hand(b"q");
         screen.wait_for_end();
@@ -133,7 +124,7 @@ fn a_terminal_that_reads_nothing_blocks_neither_link_nor_abort_nor_log() {
     let mut second = Terminal::start(&attach, SIZE, false);
     second.wait_for(" ARMED ");
     second.type_bytes(b"\x18\r");
-    wait_for_abort(&second);
+    second.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     drop(not_reading);
     // When the output is read again, the screen shows the present state.
     rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");

@@ -80,15 +80,13 @@ impl Rig {
 
     /// Waits until the facts about a command contain these words; returns the number of attempts shown.
     pub(crate) fn wait_for_fact(&self, name: &str, words: &str) -> usize {
-        self.terminal.wait_until(&format!("{name}: {words}"), |window| {
-            facts(window, name).filter(|facts| facts.contains(words)).map(|facts| attempts(&facts))
-        })
+        attempts(&self.terminal.wait_for_fact(name, words))
     }
 
     /// Waits until the ground shows this many attempts.
     pub(crate) fn wait_for_attempts(&self, name: &str, wanted: usize) {
         self.terminal.wait_until(&format!("{name} x{wanted}"), |window| {
-            facts(window, name).filter(|facts| attempts(facts) >= wanted)
+            window.facts_about(name).filter(|facts| attempts(facts) >= wanted)
         });
     }
 }
@@ -129,10 +127,6 @@ fn vehicle(profile: &str, proxy: &UdpProxy, folder: &Path) -> Running {
     command.args(["fly", "--stay", "--profile", profile, "--mavlink", &proxy.vehicle_link()]);
     command.arg("--uid-file").arg(folder.join("vehicle.uid"));
     Running::start(&mut command)
-}
-
-fn facts(window: &e2e::Window, name: &str) -> Option<String> {
-    window.row_with(&format!(" {name:<6} commanded "))
 }
 
 /// The number in ` ABORT  commanded 12.3 s x4  acknowledged waiting  observed yes`.

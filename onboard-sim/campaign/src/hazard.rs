@@ -513,7 +513,7 @@ impl Rule {
 
     /// The rule for a mission with all its motors. A model rocket has up to 160 N s, 125 g of propellant and 1,500 g.
     pub fn of(mission: &Mission) -> Self {
-        let booster = mission.launch.as_ref().filter(|_| mission.start.at == StartPoint::Pad);
+        let booster = mission.launched();
         let booster = booster.map(|launch| &launch.booster);
         let motors = || {
             [Some(&mission.motor_curve), booster.map(|booster| &booster.motor_curve)].into_iter().flatten()

@@ -55,7 +55,7 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
         gyro_bias_rad_s: stood.then(|| estimate.gyro_bias_rad_s.to_log()),
         steered: mission.steered,
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
-        rail_m: mission.launch.as_ref().map(|launch| launch.rail.foot_m().to_log()),
+        rail_m: mission.launched().map(|launch| launch.rail.foot_m().to_log()),
         released,
     }
 }

@@ -394,7 +394,8 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
     let law = Law::of(recipe.controller, &mission);
     mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
-    if let Some(rail) = mission.launch.as_mut().map(|launch| &mut launch.rail)
+    if mission.start.at == StartPoint::Pad
+        && let Some(rail) = mission.launch.as_mut().map(|launch| &mut launch.rail)
         && rail.upwind_s != 0.0
         && rail.foot_m() == Vector3::zeros()
     {
@@ -474,8 +475,7 @@ impl Sortie {
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
     /// `None` if the pilot gets the truth instead of an estimate, before the motor has lit, and where its scales are over another
-    /// curve than the truth's. The accelerometer cannot
-    /// tell more impulse from less mass.
+    /// curve than the truth's. The accelerometer cannot tell more impulse from less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {

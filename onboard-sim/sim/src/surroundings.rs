@@ -173,9 +173,9 @@ const UNNOTICED_FRAMES: usize = 20;
 /// The world at the start of the flight.
 pub(crate) fn world(mission: &Mission, drawn: &Draw) -> Result<World, SetUpError> {
     let world = world_at(mission, drawn, &drawn.apogee)?;
-    Ok(match (mission.start.at, &mission.launch) {
-        (StartPoint::Pad, Some(launch)) => world.on_rail(launch, &drawn.ascent),
-        _ => world,
+    Ok(match mission.launched() {
+        Some(launch) => world.on_rail(launch, &drawn.ascent),
+        None => world,
     })
 }
 

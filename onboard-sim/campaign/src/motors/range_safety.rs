@@ -25,7 +25,7 @@ pub struct InWind {
 /// Nobody stands in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
-    /// Radius about the pad: what flights and rule ask for in this wind and in less.
+    /// Radius about the landing pad: what flights and rule ask for in this wind and in less.
     pub keep_out_m: f64,
     /// The way of ending that reaches farthest, with its flights.
     pub way: Way,

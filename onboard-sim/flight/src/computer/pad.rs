@@ -388,9 +388,7 @@ impl Computer {
     fn begin_flight(&mut self) {
         self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
         let mission = self.pilot.mission();
-        if let (Some(launch), Some(start)) = (&mission.launch, self.pad.at_rest())
-            && mission.start.at == StartPoint::Pad
-        {
+        if let (Some(launch), Some(start)) = (mission.launched(), self.pad.at_rest()) {
             let believed = RigidState {
                 world_from_body: start.world_from_body,
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)

@@ -315,6 +315,11 @@ impl Mission {
         self.lot.as_ref().map_or(0, |lot| lot.burns)
     }
 
+    /// Rail and booster of a mission that starts from them.
+    pub fn launched(&self) -> Option<&Launch> {
+        self.launch.as_ref().filter(|_| self.start.at == StartPoint::Pad)
+    }
+
     /// The prior of a motor with another curve than the expected one: nobody has burnt any of its lot.
     pub(crate) fn unknown_motor(&self) -> MotorPrior {
         let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();

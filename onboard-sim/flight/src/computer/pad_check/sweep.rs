@@ -12,7 +12,7 @@ use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{FELT_AT_REST_M_S2, STILL_RAD_S};
 use crate::vehicle::airframe::{Airframe, Servo};
-use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
+use crate::vehicle::mission::{ArmingLimits, Mission};
 
 /// A surface stays at an end for this long after it should have arrived, s: a servo at half its rate arrives late, and
 /// yet is seen to arrive. mk2's longest way takes 0.3 s.
@@ -324,7 +324,7 @@ impl Still {
     /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter doubts its attitude by the
     /// mount's stated misalignment, and no sensor shows it in flight.
     pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<Finding> {
-        let launch = mission.launch.as_ref().filter(|_| mission.start.at == StartPoint::Pad)?;
+        let launch = mission.launched()?;
         let rail = launch.standing(mission.airframe.mass.loaded_cg_station_m).world_from_body;
         let up = rail.inverse_transform_vector(&Vector3::z());
         let felt = Vector3::from(self.force_m_s2.map(|spread| spread.mean));

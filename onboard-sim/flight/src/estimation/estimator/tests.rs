@@ -251,25 +251,13 @@ fn heights_with_ranges_from(first: u64, tenth_m: f64) -> Vec<f64> {
 #[test]
 fn ranges_that_agree_for_a_tenth_of_a_second_are_believed_at_once() {
     for first in [402, 404] {
-        let heights_m = heights_with_ranges_from(first, 4.6);
-        assert!(
-            heights_m[..18].iter().all(|height_m| (height_m - 8.0).abs() < 0.1),
-            "{first}: {heights_m:?}"
-        );
-        assert!(
-            heights_m[18..].iter().all(|height_m| (height_m - 5.0).abs() < 0.3),
-            "{first}: {heights_m:?}"
-        );
-        // The tenth is an outlier: the next two decide.
-        let heights_m = heights_with_ranges_from(first, 9.0);
-        assert!(
-            heights_m[..22].iter().all(|height_m| (height_m - 8.0).abs() < 0.1),
-            "{first}: {heights_m:?}"
-        );
-        assert!(
-            heights_m[22..].iter().all(|height_m| (height_m - 5.0).abs() < 0.3),
-            "{first}: {heights_m:?}"
-        );
+        // An outlier as the tenth: the next two decide.
+        for (tenth_m, believed_after) in [(4.6, 18), (9.0, 22)] {
+            let heights_m = heights_with_ranges_from(first, tenth_m);
+            let (before_m, after_m) = heights_m.split_at(believed_after);
+            assert!(before_m.iter().all(|height_m| (height_m - 8.0).abs() < 0.1), "{first}: {heights_m:?}");
+            assert!(after_m.iter().all(|height_m| (height_m - 5.0).abs() < 0.3), "{first}: {heights_m:?}");
+        }
     }
 }
 
