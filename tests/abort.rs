@@ -46,7 +46,7 @@ fn an_abort_on_the_pad_disarms_latches_and_prevents_arming() {
         let after = flight.ground.wait_for_phase(TdPhase::TD_PHASE_PAD_IDLE);
         assert!(after.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED));
         assert!(!after.interlocks.contains(TdInterlock::TD_INTERLOCK_ARMED));
-        assert!(after.pad_wait_s > 50, "{}", after.pad_wait_s);
+        assert!(after.approach_wait_s > 50, "{}", after.approach_wait_s);
         let beat = flight.ground.wait_for_heartbeat();
         assert_eq!(beat.system_status, MavState::MAV_STATE_FLIGHT_TERMINATION);
         assert!(!beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED));

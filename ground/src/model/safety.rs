@@ -58,7 +58,7 @@ impl KeepAway {
         let status = &sample.value;
         let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
         let passed_s = u16::try_from(sample.age(now).as_secs()).unwrap_or(u16::MAX);
-        let wait_s = told_s.map(|told_s| told_s.max(status.pad_wait_s.into()).saturating_sub(passed_s));
+        let wait_s = told_s.map(|told_s| told_s.saturating_sub(passed_s));
         let danger = match status.motor {
             _ if !concerns(status) => return None,
             TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,
@@ -178,7 +178,7 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
         // Before a flight the motor is inhibited as planned.
         phase if is_on_pad(phase) => {
             let latched = status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
-            latched || status.approach_wait_s > 0 || status.pad_wait_s > 0
+            latched || status.approach_wait_s > 0
         }
         _ => status.interlocks.intersects(amiss),
     }
@@ -233,7 +233,7 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
         TdHold::TD_HOLD_NONE => return None,
         TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 1 s"),
         TdHold::TD_HOLD_STATION_DEAF => format!("{whom} did not hear the vehicle for 1 s"),
-        TdHold::TD_HOLD_LOG_FAILED => "the vehicle's log has failed".to_owned(),
+        TdHold::TD_HOLD_CHECK_FAILED => "a check of the vehicle fails".to_owned(),
         TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
             Some(who) => format!("{who} asked for it"),
             None => "a station asked for it".to_owned(),

@@ -261,7 +261,7 @@ fn nothing_is_said_of_approaching_in_flight_or_while_the_vehicle_is_being_prepar
     let screen = rig.screen(80, 24);
     assert!(screen.contains(" Parachute ") && !screen.contains(" next do not"), "{screen}");
     let mut rig = Rig::crewed();
-    rig.pad_wait_s = 31;
+    rig.approach_wait_s = 31;
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(0.1);
     stands_on_every_page(&mut rig, "DO NOT APPROACH", "do not approach for 31 s: the waiting time runs");

@@ -479,7 +479,7 @@ fn the_wait_after_an_abort_on_the_pad_is_shown_at_every_size() {
     let mut rig = Rig::crewed();
     rig.abort_chord();
     rig.answer(ABORT, ACCEPTED);
-    rig.pad_wait_s = 57;
+    rig.approach_wait_s = 57;
     rig.run(0.1);
     assert!(rig.screen(80, 24).contains("do not approach for 57 s: LIVE MOTOR"), "{}", rig.screen(80, 24));
     assert!(rig.screen(20, 5).contains("DO NOT APPROACH"), "{}", rig.screen(20, 5));

@@ -198,11 +198,11 @@ fn a_power_cycle_does_not_end_the_waiting_time_after_an_abort() {
     let mut rig = counting();
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
     (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
-    (rig.pad_wait_s, rig.approach_wait_s) = (58, 58);
+    rig.approach_wait_s = 58;
     rig.run(1.0);
     rig.reboot();
     rig.interlocks = TdInterlock::TD_INTERLOCK_PIN_OUT;
-    (rig.pad_wait_s, rig.approach_wait_s) = (0, 0);
+    rig.approach_wait_s = 0;
     rig.run(4.0);
     let screen = rig.screen(80, 24);
     assert!(rig.events().contains("rebooted") && screen.contains("do not approach"), "{screen}");

@@ -4,7 +4,6 @@ use alloc::vec::Vec;
 
 use flight::computer::findings::Findings;
 use flight::computer::news::CrewMessage;
-use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, Output};
 use flight::rules::outputs::Line;
 use flight::vehicle::mission::Mission;
@@ -12,7 +11,6 @@ use flight_log::frame::LoggedInput;
 use flight_log::logged::Logged;
 use protocol::frame::Framer;
 use vehicle_link::endpoint::{UplinkState, VehicleEndpoint};
-use vehicle_link::sensed::SensorWatch;
 use vehicle_link::vehicle::{BatteryFacts, MissionName, VehicleKind, VehicleState};
 
 use crate::stream::{self, OnTheAir};
@@ -44,7 +42,6 @@ pub(crate) struct Crewed {
     framer: Framer,
     silent_frames: u32,
     name: MissionName,
-    sensors: SensorWatch,
     findings: Findings,
     parachute_ejected: bool,
     /// For the next frame.
@@ -67,7 +64,6 @@ impl Crewed {
             framer: Framer::new(),
             silent_frames: 0,
             name,
-            sensors: SensorWatch::default(),
             findings: Findings::default(),
             parachute_ejected: false,
         }
@@ -89,11 +85,6 @@ impl Crewed {
         computer: &Computer,
         radio: &mut impl Radio,
     ) -> stream::Heard {
-        let measured = match &input.sensed {
-            Sensed::Measured(measured) => Some(measured),
-            Sensed::Known(_) => None,
-        };
-        self.sensors.take(measured, input.frame);
         self.findings.note(computer);
         self.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
         let flown = VehicleState {
@@ -101,7 +92,6 @@ impl Crewed {
             time_s: input.time_s,
             name: &self.name,
             operators: &[],
-            sensors: &self.sensors,
             findings: &self.findings,
             battery: input.battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
             rehearsed: None,

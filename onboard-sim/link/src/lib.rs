@@ -8,7 +8,6 @@
 //! * [`commands`]: translates MAVLink commands to requests for the vehicle.
 //! * [`stations`]: how well the vehicle hears each ground station.
 //! * [`telemetry`] and [`streams`]: that state as MAVLink messages, and their rates.
-//! * [`sensed`]: what the sensors said last.
 //! * [`parameters`]: values that a ground station may read by name, and the few that it may set.
 #![cfg_attr(not(test), no_std)]
 
@@ -17,7 +16,6 @@ extern crate alloc;
 pub mod commands;
 pub mod endpoint;
 pub mod parameters;
-pub mod sensed;
 pub mod stations;
 pub mod streams;
 pub mod telemetry;

@@ -3,9 +3,11 @@
 use alloc::string::String;
 
 use flight::computer::findings::Findings;
+use flight::computer::pilot::Sensed;
 use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown_m};
 use flight::computer::{Computer, Input};
 use flight::estimation::estimator::Estimate;
+use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
@@ -17,8 +19,6 @@ use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use protocol::mission::MissionHash;
-
-use crate::sensed::SensorWatch;
 
 /// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
 /// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.
@@ -117,7 +117,6 @@ pub struct VehicleState<'a> {
     pub name: &'a MissionName,
     /// Who may command; empty without operators.
     pub operators: &'a [Operator],
-    pub sensors: &'a SensorWatch,
     /// What went wrong so far.
     pub findings: &'a Findings,
     /// `None` where its voltage is not measured.
@@ -151,13 +150,21 @@ impl<'a> VehicleState<'a> {
         self.computer.input()
     }
 
+    /// The measurements of the last frame; `None` where no sensors are modelled.
+    pub fn measured(&self) -> Option<&'a Measurements> {
+        match &self.input().sensed {
+            Sensed::Measured(measured) => Some(measured).filter(|_| self.computer.sensors().measures()),
+            Sensed::Known(_) => None,
+        }
+    }
+
     /// What counts as a landing.
     pub fn limits(&self) -> TouchdownLimits {
         TouchdownLimits::of_the_legs(self.mission())
     }
 
     /// Bit k: arming check k fails now. Zero off the pad.
-    pub fn checks_failed(&self) -> u16 {
+    pub fn checks_failed(&self) -> u32 {
         if !self.phase().on_pad() {
             return 0;
         }
@@ -365,10 +372,10 @@ fn ned(in_world: &Vector3<f64>) -> [f64; 3] {
 
 /// One bit per broken limit, in the verdict's order.
 pub fn violations(verdict: &LandingVerdict) -> u16 {
-    bits(verdict.results.iter().map(|result| !result.passed))
+    bits(verdict.results.iter().map(|result| !result.passed)) as u16
 }
 
 /// Flags as bits, the first in bit 0.
-fn bits(flags: impl Iterator<Item = bool>) -> u16 {
-    flags.take(16).enumerate().fold(0, |bits, (place, set)| bits | (u16::from(set) << place))
+fn bits(flags: impl Iterator<Item = bool>) -> u32 {
+    flags.take(32).enumerate().fold(0, |bits, (place, set)| bits | (u32::from(set) << place))
 }

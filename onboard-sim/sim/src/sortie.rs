@@ -408,7 +408,8 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
 // Applies a fault to a flight.
 
 impl Sortie {
-    fn break_down(&mut self, breakage: &Breakage) {
+    /// Something breaks now.
+    pub fn break_down(&mut self, breakage: &Breakage) {
         let every = Vector3::from_element(1.0);
         let sensors = &mut self.surroundings.faults;
         match *breakage {

@@ -319,6 +319,12 @@ fn failure(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_ABORT_LATCH => "power cycle",
         TdCheck::TD_CHECK_PIN => "pull the pin",
         TdCheck::TD_CHECK_SELF_TEST => "not passed",
+        TdCheck::TD_CHECK_ACCELEROMETER
+        | TdCheck::TD_CHECK_GYRO
+        | TdCheck::TD_CHECK_BAROMETER
+        | TdCheck::TD_CHECK_LIDAR => "no data",
+        TdCheck::TD_CHECK_GNSS => "no fix",
+        TdCheck::TD_CHECK_HEIGHT => "too low",
         TdCheck::TD_CHECK_TILT => "not upright",
         TdCheck::TD_CHECK_ROTATION => "turning",
         TdCheck::TD_CHECK_SPEED => "moving",

@@ -147,7 +147,7 @@ pub(super) fn event_of(
     Some(match asked {
         Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
         Asked::Disarm => Event::DisarmRequested { lifted_off },
-        Asked::Start => Event::StartRequested { countdown_s },
+        Asked::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
         Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill | Asked::EndCheck => return None,
@@ -241,7 +241,8 @@ impl Computer {
                 _ => Answer::ACCEPTED,
             };
         };
-        if let (Asked::Hold, true, Some(station)) = (asked, mode.may_hold(start, time_s), station) {
+        let may_hold = mode.may_hold_for(HoldCause::Commanded, start, time_s);
+        if let (Asked::Hold, true, Some(station)) = (asked, may_hold, station) {
             let who = by.map_or_else(String::new, |by| format!("{by}, "));
             self.table.say(Severity::Notice, format!("{who}station {station} asks for a hold"));
         }
@@ -290,7 +291,7 @@ impl Computer {
             let who = named(armed_by, by);
             return Some(format!("{who} armed it: start there, or take command when it is silent"));
         }
-        (!self.input.log.running).then(|| "the log has failed: disarm, and see to it".into())
+        None
     }
 
     /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
@@ -418,17 +419,10 @@ impl Computer {
         }
     }
 
-    /// Holds the countdown if the log has failed: nobody would learn afterwards what happened.
-    pub(super) fn watch_the_log(&mut self) {
-        if !self.input.log.running {
-            self.hold(HoldCause::LogFailed, || "the log has failed in the countdown".into());
-        }
-    }
-
-    /// Holds a running countdown, and says why; not in its last moment, when nothing holds any more.
-    fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
+    /// Holds a running countdown, and says why; not when this cause comes too late for it.
+    pub(super) fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
         let start = self.start_point();
-        if !self.table.mode().may_hold(start, self.table.time_s()) {
+        if !self.table.mode().may_hold_for(cause, start, self.table.time_s()) {
             return false;
         }
         self.table.say(Severity::Critical, why());

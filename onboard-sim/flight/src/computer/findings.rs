@@ -11,8 +11,9 @@ use alloc::vec::Vec;
 
 use super::pilot::Sensed;
 use super::{Computer, FRAME_S, Input};
-use crate::estimation::estimator::{Estimate, Health, ImuSample};
+use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
+use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Line;
 use crate::rules::phase::{Latch, Phase};
@@ -233,22 +234,14 @@ impl Findings {
     }
 }
 
-/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a second and drops one sample
-/// in 50.
-const GNSS_LOST_S: f64 = 1.5;
 /// The same where its last fix came before the boost was over, s: none of three receivers keeps its fix in a boost.
 const GNSS_LOST_IN_BOOST_S: f64 = 6.0;
-/// The barometer speaks 50 times a second.
-const BAROMETER_LOST_S: f64 = 0.25;
-/// A lidar that says nothing for this long, s, where it must see the ground: from this slant range, m, down to the dust, and
-/// while its beam leans less than this (40 deg).
-const LIDAR_LOST_S: f64 = 0.25;
+/// Where the lidar must see the ground: from this slant range, m, down to the dust, and while its beam leans less than this
+/// (40 deg).
 const LIDAR_SEES_M: [f64; 2] = [3.0, 10.0];
 const LIDAR_COS_TILT: f64 = 0.766;
 /// Beyond this tilt (60 deg) the nose is astray: no plan leans so far.
 const ASTRAY_COS_TILT: f64 = 0.5;
-/// So many equal samples in a row do not happen to noise.
-const FROZEN_FRAMES: u32 = 10;
 /// A gimbal and a fin this far from where their servo's data take them do not follow, rad. Feedback, play and an unknown
 /// half frame of delay make 1 deg of it for a gimbal; the fins' feedback is coarser.
 const AWAY_RAD: [f64; 2] = [0.035, 0.14];
@@ -278,13 +271,8 @@ struct Watcher {
     frame: u64,
     /// Frames that are missing before this one.
     missing: u64,
-    /// When each sensor last spoke, s.
-    gnss_s: f64,
-    barometer_s: f64,
-    lidar_s: f64,
+    /// Satellites were seen after the boost.
     gnss_since_boost: bool,
-    imu: ImuSample,
-    frozen_frames: u32,
     surfaces: [ServoModel; SURFACES],
     /// Specific force along the nose over the boost, m/s.
     boost_m_s: f64,
@@ -307,12 +295,7 @@ impl Watcher {
         Self {
             frame: flown.frame.saturating_sub(1),
             missing: 0,
-            gnss_s: flown.time_s,
-            barometer_s: flown.time_s,
-            lidar_s: flown.time_s,
             gnss_since_boost: false,
-            imu: ImuSample::NONE,
-            frozen_frames: 0,
             surfaces: servos(airframe, flown),
             boost_m_s: 0.0,
             ejected_s: None,
@@ -331,22 +314,11 @@ impl Watcher {
         if self.missing > 0 {
             // Nobody knows what was commanded or measured meanwhile.
             self.surfaces = servos(&computer.pilot().mission().airframe, flown);
-            (self.gnss_s, self.barometer_s, self.lidar_s) = (time_s, time_s, time_s);
         }
         if let Sensed::Measured(measured) = &flown.sensed {
             if measured.gnss.is_some() {
-                self.gnss_s = time_s;
                 self.gnss_since_boost = phase != Phase::Boost;
             }
-            if measured.pressure_altitude_m.is_some() {
-                self.barometer_s = time_s;
-            }
-            if measured.lidar_range_m.is_some() {
-                self.lidar_s = time_s;
-            }
-            let same = measured.imu.specific_force_m_s2 == self.imu.specific_force_m_s2;
-            self.frozen_frames = if same { self.frozen_frames + 1 } else { 0 };
-            self.imu = measured.imu;
             if phase == Phase::Boost {
                 self.boost_m_s += measured.imu.specific_force_m_s2.x * FRAME_S;
             }
@@ -383,10 +355,10 @@ impl Watcher {
         let mission = pilot.mission();
         let in_air = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down;
         let now = |value: f64, beside| Seen { since_s: time_s, size: value, value, beside, detail: "" };
-        let silent = |since_s: f64, longest_s: f64, beside: f64| {
-            let silent_s = time_s - since_s;
+        let [barometer_s, gnss_s, _] = computer.sensors().silent_s();
+        let silent = |silent_s: f64, longest_s: f64| {
             (in_air && has_sensors(flown) && silent_s > longest_s)
-                .then_some(Seen { since_s, ..now(silent_s, beside) })
+                .then_some(Seen { since_s: time_s - silent_s, ..now(silent_s, 0.0) })
         };
         match sign {
             Sign::Restart => {
@@ -395,9 +367,9 @@ impl Watcher {
             }
             Sign::Gnss => {
                 let climbs = phase == Phase::Boost || !self.gnss_since_boost && mission.launch.is_some();
-                silent(self.gnss_s, if climbs { GNSS_LOST_IN_BOOST_S } else { GNSS_LOST_S }, 0.0)
+                silent(gnss_s, if climbs { GNSS_LOST_IN_BOOST_S } else { GNSS_LOST_S })
             }
-            Sign::Barometer => silent(self.barometer_s, BAROMETER_LOST_S, 0.0),
+            Sign::Barometer => silent(barometer_s, BAROMETER_LOST_S),
             Sign::Gate | Sign::Latched => {
                 let detail = latched(computer.latch()?, sign, self.gate)?;
                 Some(Seen { detail, ..now(0.0, 0.0) })
@@ -433,13 +405,14 @@ fn seen_in_flight(
             let [low_m, high_m] = LIDAR_SEES_M;
             let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
             let must_see_s = watcher.must_see_s.filter(|_| falls && height_m >= low_m)?;
-            let silent_s = time_s - watcher.lidar_s.max(must_see_s);
+            let [_, _, lidar_s] = computer.sensors().silent_s();
+            let silent_s = lidar_s.min(time_s - must_see_s);
             (silent_s > LIDAR_LOST_S).then(|| seen(time_s - silent_s, silent_s, high_m, ""))
         }
-        Sign::Accelerometer => (watcher.frozen_frames >= FROZEN_FRAMES).then(|| {
-            let frozen_s = f64::from(watcher.frozen_frames) * FRAME_S;
-            seen(time_s - frozen_s, frozen_s, 0.0, "")
-        }),
+        Sign::Accelerometer => {
+            let frozen_s = computer.sensors().accelerometer_frozen_s()?;
+            Some(seen(time_s - frozen_s, frozen_s, 0.0, ""))
+        }
         Sign::HeightsDisagree => {
             let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
             let apart_m = estimate.heights.disagreement_m().filter(|_| falls)?;

@@ -33,12 +33,13 @@ use serde::{Deserialize, Serialize};
 pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
-use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
+use self::pad::{ANSWERING_RAD, PadWatch, SelfTest, as_measured};
 use self::pad_check::PadCheck;
 use self::pilot::{Pilot, Pointed, Sensed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::estimation::estimator::{ImuSample, Measurements};
+use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::{PredictedLanding, Uplink};
@@ -67,6 +68,8 @@ struct Release {
 #[derive(Debug, Clone, Serialize)]
 pub struct Computer {
     table: PhaseTable,
+    /// Which sensors speak.
+    sensors: SensorWatch,
     /// The wait on the pad.
     pad: PadWatch,
     /// Flies from the release on.
@@ -110,8 +113,16 @@ impl Computer {
         if self.rehearsed.is_none() {
             self.rehearsed = input.rehearsed.cloned();
         }
+        self.sensors.take(
+            &as_measured(&input.sensed),
+            matches!(input.sensed, Sensed::Measured(_)),
+            input.time_s,
+        );
         if self.table.mode().phase.on_pad() {
             self.pad.update_stillness(&input.sensed);
+            if self.rehearsed.is_some() {
+                self.ask_the_checks_again();
+            }
         }
         let flown = self.flown();
         if let Some(flown) = &flown {
@@ -121,10 +132,9 @@ impl Computer {
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
-        self.watch_the_log();
         let mut planned = false;
         if let Some(flown) = &flown {
-            self.pilot.decide(&mut self.table, flown);
+            self.pilot.decide(&mut self.table, flown, &self.sensors);
             planned = self.pilot.plan(self.table.mode(), flown);
             let pointed = self.pilot.point(self.table.mode(), flown);
             self.take_over(pointed);
@@ -255,6 +265,11 @@ impl Computer {
                 phase.on_pad() && mode.interlocks.abort_latched && stays
             }
         }
+    }
+
+    /// Which sensors speak, and what is wrong with them.
+    pub fn sensors(&self) -> &SensorWatch {
+        &self.sensors
     }
 
     /// Flies the rocket from its release on.

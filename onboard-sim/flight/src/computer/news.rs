@@ -77,18 +77,31 @@ pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(
     (after.lands_in_place && !before.lands_in_place).then_some((Severity::Critical, words))
 }
 
-/// The failing arming check that the crew on the pad was last told of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub(super) struct Readiness(Option<&'static str>);
+/// A check that fails for so long is told, and holds the countdown, s: a contact that bounces, or one lost sample, is shorter,
+/// and a sensor that dies has shown how by then.
+const FAILS_FOR_S: f64 = 0.1;
+
+/// The failing arming check that the crew on the pad was last told of, and since when one fails, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub(super) struct Readiness {
+    told: Option<&'static str>,
+    since_s: Option<f64>,
+}
 
 impl Readiness {
-    /// A message with the check that fails now, if it is another one than before. The uplink is left out: it comes and
-    /// goes with every lost heartbeat, and each station is told of its own uplink anyway.
-    pub(super) fn news(&mut self, checks: &[Check]) -> Option<String> {
-        let failing = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK);
-        let complaint = failing.map(|check| check.name);
-        let changed = complaint != core::mem::replace(&mut self.0, complaint);
-        failing.filter(|_| changed).and_then(Check::refusal).map(|reason| format!("not ready: {reason}"))
+    /// Why the vehicle may not be armed or started, and whether the crew is still to be told: the first check that fails, once
+    /// one has failed for [`FAILS_FOR_S`]. The uplink is left out: it comes and goes with every lost heartbeat, and each station
+    /// is told of its own uplink anyway.
+    pub(super) fn failing(&mut self, checks: &[Check], time_s: f64) -> Option<(String, bool)> {
+        let Some(check) = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK) else {
+            *self = Self::default();
+            return None;
+        };
+        if time_s - *self.since_s.get_or_insert(time_s) < FAILS_FOR_S {
+            return None;
+        }
+        let untold = self.told.replace(check.name) != Some(check.name);
+        check.refusal().map(|reason| (reason, untold))
     }
 }
 

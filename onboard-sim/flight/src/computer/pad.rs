@@ -11,8 +11,9 @@ use super::{Computer, Input, Release};
 use crate::computer::pilot::Sensed;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
 use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
+use crate::estimation::sensor_watch::Rests;
 use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
-use crate::rules::phase::{Event, Phase, StartPoint};
+use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::{RigidState, upright};
 
@@ -57,8 +58,6 @@ struct PadFindings {
     lean_rad: f64,
     /// Mean pressure altitude, m; NaN without a sample.
     pressure_altitude_m: f64,
-    /// Mean rotation rate, rad/s.
-    rotation_rad_s: f64,
     /// Mean GNSS velocity, world, m/s; NaN without a fix.
     velocity_m_s: Vector3<f64>,
 }
@@ -68,7 +67,6 @@ struct PadFindings {
 pub(super) struct PadWatch {
     alignment: PadAlignment,
     frames: u32,
-    gyro_sum_rad_s: Vector3<f64>,
     fixes: u32,
     velocity_sum_m_s: Vector3<f64>,
     force_sum_m_s2: Vector3<f64>,
@@ -90,7 +88,6 @@ impl PadWatch {
             self.pressures += 1;
             self.altitude_sum_m += altitude_m;
         }
-        self.gyro_sum_rad_s += measurements.imu.gyro_rad_s;
         if let Some(fix) = &measurements.gnss {
             self.fixes += 1;
             self.velocity_sum_m_s += fix.velocity_m_s;
@@ -106,7 +103,6 @@ impl PadWatch {
             at_rest: over.alignment.finish(0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
-            rotation_rad_s: (over.gyro_sum_rad_s / f64::from(over.frames)).norm(),
             // Without a fix this is zero by zero: NaN, which passes no check.
             velocity_m_s: over.velocity_sum_m_s / f64::from(over.fixes),
         });
@@ -117,13 +113,13 @@ impl PadWatch {
         self.found.is_some()
     }
 
-    /// Attitude and motion on the pad, or below a drone.
-    pub(super) fn stance(&self, hangs: bool) -> Stance {
+    /// Attitude and motion on the pad, or below a drone, of a vehicle that turns at a rate, rad/s.
+    pub(super) fn stance(&self, hangs: bool, rotation_rad_s: f64) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
         if hangs {
             return Stance {
                 tilt_rad: found.lean_rad,
-                rotation_rad_s: found.rotation_rad_s,
+                rotation_rad_s,
                 speed_m_s: found.velocity_m_s.norm(),
                 settled: true,
                 hanging_m: Some(found.pressure_altitude_m),
@@ -131,7 +127,7 @@ impl PadWatch {
         }
         Stance {
             tilt_rad: found.at_rest.map_or(f64::NAN, |_| self.believed().tilt_rad()),
-            rotation_rad_s: found.rotation_rad_s,
+            rotation_rad_s,
             speed_m_s: found.velocity_m_s.norm(),
             settled: found.at_rest.is_some(),
             hanging_m: None,
@@ -237,7 +233,18 @@ impl SelfTest {
 impl Computer {
     /// Attitude and motion on the pad.
     pub fn stance(&self) -> Stance {
-        self.pad.stance(self.start_point() == StartPoint::Drone)
+        self.pad.stance(self.start_point() == StartPoint::Drone, self.sensors.turns_rad_s())
+    }
+
+    /// Where it stands while it waits.
+    fn rests(&self) -> Rests {
+        let mission = self.pilot.mission();
+        let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
+        match (mission.launched(), self.start_point()) {
+            (Some(launch), _) => Rests::OnRail(launch.standing(cg_station_m).position_m),
+            (None, StartPoint::Drone) => Rests::Hanging,
+            (None, _) => Rests::OnLegs(Vector3::z() * mission.airframe.above_feet_m(cg_station_m)),
+        }
     }
 
     /// The estimated state on the pad, at rest at the origin.
@@ -265,6 +272,7 @@ impl Computer {
             speed_m_s: stance.speed_m_s,
             self_test_passed: self.table.mode().phase != Phase::Safe,
             is_checking: self.pad_check.is_busy(self.input.frame),
+            sensor_defects: self.sensors.defects(self.rests()),
             estimator_converged: stance.settled,
             hanging_m: stance.hanging_m,
             fins_answering: self.fins_answering,
@@ -280,11 +288,21 @@ impl Computer {
         arming_checks(&self.arming, &input)
     }
 
-    pub(super) fn report_readiness_changes(&mut self) {
-        if self.table.mode().phase == Phase::PadIdle
-            && let Some(words) = self.readiness.news(&self.arming_checks())
-        {
-            self.table.say(Severity::Warning, words);
+    /// Asks every arming check again: while the vehicle waits the crew is told, and a check that fails in the countdown holds
+    /// it, until the igniter has its current.
+    pub(super) fn ask_the_checks_again(&mut self) {
+        let checks = self.arming_checks();
+        let armed = match self.table.mode().phase {
+            Phase::PadIdle => false,
+            Phase::PadArmed => true,
+            _ => return,
+        };
+        let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s()) else { return };
+        let held = armed && self.hold(HoldCause::CheckFailed, || why.clone());
+        if untold && !held {
+            let (severity, state) =
+                if armed { (Severity::Critical, "armed, and ") } else { (Severity::Warning, "not ready: ") };
+            self.table.say(severity, format!("{state}{why}"));
         }
     }
 }
@@ -296,9 +314,6 @@ impl Computer {
     pub(super) fn wait_on_the_pad(&mut self, input: &Input<'_>) {
         if self.table.mode().phase == Phase::Safe {
             self.test_itself(input);
-        }
-        if self.rehearsed.is_some() {
-            self.report_readiness_changes();
         }
         match self.start_point() {
             // A drone's pilot lets go, and the fall is felt.
@@ -403,6 +418,6 @@ impl Computer {
         // From rest it falls faster and faster: the speed when the lines are taut.
         let delay_s = parachute.ejection_delay_s;
         let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
-        self.pad.stance(true).hanging_m.is_some_and(|height_m| height_m > fall_m)
+        self.pad.stance(true, 0.0).hanging_m.is_some_and(|height_m| height_m > fall_m)
     }
 }

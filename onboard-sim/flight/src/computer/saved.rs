@@ -22,6 +22,7 @@ use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
 use super::{Commands, Computer, CrewMemory, Input, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
+use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::baseline::Law;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Outputs;
@@ -190,6 +191,7 @@ impl Computer {
         pilot.set_law(law.clone());
         Self {
             table: PhaseTable::new(0.0),
+            sensors: SensorWatch::default(),
             pad: PadWatch::default(),
             pilot: Box::new(pilot),
             law,
@@ -232,7 +234,7 @@ impl Computer {
             Event::SelfTestPassed,
             Event::PinPulled,
             Event::ArmRequested { checks_passed: true },
-            Event::StartRequested { countdown_s: 0.0 },
+            Event::StartRequested { countdown_s: 0.0, checks_passed: true },
         ] {
             // The table accepts these events in this order; a test checks that.
             let _ = self.table.happen(event);

@@ -69,7 +69,8 @@ impl PhaseTable {
         }
         self.mode = next.mode;
         self.latch = self.latch.or_else(|| Latch::of(&event, before.interlocks, next.mode.interlocks));
-        let countdown_s = if let Event::StartRequested { countdown_s } = event { countdown_s } else { 0.0 };
+        let countdown_s =
+            if let Event::StartRequested { countdown_s, .. } = event { countdown_s } else { 0.0 };
         for effect in next.effects.iter() {
             // At touchdown, the motor may have been inhibited long before: it is not reported again.
             let known = effect == Effect::InhibitLandingMotor && before.interlocks.landing_motor_inhibited;

@@ -51,6 +51,8 @@ pub struct ArmingInput {
     pub self_test_passed: bool,
     /// A check of the vehicle moves its surfaces, or watches its sensors.
     pub is_checking: bool,
+    /// What is wrong with accelerometer, gyro, barometer, satellites and lidar, in words.
+    pub sensor_defects: [Option<String>; 5],
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,
     /// The estimator has settled.
@@ -88,8 +90,17 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             "passed",
             if input.is_checking { "a check of the vehicle runs" } else { "not passed" },
         ),
-        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
+    ];
+    // Before what is computed from them: the sensor is named, and not the number that it spoils.
+    checks.extend(
+        SENSOR_CHECKS
+            .into_iter()
+            .zip(&input.sensor_defects)
+            .map(|(name, defect)| Check::sensor(name, defect)),
+    );
+    checks.extend([
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
+        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
         Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
         Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
         Check {
@@ -115,7 +126,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),
         battery(limits, input.battery_v),
-    ];
+    ]);
     if let Some(height_m) = input.hanging_m {
         checks.push(Check {
             name: "height below the drone",
@@ -126,6 +137,9 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     }
     checks
 }
+
+/// The names of the sensor checks.
+const SENSOR_CHECKS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
 
 /// The name of the uplink check, the only check that depends on the ground.
 pub const UPLINK_CHECK: &str = "uplink";
@@ -189,14 +203,28 @@ impl Check {
         Self {
             name,
             passed: value.abs() <= limit,
-            found: format!("{:.2} {unit}", value.abs()),
+            found: if value.is_nan() { "not known".to_owned() } else { format!("{:.2} {unit}", value.abs()) },
             required: format!("at most {limit} {unit}"),
         }
     }
 
+    /// A check of a sensor, which names itself in its defect.
+    fn sensor(name: &'static str, defect: &Option<String>) -> Self {
+        let found = defect.clone().unwrap_or_else(|| "speaks".to_owned());
+        Self { name, passed: defect.is_none(), found, required: String::new() }
+    }
+
     /// The refusal in words, or `None` if passed.
     pub fn refusal(&self) -> Option<String> {
-        (!self.passed).then(|| format!("{}: found {}, required {}", self.name, self.found, self.required))
+        let Self { name, found, required, .. } = self;
+        let words = || {
+            if required.is_empty() {
+                found.clone()
+            } else {
+                format!("{name}: found {found}, required {required}")
+            }
+        };
+        (!self.passed).then(words)
     }
 }
 
@@ -223,6 +251,7 @@ mod tests {
             speed_m_s: 0.0,
             self_test_passed: true,
             is_checking: false,
+            sensor_defects: [const { None }; 5],
             hanging_m: None,
             estimator_converged: true,
             fins_answering: [true; 4],
@@ -252,7 +281,7 @@ mod tests {
 
     #[test]
     fn each_check_alone_refuses_and_reports_its_name_and_value() {
-        let spoilings: [Spoiling; 20] = [
+        let spoilings: [Spoiling; 22] = [
             ("abort latch: found latched", |input| {
                 input.abort_latched = true;
             }),
@@ -265,10 +294,16 @@ mod tests {
             ("self-test: found a check of the vehicle runs", |input| {
                 input.is_checking = true;
             }),
+            ("no GNSS fix for 9 s", |input| {
+                input.sensor_defects[3] = Some("no GNSS fix for 9 s".to_owned());
+            }),
+            ("lidar silent", |input| {
+                input.sensor_defects[4] = Some("lidar silent for 2 s".to_owned());
+            }),
             ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
                 input.tilt_rad = 6.0_f64.to_radians();
             }),
-            ("tilt from vertical: found NaN deg", |input| {
+            ("tilt from vertical: found not known", |input| {
                 input.tilt_rad = f64::NAN;
             }),
             ("rotation: found", |input| {

@@ -182,7 +182,7 @@ mod tests {
             12 | 13 => Event::Apogee { booster_attached: false },
             14 => Event::SelfTestPassed,
             15..=17 => Event::ArmRequested { checks_passed: true },
-            18 | 19 => Event::StartRequested { countdown_s: 1.0 },
+            18 | 19 => Event::StartRequested { countdown_s: 1.0, checks_passed: true },
             20 | 21 => Event::CountdownElapsed,
             22 => Event::ReleasedAt(StartPoint::Apogee),
             23 => Event::LiftOff,

@@ -123,10 +123,11 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let [north_m_s, east_m_s, _] = motion.velocity_m_s;
     let (lat, lon) = degrees_e7(state, north_m, east_m);
     let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
-    let fix_type = match state.sensors.last {
-        None => GpsFixType::GPS_FIX_TYPE_NO_GPS,
-        Some(_) if state.sensors.gnss() => GpsFixType::GPS_FIX_TYPE_3D_FIX,
-        Some(_) => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+    let sensors = state.computer.sensors();
+    let fix_type = match sensors.measures() {
+        false => GpsFixType::GPS_FIX_TYPE_NO_GPS,
+        true if sensors.gnss_speaks() => GpsFixType::GPS_FIX_TYPE_3D_FIX,
+        true => GpsFixType::GPS_FIX_TYPE_NO_FIX,
     };
     let unknown = GPS_RAW_INT_DATA {
         time_usec: (1e6 * state.time_s) as u64,
@@ -165,7 +166,8 @@ pub(super) fn system_time(state: &VehicleState<'_>) -> MavMessage {
 pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysStatusSensor) {
     use MavSysStatusSensor as S;
     let mut silent = S::empty();
-    if state.sensors.last.is_none() {
+    let sensors = state.computer.sensors();
+    if !sensors.measures() {
         return (silent, silent);
     }
     let present = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -173,8 +175,9 @@ pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysSt
         | S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
         | S::MAV_SYS_STATUS_SENSOR_GPS
         | S::MAV_SYS_STATUS_SENSOR_LASER_POSITION;
-    silent.set(S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, !state.sensors.barometer());
-    silent.set(S::MAV_SYS_STATUS_SENSOR_GPS, !state.sensors.gnss());
+    silent.set(S::MAV_SYS_STATUS_SENSOR_3D_ACCEL, sensors.accelerometer_frozen_s().is_some());
+    silent.set(S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, sensors.pressure_altitude_m().is_none());
+    silent.set(S::MAV_SYS_STATUS_SENSOR_GPS, !sensors.gnss_speaks());
     (present, silent)
 }
 
@@ -238,7 +241,7 @@ fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
 pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     // Where the truth is the estimate there is no estimator to speak of.
-    state.sensors.last?;
+    state.measured()?;
     let estimate = state.airborne()?.estimate;
     let sigmas_m = &estimate.sigmas.position_m;
     let aids = state.computer.pilot().estimator().aids();
@@ -258,7 +261,7 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
         Health::Doubtful(Doubt::Horizontal) => flags -= horizontal,
         Health::Doubtful(Doubt::Tilt) => flags -= F::ESTIMATOR_ATTITUDE,
     }
-    let lidar = state.sensors.lidar();
+    let lidar = state.computer.sensors().lidar_range_m().is_some();
     flags.set(F::ESTIMATOR_POS_VERT_AGL, lidar && flags.contains(vertical));
     Some(MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
         time_usec: (1e6 * state.time_s) as u64,
@@ -277,14 +280,15 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
 /// There is no magnetometer and no thermometer: their fields are not marked as updated.
 pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
     use HighresImuUpdatedFlags as U;
-    let imu = state.sensors.last?.imu;
+    let imu = state.measured()?.imu;
+    let pressure_altitude_m = state.computer.sensors().pressure_altitude_m();
     let mut fields_updated = U::HIGHRES_IMU_UPDATED_XACC
         | U::HIGHRES_IMU_UPDATED_YACC
         | U::HIGHRES_IMU_UPDATED_ZACC
         | U::HIGHRES_IMU_UPDATED_XGYRO
         | U::HIGHRES_IMU_UPDATED_YGYRO
         | U::HIGHRES_IMU_UPDATED_ZGYRO;
-    fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, state.sensors.barometer());
+    fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, pressure_altitude_m.is_some());
     let [xacc, yacc, zacc] = <[f64; 3]>::from(imu.specific_force_m_s2).map(|force| force as f32);
     let [xgyro, ygyro, zgyro] = <[f64; 3]>::from(imu.gyro_rad_s).map(|rate| rate as f32);
     Some(MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
@@ -295,7 +299,7 @@ pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
         xgyro,
         ygyro,
         zgyro,
-        pressure_alt: state.sensors.pressure_altitude_m as f32,
+        pressure_alt: pressure_altitude_m.unwrap_or(f64::NAN) as f32,
         fields_updated,
         ..HIGHRES_IMU_DATA::default()
     }))

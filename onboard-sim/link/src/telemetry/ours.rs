@@ -35,7 +35,6 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
         countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
         interlocks: interlocks(mode.interlocks),
         checks_failed: TdCheck::from_bits_truncate(state.checks_failed()),
-        pad_wait_s: mode.pad_wait_remaining_s(time_s).map_or(0, |s| libm::ceil(s) as u8),
         approach_wait_s: mode.approach_wait_s(time_s).map_or(u16::MAX, |s| libm::ceil(s) as u16),
         motor: td_motor(mode.motor_status(time_s)),
         hold: match held {
@@ -44,7 +43,7 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
             Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
             Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
             Some((HoldCause::StationDeaf, _)) => TdHold::TD_HOLD_STATION_DEAF,
-            Some((HoldCause::LogFailed, _)) => TdHold::TD_HOLD_LOG_FAILED,
+            Some((HoldCause::CheckFailed, _)) => TdHold::TD_HOLD_CHECK_FAILED,
         },
         hold_left_s: held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
         phase: td_phase(mode.phase),

@@ -24,7 +24,6 @@ use protocol::log::v1;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
-use vehicle_link::sensed::SensorWatch;
 pub use vehicle_link::vehicle::{BatteryFacts, Impact, Judged, MissionName, VehicleState};
 
 use self::ground::Ground;
@@ -40,7 +39,6 @@ pub struct RocketFlight {
 #[derive(Clone)]
 pub struct Vehicle {
     sortie: Sortie,
-    sensors: SensorWatch,
     findings: Findings,
     /// How long the last plan took, s.
     took_s: f64,
@@ -94,7 +92,6 @@ impl Vehicle {
     pub fn on_the_pad(flight: &RocketFlight) -> Result<Self, SetUpError> {
         Ok(Self {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
-            sensors: SensorWatch::default(),
             findings: Findings::default(),
             took_s: 0.0,
             flown: false,
@@ -182,7 +179,6 @@ impl Vehicle {
         }
         let flying = self.computer().released_at_s().is_some();
         self.flown = flying && !released && !self.ground.is_over(self.sortie.computer());
-        self.sensors.take(self.sortie.measured(), self.sortie.frame());
         self.findings.note(self.sortie.computer());
         events.extend(self.events_of_the_simulation(released));
         VehicleStep { events, answers }
@@ -227,7 +223,6 @@ impl Vehicle {
             time_s: self.time_s(),
             name: &self.mission,
             operators: &self.operators,
-            sensors: &self.sensors,
             findings: &self.findings,
             battery: Some(BatteryFacts {
                 volts: battery.volts(),

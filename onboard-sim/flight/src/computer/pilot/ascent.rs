@@ -22,26 +22,37 @@ const LIFT_OFF_WITHIN_S: f64 = 3.0;
 /// How long the vehicle must brake before the motor counts as burnt out, s. Drag alone brakes at once; a dip of the thrust
 /// below the drag is shorter.
 const BRAKING_S: f64 = 0.1;
-/// Frames with a falling estimate that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
+/// A burn-out counts from this share of the motor's burn time on, and comes by itself at that one: burn times scatter by 4 %,
+/// and an accelerometer that lies ends no boost.
+const BURNS_FOR: [f64; 2] = [0.6, 1.5];
+/// Frames with a falling vehicle that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
 const FALLING_FRAMES: u32 = 3;
-/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, whatever the estimate
-/// says. It is six times the noise of a barometer in its own exhaust or wake.
+/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, if nothing else says that it
+/// rises. It is six times the noise of a barometer in its own exhaust or wake.
 const SUNK_M: f64 = 6.0;
 const SUNK_S: f64 = 0.2;
 /// A vehicle this far above its first pressure altitude, m, for [`RISEN_S`] has lifted off, whatever it feels. Gusts over the
 /// static ports show a metre or two.
 const RISEN_M: f64 = 15.0;
 const RISEN_S: f64 = 0.1;
-/// A pressure altitude that gained [`CLIMBED_M`] in [`CLIMBED_S`] climbs at 10 m/s or more: no estimate makes an apogee of
-/// that. Noise of a barometer gains 0.5 m.
-const CLIMBED_M: f64 = 2.0;
-const CLIMBED_S: f64 = 0.2;
-/// While the estimate still rises faster than this, m/s, the barometer's word needs [`SUNK_FAST_S`]: a pressure that jumps by
-/// 20 m is passed again after half a second at 40 m/s.
-const RISES_FAST_M_S: f64 = 15.0;
-const SUNK_FAST_S: f64 = 1.0;
+/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6 m/s.
+const RATE_OVER_S: f64 = 0.2;
+/// A barometer that shows this much, m/s, climbs, and has not sunk.
+const CLIMBS_M_S: f64 = 10.0;
+/// The speeds of two sensors that differ by more, m/s, cannot both be right: the wake, a late fix and a tilted rail make 5 of it.
+const APART_M_S: f64 = 15.0;
+/// A fix this old still tells the speed, s: three fixes are missing.
+const FIX_KEEPS_S: f64 = 0.6;
 /// After the separation charge the pressure in the vehicle is not that of the air, s: three times its time of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
+/// What was felt as a lift-off is looked at for so long, s: the weakest motor that leaves the rail rises by 10 m in it.
+const DOUBTED_S: f64 = 2.0;
+/// Within this of its first pressure altitude, m, a vehicle stands, and a fix that shows less than that speed, m/s, is one of a
+/// vehicle that stands.
+const STANDS_M: f64 = 5.0;
+const STANDS_M_S: f64 = 3.0;
+/// A barometer that says the same for so many samples says nothing.
+const FROZEN_SAMPLES: u32 = 10;
 
 /// What the watch sees of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -51,31 +62,54 @@ pub(super) struct AscentReadings {
     pub(super) phase: Phase,
     /// Along the axis, as measured, m/s^2.
     pub(super) axial_specific_force_m_s2: f64,
+    /// Upwards, from what was felt and the attitude, m/s^2.
+    pub(super) vertical_m_s2: f64,
     pub(super) pressure_altitude_m: Option<f64>,
+    /// Of a fix, up, m/s.
+    pub(super) gnss_m_s: Option<f64>,
     /// As estimated, up, m/s.
     pub(super) vertical_m_s: f64,
     /// The wire between booster and vehicle is whole.
     pub(super) booster_attached: bool,
     pub(super) separate_before_apogee_s: f64,
+    /// Burn time of the ascent motor, s.
+    pub(super) burn_time_s: f64,
 }
 
-/// The watch's memory.
+/// The watch's memory. Three speeds say whether the vehicle rises: what was felt since the lift-off, without anything that
+/// corrects it; the pressure's; the satellites'. None of them alone makes an event.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct AscentWatch {
     gained_m_s: f64,
     lifted_off: bool,
+    lifted_off_at_s: f64,
+    /// More than the accelerometer says that it has lifted off.
+    confirmed: bool,
+    /// What was felt was no lift-off: the accelerometer is not believed alone any more.
+    denied: bool,
     braking_s: f64,
     separating_since_s: Option<f64>,
     falling_frames: u32,
+    /// Felt, m/s; it begins with the estimate.
+    felt_m_s: Option<f64>,
+    /// The last fix's, m/s, and when it came, s.
+    gnss_m_s: f64,
+    gnss_at_s: f64,
+    altitude_m: f64,
+    same_samples: u32,
     highest_m: f64,
     sunk_s: f64,
+    /// The estimate's speed when the pressure began to show a fall, m/s.
+    sunk_from_m_s: f64,
     /// The first pressure altitude.
     ground_m: Option<f64>,
     risen_s: f64,
-    /// Where and when the present window of [`CLIMBED_S`] began, and whether the last one gained [`CLIMBED_M`].
+    /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
     mark_m: f64,
     marked_at_s: f64,
-    climbing: bool,
+    /// What the last one gave, m/s, and when, s.
+    pressure_m_s: f64,
+    pressure_at_s: f64,
 }
 
 impl Default for AscentWatch {
@@ -83,16 +117,26 @@ impl Default for AscentWatch {
         Self {
             gained_m_s: 0.0,
             lifted_off: false,
+            lifted_off_at_s: 0.0,
+            confirmed: false,
+            denied: false,
             braking_s: 0.0,
             separating_since_s: None,
             falling_frames: 0,
+            felt_m_s: None,
+            gnss_m_s: 0.0,
+            gnss_at_s: f64::NEG_INFINITY,
+            altitude_m: f64::INFINITY,
+            same_samples: 0,
             highest_m: f64::NEG_INFINITY,
             sunk_s: 0.0,
+            sunk_from_m_s: 0.0,
             ground_m: None,
             risen_s: 0.0,
-            mark_m: f64::INFINITY,
+            mark_m: 0.0,
             marked_at_s: f64::NEG_INFINITY,
-            climbing: false,
+            pressure_m_s: 0.0,
+            pressure_at_s: f64::NEG_INFINITY,
         }
     }
 }
@@ -108,11 +152,20 @@ impl AscentWatch {
         self.separating_since_s.is_some()
     }
 
+    /// The same watch after a reset: what was felt meanwhile is in the estimate alone.
+    pub(super) fn resumed(self) -> Self {
+        Self { felt_m_s: None, ..self }
+    }
+
     /// The event of this frame, if there is one.
     pub(super) fn update(&mut self, seen: &AscentReadings) -> Option<Event> {
+        self.update_speeds(seen);
         self.update_heights(seen);
         if !self.lifted_off {
             return self.wait_for_lift_off(seen);
+        }
+        if !self.confirmed {
+            return self.doubt_the_lift_off(seen);
         }
         match seen.phase {
             Phase::Boost if self.has_burnt_out(seen) => Some(Event::Burnout),
@@ -131,59 +184,154 @@ impl AscentWatch {
     pub(super) fn detects_lift_off(&mut self, axial_m_s2: f64, frame_s: f64) -> bool {
         let gain_m_s = (axial_m_s2 - STANDARD_GRAVITY_M_S2) * frame_s;
         self.gained_m_s = if axial_m_s2 > PUSHED_M_S2 { self.gained_m_s + gain_m_s } else { 0.0 };
-        self.lifted_off = self.gained_m_s >= LIFTED_OFF_M_S;
+        self.lifted_off = self.gained_m_s >= LIFTED_OFF_M_S && !self.denied;
         self.lifted_off
     }
 
     fn wait_for_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
         if self.detects_lift_off(seen.axial_specific_force_m_s2, seen.frame_s) {
+            self.lifted_off_at_s = seen.time_s;
             return Some(Event::LiftOff);
         }
         // The second opinion counts while a lift-off is expected, also after an abort of the ignition: in a day on the pad
         // the weather moves by 15 m.
         let expected = seen.phase == Phase::Boost || seen.time_s < LIFT_OFF_WITHIN_S;
         if expected && self.risen_s >= RISEN_S {
-            self.lifted_off = true;
+            (self.lifted_off, self.lifted_off_at_s) = (true, seen.time_s);
             return Some(Event::LiftOff);
         }
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
     }
 
+    /// A push alone is no lift-off. Whoever says that the vehicle moves confirms it; if barometer or satellites say that it
+    /// stands, there was none. In doubt it flies: a barometer that has failed does not stand still on its pad.
+    fn doubt_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
+        let fix_m_s = self.gnss_m_s(seen.time_s);
+        let off_m = self.ground_m.filter(|_| self.pressure_speaks(seen.time_s)).map(|ground_m| self.altitude_m - ground_m);
+        let moves = self.risen_s >= RISEN_S
+            || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M && self.pressure_m_s.abs() > STANDS_M_S)
+            || fix_m_s.is_some_and(|m_s| m_s.abs() > STANDS_M_S);
+        // A barometer needs a moment before it tells a speed.
+        let since_s = seen.time_s - self.lifted_off_at_s;
+        let nobody_says = off_m.is_none() && fix_m_s.is_none() && since_s > 2.0 * RATE_OVER_S;
+        if moves || nobody_says {
+            self.confirmed = true;
+        } else if since_s >= DOUBTED_S {
+            self.confirmed = off_m.is_some_and(|off_m| off_m.abs() > STANDS_M);
+            if !self.confirmed {
+                (self.lifted_off, self.denied, self.felt_m_s) = (false, true, None);
+                return Some(Event::NoLiftOff);
+            }
+        }
+        None
+    }
+
+    /// The barometer is heard, and does not repeat itself.
+    fn pressure_speaks(&self, time_s: f64) -> bool {
+        time_s - self.pressure_at_s <= 2.0 * RATE_OVER_S && self.same_samples < FROZEN_SAMPLES
+    }
+
+    /// The speed that the pressure shows, m/s. Through the gas of the separation charge it is that of before, less what a
+    /// coasting vehicle loses.
+    fn pressure_m_s(&self, time_s: f64) -> Option<f64> {
+        let charged =
+            self.separating_since_s.is_some_and(|since_s| time_s - since_s < CHARGE_LASTS_S + 2.0 * RATE_OVER_S);
+        if self.pressure_speaks(time_s) {
+            Some(self.pressure_m_s)
+        } else if charged && self.pressure_at_s.is_finite() {
+            Some(self.pressure_m_s - STANDARD_GRAVITY_M_S2 * (time_s - self.pressure_at_s))
+        } else {
+            None
+        }
+    }
+
     fn has_burnt_out(&mut self, seen: &AscentReadings) -> bool {
         let braking = seen.axial_specific_force_m_s2 < 0.0;
         self.braking_s = lasts_s(self.braking_s, Some(braking), seen.frame_s);
-        self.braking_s >= BRAKING_S
+        let [early_s, late_s] = BURNS_FOR.map(|share| share * seen.burn_time_s);
+        let since_s = seen.time_s - self.lifted_off_at_s;
+        (self.braking_s >= BRAKING_S && since_s >= early_s) || since_s >= late_s
     }
 
     fn separation_is_due(&self, seen: &AscentReadings) -> bool {
-        let to_apogee_s = seen.vertical_m_s / STANDARD_GRAVITY_M_S2;
+        let to_apogee_s = self.rises_m_s(seen) / STANDARD_GRAVITY_M_S2;
         self.separating_since_s.is_none() && to_apogee_s <= seen.separate_before_apogee_s
     }
 
     fn has_passed_apogee(&mut self, seen: &AscentReadings) -> bool {
-        self.falling_frames = if seen.vertical_m_s < 0.0 { self.falling_frames + 1 } else { 0 };
-        let climbs = self.climbing && seen.time_s - self.marked_at_s < CLIMBED_S;
-        let sunk_s = if seen.vertical_m_s > RISES_FAST_M_S { SUNK_FAST_S } else { SUNK_S };
-        (self.falling_frames >= FALLING_FRAMES && !climbs) || self.sunk_s >= sunk_s
+        self.falling_frames = if self.rises_m_s(seen) < 0.0 { self.falling_frames + 1 } else { 0 };
+        // The pressure shows a fall, and satellites do; without them the pressure is believed when the estimate rises slowly,
+        // or after the time in which a vehicle as fast as the estimate has fallen, too.
+        let sunk = match self.gnss_m_s(seen.time_s) {
+            Some(gnss_m_s) => gnss_m_s < 0.0 && self.sunk_s >= SUNK_S,
+            None if seen.vertical_m_s <= APART_M_S => self.sunk_s >= SUNK_S,
+            None => self.sunk_s >= 1.0 + self.sunk_from_m_s / STANDARD_GRAVITY_M_S2,
+        };
+        self.falling_frames >= FALLING_FRAMES || sunk
+    }
+
+    /// The speed of the last fix, m/s, if it is not too old.
+    fn gnss_m_s(&self, time_s: f64) -> Option<f64> {
+        (time_s - self.gnss_at_s <= FIX_KEEPS_S).then_some(self.gnss_m_s)
+    }
+
+    /// How fast the vehicle rises, m/s: as estimated, unless the sensors say otherwise. Of three the middle one is right. Of two
+    /// that contradict each other the one that rises faster counts: nothing is parted or opened on the way up.
+    fn rises_m_s(&self, seen: &AscentReadings) -> f64 {
+        let estimated_m_s = seen.vertical_m_s;
+        let apart = |m_s: f64| (m_s - estimated_m_s).abs() > APART_M_S;
+        match (self.pressure_m_s(seen.time_s), self.gnss_m_s(seen.time_s)) {
+            (Some(pressure_m_s), Some(gnss_m_s)) => {
+                let mut three_m_s = [self.felt_m_s.unwrap_or(estimated_m_s), pressure_m_s, gnss_m_s];
+                three_m_s.sort_by(f64::total_cmp);
+                if apart(three_m_s[1]) { three_m_s[1] } else { estimated_m_s }
+            }
+            (Some(other_m_s), None) | (None, Some(other_m_s)) if apart(other_m_s) => {
+                estimated_m_s.max(other_m_s)
+            }
+            _ => estimated_m_s,
+        }
+    }
+
+    fn update_speeds(&mut self, seen: &AscentReadings) {
+        let felt_m_s = self.felt_m_s.get_or_insert(seen.vertical_m_s);
+        if seen.vertical_m_s2.is_finite() {
+            *felt_m_s += seen.vertical_m_s2 * seen.frame_s;
+        }
+        if let Some(gnss_m_s) = seen.gnss_m_s.filter(|m_s| m_s.is_finite()) {
+            (self.gnss_m_s, self.gnss_at_s) = (gnss_m_s, seen.time_s);
+        }
     }
 
     fn update_heights(&mut self, seen: &AscentReadings) {
         let disturbed = self.separating_since_s.is_some_and(|since_s| seen.time_s - since_s < CHARGE_LASTS_S);
-        if let Some(altitude_m) = seen.pressure_altitude_m.filter(|_| !disturbed) {
-            self.highest_m = self.highest_m.max(altitude_m);
+        let sample_m = seen.pressure_altitude_m.filter(|altitude_m| altitude_m.is_finite());
+        if let Some(altitude_m) = sample_m.filter(|_| !disturbed) {
+            let same = altitude_m.to_bits() == self.altitude_m.to_bits();
+            self.same_samples = if same { self.same_samples.saturating_add(1) } else { 0 };
+            self.altitude_m = altitude_m;
             self.ground_m.get_or_insert(altitude_m);
-            let gained = altitude_m >= self.mark_m + CLIMBED_M;
-            if gained || seen.time_s - self.marked_at_s >= CLIMBED_S {
-                (self.climbing, self.mark_m, self.marked_at_s) = (gained, altitude_m, seen.time_s);
+            let since_s = seen.time_s - self.marked_at_s;
+            if since_s >= RATE_OVER_S {
+                // The first sample after a pause only begins a window.
+                if since_s <= 2.0 * RATE_OVER_S {
+                    (self.pressure_m_s, self.pressure_at_s) = ((altitude_m - self.mark_m) / since_s, seen.time_s);
+                }
+                (self.mark_m, self.marked_at_s) = (altitude_m, seen.time_s);
             }
+            // What climbs has not sunk: a pressure that has jumped down climbs on from there.
+            let climbs = self.pressure_m_s >= CLIMBS_M_S;
+            self.highest_m = if climbs { altitude_m } else { self.highest_m.max(altitude_m) };
         }
         let ground_m = self.ground_m.unwrap_or(f64::INFINITY);
-        let is_now = |compare: &dyn Fn(f64) -> bool| {
-            if disturbed { Some(false) } else { seen.pressure_altitude_m.map(compare) }
-        };
+        let is_now =
+            |compare: &dyn Fn(f64) -> bool| if disturbed { Some(false) } else { sample_m.map(compare) };
         let risen = is_now(&|altitude_m| altitude_m > ground_m + RISEN_M);
         let sunk = is_now(&|altitude_m| altitude_m < self.highest_m - SUNK_M);
         self.risen_s = lasts_s(self.risen_s, risen, seen.frame_s);
+        if self.sunk_s <= 0.0 {
+            self.sunk_from_m_s = seen.vertical_m_s.max(0.0);
+        }
         self.sunk_s = lasts_s(self.sunk_s, sunk, seen.frame_s);
     }
 }
@@ -286,15 +434,18 @@ mod tests {
             frame_s: 0.005,
             phase,
             axial_specific_force_m_s2: force_m_s2,
+            vertical_m_s2: force_m_s2 - STANDARD_GRAVITY_M_S2,
             pressure_altitude_m: None,
+            gnss_m_s: None,
             vertical_m_s,
             booster_attached: false,
             separate_before_apogee_s: 2.0,
+            burn_time_s: 0.8,
         }
     }
 
     fn lifted_off() -> AscentWatch {
-        AscentWatch { lifted_off: true, ..AscentWatch::default() }
+        AscentWatch { lifted_off: true, confirmed: true, ..AscentWatch::default() }
     }
 
     #[test]
@@ -361,14 +512,17 @@ mod tests {
                 booster_attached: true,
                 ..seen(time_s, Phase::Boost, 0.0, -9.81 * time_s)
             };
-            events.extend(watch.update(&dead).map(|event| (time_s, event)));
+            let phase = if events.len() < 2 { Phase::Boost } else { Phase::Coast };
+            events.extend(watch.update(&AscentReadings { phase, ..dead }).map(|event| (time_s, event)));
         }
         assert_eq!(events[0].1, Event::LiftOff);
         // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
         assert!((0.3..0.5).contains(&events[0].0), "{events:?}");
-        assert_eq!(events[1].1, Event::Apogee { booster_attached: true });
-        // From 10 m/s down nothing contradicts the estimate: one second before apogee.
-        assert!((4.9..5.5).contains(&events[1].0), "{events:?}");
+        // Nothing brakes: the motor's time is over, and the booster goes two seconds before the apogee of the pressure.
+        assert_eq!((events[1].1, events[2].1), (Event::Burnout, Event::SeparationDue));
+        assert!((1.2..1.8).contains(&events[1].0) && (4.0..4.5).contains(&events[2].0), "{events:?}");
+        assert_eq!(events[3].1, Event::Apogee { booster_attached: true });
+        assert!((5.9..6.5).contains(&events[3].0), "{events:?}");
     }
 
     /// A jump of the pressure by 20 m while it climbs at 40 m/s is no apogee.
@@ -383,6 +537,49 @@ mod tests {
                 ..seen(time_s, Phase::Coast, -2.0, 40.0)
             };
             assert_eq!(watch.update(&climbing), None, "{time_s}");
+        }
+    }
+
+    /// A step of the pressure in the boost, and a ramp that shows a fall: without a fix, with one, and with one that agrees
+    /// with the pressure.
+    #[test]
+    fn a_barometer_alone_ends_no_ascent() {
+        for (fix_m_s, ends) in [(None, false), (Some(50.0), false), (Some(-5.0), true)] {
+            for ramp_m_s in [0.0, -80.0] {
+                let mut watch = lifted_off();
+                let apogee = (0..400).any(|frame| {
+                    let time_s = 0.005 * f64::from(frame);
+                    let wrong_m = if time_s < 0.5 { 0.0 } else { -60.0 + ramp_m_s * (time_s - 0.5) };
+                    let lying = AscentReadings {
+                        pressure_altitude_m: (frame % 4 == 0).then_some(50.0 * time_s + wrong_m + 1e-3 * time_s),
+                        gnss_m_s: fix_m_s,
+                        burn_time_s: 10.0,
+                        ..seen(time_s, Phase::Boost, 9.81, 50.0)
+                    };
+                    matches!(watch.update(&lying), Some(Event::Apogee { .. }))
+                });
+                assert_eq!(apogee, ends, "fix {fix_m_s:?}, ramp {ramp_m_s}");
+            }
+        }
+    }
+
+    /// An accelerometer that pushes while barometer and satellites stand is denied; one whose others are silent is believed.
+    #[test]
+    fn a_push_that_only_the_accelerometer_feels_is_no_lift_off() {
+        for (pressure, fix, denied) in [(true, true, true), (true, false, true), (false, true, true), (false, false, false)] {
+            let mut watch = AscentWatch::default();
+            let mut events = Vec::new();
+            for frame in 0..600 {
+                let pushed = AscentReadings {
+                    pressure_altitude_m: (pressure && frame % 4 == 0).then_some(0.1 * libm::sin(f64::from(frame))),
+                    gnss_m_s: fix.then_some(0.05),
+                    ..seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 40.0)
+                };
+                events.extend(watch.update(&pushed));
+            }
+            assert_eq!(events[0], Event::LiftOff);
+            assert_eq!(events.contains(&Event::NoLiftOff), denied, "{pressure} {fix}: {events:?}");
+            assert_eq!(watch.has_lifted_off(), !denied);
         }
     }
 

@@ -343,7 +343,7 @@ impl Pilot {
         let mut resumed = Self {
             estimator,
             estimate,
-            ascent,
+            ascent: ascent.resumed(),
             apogee_m,
             ignited_at_s,
             fin_share,

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::Pilot;
 use crate::computer::Input;
 use crate::estimation::estimator::Estimate;
+use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::ignition::IgnitionPrediction;
 use crate::guidance::vertical::fall_ends_m_s;
 use crate::rules::gate::GateInput;
@@ -129,7 +130,14 @@ impl Pilot {
         mode: &Mode,
         input: &Input<'_>,
         estimate: &Estimate,
+        sensors: &SensorWatch,
     ) -> Option<Event> {
+        // What is felt carries the estimate: without it nobody knows the attitude, and the pressure alone knows the height.
+        if mode.phase.in_descent() && sensors.feels_nothing_for_s() >= LASTS_S {
+            let fills_m = self.prediction.filling_height_m();
+            let parachute_fills = sensors.pressure_altitude_m().is_none_or(|height_m| height_m > fills_m);
+            return Some(Event::GateShutForGood { parachute_fills });
+        }
         let found = self.gate_input(mode, input, estimate);
         if mode.phase.in_descent() && self.is_shut_by_what_lasts(&found) {
             self.gate_shut_since_s.get_or_insert(input.time_s);
@@ -205,7 +213,7 @@ mod tests {
             let event = pilot.abort_event(table.mode(), Some(input));
             pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
         }
-        pilot.decide(table, input);
+        pilot.decide(table, input, &SensorWatch::default());
         pilot.plan(table.mode(), input);
         pilot.point(table.mode(), input).fins_rad
     }

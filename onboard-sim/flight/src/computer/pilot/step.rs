@@ -12,6 +12,7 @@ use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
+use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::gate::{self, GateInput};
@@ -252,19 +253,25 @@ impl Pilot {
         let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
         };
-        let pressure_altitude_m = match &input.sensed {
-            Sensed::Known(_) => None,
-            Sensed::Measured(measured) => measured.pressure_altitude_m,
+        let (felt_m_s2, pressure_altitude_m, fix) = match &input.sensed {
+            Sensed::Known(_) => (estimate.specific_force_m_s2, None, None),
+            Sensed::Measured(measured) => {
+                (measured.imu.specific_force_m_s2, measured.pressure_altitude_m, measured.gnss)
+            }
         };
+        let weight_m_s2 = self.model.mission.gravity_m_s2;
         let seen = AscentReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             phase,
             axial_specific_force_m_s2: axial_m_s2(&input.sensed),
+            vertical_m_s2: (estimate.state.world_from_body * felt_m_s2).z - weight_m_s2,
             pressure_altitude_m,
+            gnss_m_s: fix.map(|fix| fix.velocity_m_s.z),
             vertical_m_s: estimate.state.velocity_m_s.z,
             booster_attached: input.booster_attached,
             separate_before_apogee_s: launch.separate_before_apogee_s,
+            burn_time_s: launch.booster.motor_curve.burn_time_s(),
         };
         let Some(event) = self.ascent.update(&seen) else { return };
         if let Event::Apogee { .. } = event {
@@ -277,11 +284,16 @@ impl Pilot {
     }
 
     /// Moves through the phases of the descent and the landing.
-    pub(in crate::computer) fn decide(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
+    pub(in crate::computer) fn decide(
+        &mut self,
+        table: &mut PhaseTable,
+        input: &Input<'_>,
+        sensors: &SensorWatch,
+    ) {
         let Some(estimate) = self.estimate else { return };
         let estimate = &estimate;
         let time_s = input.time_s;
-        if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate) {
+        if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate, sensors) {
             self.happen(table, hopeless, time_s);
         }
         match table.mode().phase {

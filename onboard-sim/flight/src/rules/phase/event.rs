@@ -27,6 +27,8 @@ pub enum Event {
     },
     /// Radio command: start the countdown.
     StartRequested {
+        /// Every arming check passes now, too.
+        checks_passed: bool,
         /// Length of the countdown, s.
         countdown_s: f64,
     },

@@ -218,8 +218,9 @@ pub const UPLINK_SILENT_S: f64 = 1.0;
 /// A held vehicle disarms after this long without a new start, s.
 pub const HOLD_LIMIT_S: f64 = 60.0;
 
-/// So long before the release, s, and later nothing holds the countdown any more: a hold that comes as late as the release
-/// itself must not leave the crew in doubt whether the motor lights. An abort and a disarm still end it.
+/// So long before the release, s, and later no key and no silence holds the countdown any more: a hold that comes as late as the
+/// release itself must not leave the crew in doubt whether the motor lights. An abort and a disarm still end it, and so does an
+/// arming check that fails: it is the vehicle that finds it, and nothing has current before the release.
 pub const LAST_HOLD_S: f64 = 2.0;
 
 /// Why a countdown was held.
@@ -234,8 +235,8 @@ pub enum HoldCause {
     TapOverdue = 3,
     /// The station that armed the vehicle says that it hears nothing of it.
     StationDeaf = 4,
-    /// The vehicle's log has failed.
-    LogFailed = 5,
+    /// An arming check fails.
+    CheckFailed = 5,
 }
 
 /// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
@@ -255,9 +256,10 @@ impl StartPoint {
 }
 
 impl Mode {
-    /// Whether a countdown runs that may still be held.
-    pub fn may_hold(&self, start: StartPoint, time_s: f64) -> bool {
-        let in_time = |end_s: f64| start.last_hold_s().is_none_or(|last_s| end_s - time_s > last_s);
+    /// Whether a countdown runs that may still be held for this.
+    pub fn may_hold_for(&self, cause: HoldCause, start: StartPoint, time_s: f64) -> bool {
+        let last_s = start.last_hold_s().filter(|_| cause != HoldCause::CheckFailed);
+        let in_time = |end_s: f64| last_s.is_none_or(|last_s| end_s - time_s > last_s);
         self.countdown_end_s.is_some_and(in_time)
     }
 

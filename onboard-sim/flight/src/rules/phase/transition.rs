@@ -103,8 +103,9 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             wrong("disarm", "only PAD_ARMED, BOOST before the lift-off, and TOUCHDOWN disarm")
         }
 
-        (P::PadArmed, E::StartRequested { countdown_s }) => match mode.countdown_end_s {
+        (P::PadArmed, E::StartRequested { countdown_s, checks_passed }) => match mode.countdown_end_s {
             Some(_) => Row::Refuse(Refusal::CountdownRunning),
+            None if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
             None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
             None => Row::Go(
                 Mode { countdown_end_s: Some(time_s + countdown_s), hold: None, ..*mode },
@@ -116,7 +117,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
 
         // A hold cancels the countdown: only a new start counts down again.
         (P::PadArmed, E::Hold { cause, start }) => match (mode.countdown_end_s, mode.hold) {
-            (Some(_), _) if !mode.may_hold(start, time_s) => Row::Refuse(Refusal::TooLateToHold),
+            (Some(_), _) if !mode.may_hold_for(cause, start, time_s) => Row::Refuse(Refusal::TooLateToHold),
             (Some(_), _) => Row::Go(
                 Mode { countdown_end_s: None, hold: Some(Hold { cause, at_s: time_s }), ..*mode },
                 phase,

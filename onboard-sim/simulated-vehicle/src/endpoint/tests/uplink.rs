@@ -247,23 +247,23 @@ fn a_station_that_hears_nothing_of_the_countdown_holds_it() {
 }
 
 #[test]
-fn a_log_that_fails_holds_the_countdown_while_a_hold_works() {
+fn a_log_that_fails_holds_the_countdown_until_the_release() {
     let failed = LogState { running: false, space_bytes: 0 };
     let mut pad = Pad::rocket();
     pad.count_down();
     pad.vehicle.set_log_state(failed);
     pad.run(0.5);
     assert!(!pad.counting());
-    assert_eq!(pad.status().hold, TdHold::TD_HOLD_LOG_FAILED);
-    assert_eq!(pad.said("the log has failed in the countdown"), 1);
-    assert_eq!(pad.ask(CREW, START, 0.0), DENIED);
-    assert_eq!(pad.said("start refused: the log has failed"), 1);
+    assert_eq!(pad.status().hold, TdHold::TD_HOLD_CHECK_FAILED);
+    assert_eq!(pad.said("log: found not running, required running"), 1);
+    assert_eq!(pad.ask(CREW, START, 0.0), NOT_NOW);
+    assert_eq!(pad.said("start refused: log: found not running"), 1);
     let mut pad = Pad::rocket();
     pad.count_down();
     pad.run(pad.vehicle.computer().countdown_s() - 1.0);
     pad.vehicle.set_log_state(failed);
     pad.run(2.0);
-    assert!(!pad.vehicle.phase().on_pad(), "in the last 2 s nothing holds");
+    assert!(pad.vehicle.phase().on_pad() && !pad.counting(), "nothing has current before the release");
 }
 
 /// Who starts is who armed, or has taken command: the silence of that station holds the countdown.

@@ -1,6 +1,7 @@
 //! The vehicles as their crew meets them: arming, countdown, landing, and an abort in every phase they pass.
 
 mod check;
+mod countdown;
 mod pad;
 mod space;
 

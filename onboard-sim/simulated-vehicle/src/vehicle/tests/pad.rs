@@ -4,6 +4,7 @@ use super::space::flight_of;
 use super::*;
 use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::outputs::{Line, Outputs};
+use flight::rules::phase::HoldCause;
 use flight::vehicle::mission::StartPoint;
 use sim::outside::{Outside, Unwatched};
 use sim::sortie::Sortie;
@@ -177,7 +178,11 @@ fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_bu
             let held = asked_in(&flight, Asked::Hold, frames);
             assert_eq!(
                 held,
-                mode.may_hold(start, f64::from(u32::try_from(flight.frame()).unwrap() + 1) * FRAME_S)
+                mode.may_hold_for(
+                    HoldCause::Commanded,
+                    start,
+                    f64::from(u32::try_from(flight.frame()).unwrap() + 1) * FRAME_S
+                )
             );
             let disarmed = asked_in(&flight, Asked::Disarm, frames);
             assert!(disarmed || !mode.phase.on_pad(), "{mode:?}");
@@ -249,22 +254,19 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
     }
 }
 
+/// The booster goes, and the parachute opens at the apogee.
+const FELT_NOTHING: [Phase; 6] =
+    [Phase::PadArmed, Phase::Boost, Phase::Coast, Phase::Deploy, Phase::Chute, Phase::Touchdown];
+
 /// Detections that come early or late because a sensor lies, each with its outcome.
 #[test]
 fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
     // What happens in order, and how the vehicle moves vertically when it believes in its apogee, m/s.
     let cases: [(&str, &[Phase], core::ops::Range<f64>); 5] = [
-        // Lift-off is late, seen by the barometer alone, and the booster stays: the estimate falls all the time.
-        (
-            "accelerometer-dead@0",
-            &[Phase::PadArmed, Phase::Boost, Phase::Chute, Phase::Touchdown],
-            -5.0..12.0,
-        ),
-        (
-            "accelerometer-dead@boost+1",
-            &[Phase::PadArmed, Phase::Boost, Phase::Chute, Phase::Touchdown],
-            -5.0..12.0,
-        ),
+        // Lift-off is late, seen by the barometer alone. Pressure and satellites part the booster and show the apogee; without
+        // an accelerometer no landing is tried.
+        ("accelerometer-dead@0", &FELT_NOTHING, -8.0..2.0),
+        ("accelerometer-dead@boost+1", &FELT_NOTHING, -8.0..2.0),
         // Two metres a second squared too much: the estimate still rises when the barometer already sinks.
         ("accelerometer-bias:200@boost", &[], -15.0..1.0),
         ("accelerometer-bias:-200@boost", &[], -1.0..12.0),

@@ -21,7 +21,7 @@ fn during_a_flight_the_motor_is_live_then_burning_then_hot_then_burnt() {
         }
         (mode.motor_status(time_s), mode.approach_wait_s(time_s))
     };
-    let start = [ARM[2], Event::StartRequested { countdown_s: 0.0 }];
+    let start = [ARM[2], Event::StartRequested { countdown_s: 0.0, checks_passed: true }];
     assert_eq!(status(&[], 2.0), (MotorStatus::Live, Some(0.0)));
     assert_eq!(status(&start, 3.0), (MotorStatus::Live, None));
     let fall = [Event::ReleasedAt(StartPoint::Apogee), Event::FinsConfirmed, Event::LandArm];
@@ -152,13 +152,13 @@ proptest! {
 // Holds: after a hold only a new start counts down again.
 
 const SILENT: Event = hold(HoldCause::UplinkSilent, StartPoint::Pad);
-const START: Event = Event::StartRequested { countdown_s: 5.0 };
+const START: Event = Event::StartRequested { countdown_s: 5.0, checks_passed: true };
 const CAUSES: [HoldCause; 5] = [
     HoldCause::UplinkSilent,
     HoldCause::Commanded,
     HoldCause::TapOverdue,
     HoldCause::StationDeaf,
-    HoldCause::LogFailed,
+    HoldCause::CheckFailed,
 ];
 
 const fn hold(cause: HoldCause, start: StartPoint) -> Event {
@@ -185,13 +185,18 @@ fn a_hold_clears_the_countdown_and_keeps_the_vehicle_armed() {
 
 /// The countdown ends at 8 s.
 #[test]
-fn in_the_last_two_seconds_nothing_holds_and_an_abort_and_a_disarm_still_end_it() {
+fn in_the_last_two_seconds_no_key_and_no_silence_holds_and_a_failing_check_an_abort_and_a_disarm_still_end_it()
+ {
     let counting = after(&with_arm(&[START]));
     for cause in CAUSES {
         for start in [StartPoint::Pad, StartPoint::Apogee] {
             assert_eq!(transition(&counting, hold(cause, start), 5.99).refusal, None);
             for time_s in [6.0, 7.0, 8.0, 9.0, f64::NAN] {
                 let late = transition(&counting, hold(cause, start), time_s);
+                if cause == HoldCause::CheckFailed {
+                    assert_eq!((late.refusal, late.mode.countdown_end_s), (None, None), "{time_s}");
+                    continue;
+                }
                 assert_eq!((late.refusal, late.mode), (Some(Refusal::TooLateToHold), counting), "{time_s}");
             }
         }

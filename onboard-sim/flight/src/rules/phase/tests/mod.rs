@@ -9,7 +9,7 @@ fn every_event() -> Vec<Event> {
         Event::SelfTestPassed,
         Event::PinPulled,
         Event::PinInserted,
-        Event::StartRequested { countdown_s: 5.0 },
+        Event::StartRequested { countdown_s: 5.0, checks_passed: true },
         Event::CountdownElapsed,
         Event::ReleasedAt(StartPoint::Pad),
         Event::ReleasedAt(StartPoint::Apogee),
@@ -189,7 +189,7 @@ const ABORT: Event = Event::AbortRequested { lifted_off: true, above_commit_heig
 #[test]
 fn a_vehicle_released_at_apogee_flies_to_safed() {
     let mode = after(&with_arm(&[
-        Event::StartRequested { countdown_s: 1.0 },
+        Event::StartRequested { countdown_s: 1.0, checks_passed: true },
         Event::ReleasedAt(StartPoint::Apogee),
         Event::FinsConfirmed,
         Event::LandArm,
@@ -210,7 +210,7 @@ fn a_vehicle_released_at_apogee_flies_to_safed() {
 #[test]
 fn a_pad_start_flies_the_whole_sequence() {
     let mode = after(&with_arm(&[
-        Event::StartRequested { countdown_s: 1.0 },
+        Event::StartRequested { countdown_s: 1.0, checks_passed: true },
         Event::CountdownElapsed,
         Event::LiftOff,
         Event::Burnout,
@@ -227,13 +227,13 @@ fn a_pad_start_flies_the_whole_sequence() {
 
 #[test]
 fn the_countdown_must_run_out_before_a_release() {
-    let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0, checks_passed: true }]));
     let release = Event::ReleasedAt(StartPoint::Apogee);
     assert_eq!(transition(&mode, release, 7.9).refusal, Some(Refusal::CountdownNotElapsed));
     assert_eq!(transition(&mode, release, 8.0).mode.phase, Phase::Deploy);
     assert_eq!(mode.countdown_remaining_s(6.0), Some(2.0));
     assert_eq!(
-        transition(&mode, Event::StartRequested { countdown_s: 5.0 }, 4.0).refusal,
+        transition(&mode, Event::StartRequested { countdown_s: 5.0, checks_passed: true }, 4.0).refusal,
         Some(Refusal::CountdownRunning)
     );
 }
@@ -241,14 +241,15 @@ fn the_countdown_must_run_out_before_a_release() {
 #[test]
 fn a_countdown_must_be_a_number_of_seconds() {
     for countdown_s in [f64::NAN, f64::INFINITY, -1.0] {
-        let answer = transition(&after(&ARM), Event::StartRequested { countdown_s }, 3.0);
+        let answer =
+            transition(&after(&ARM), Event::StartRequested { countdown_s, checks_passed: true }, 3.0);
         assert_eq!(answer.refusal, Some(Refusal::BadCountdown));
     }
 }
 
 #[test]
 fn disarming_cancels_the_countdown_and_latches_nothing() {
-    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0, checks_passed: true }]));
     let answer = transition(&counting, Event::DisarmRequested { lifted_off: false }, 4.0);
     assert_eq!(answer.mode.phase, Phase::PadIdle);
     assert_eq!(answer.effects, Effects::of(&[Effect::Disarm, Effect::CancelCountdown]));
@@ -360,7 +361,7 @@ fn a_set_of_effects_lists_exactly_its_members() {
 
 #[test]
 fn each_way_to_an_inhibited_motor_has_its_cause() {
-    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0 }]));
+    let counting = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0, checks_passed: true }]));
     for (mode, event, cause) in [
         (counting, ABORT, Latch::Commanded),
         (in_order(Phase::Powered), ABORT, Latch::Commanded),
@@ -390,7 +391,7 @@ fn any_event() -> impl Strategy<Value = Event> {
 /// Events that advance the flight, so that random sequences reach the late phases too.
 fn likely_event() -> impl Strategy<Value = Event> {
     let leading = with_arm(&[
-        Event::StartRequested { countdown_s: 1.0 },
+        Event::StartRequested { countdown_s: 1.0, checks_passed: true },
         Event::ReleasedAt(StartPoint::Apogee),
         Event::FinsConfirmed,
         Event::LandArm,

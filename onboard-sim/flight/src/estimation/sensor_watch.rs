@@ -1,0 +1,251 @@
+//! Which sensors speak, and what each says that cannot be true: one set of rules, asked before an arming, until the igniter
+//! has its current, in flight, and of a log.
+
+use alloc::format;
+use alloc::string::String;
+use nalgebra::{SVector, Vector3};
+use serde::Serialize;
+
+use super::estimator::Measurements;
+use super::estimator::alignment::FELT_AT_REST_M_S2;
+
+/// So many equal inertial samples in a row do not happen to noise.
+const FROZEN_IMU: u32 = 10;
+/// The same of a barometer, half a second, and of satellite fixes, two seconds: both round more coarsely.
+const FROZEN_BAROMETER: u32 = 25;
+const FROZEN_FIXES: u32 = 10;
+
+/// The barometer speaks 50 times a second.
+pub const BAROMETER_LOST_S: f64 = 0.25;
+/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a second and drops one sample
+/// in 50.
+pub const GNSS_LOST_S: f64 = 1.5;
+/// A lidar that says nothing for this long where it must see the ground, s.
+pub const LIDAR_LOST_S: f64 = 0.25;
+/// An inertial unit speaks in every frame; its samples are bridged for as long, s.
+const IMU_LOST_S: f64 = 0.05;
+
+/// Time over which a resting vehicle's inertial samples are averaged, s: a shudder of the rail in a gust is shorter, and
+/// the noise of one sample (0.5 deg/s, 0.1 m/s^2) goes down to a seventh.
+const RESTS_OVER_S: f64 = 0.25;
+/// A barometer that was zeroed at power-up and stands farther from its pad than this is wrong, m: in a day the weather moves
+/// it by 15 m.
+const BAROMETER_OFF_M: f64 = 20.0;
+/// Fixes of a vehicle on its pad lie within this of it, m: four times the wander of a single-frequency receiver.
+const GNSS_OFF_M: f64 = 20.0;
+/// Weight of the newest fix in the place that fixes show: an outlier of 50 m moves it by 10.
+const NEWEST_FIX: f64 = 0.2;
+
+/// When one sensor spoke, and for how long it has said the same.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Voice<const N: usize> {
+    last: SVector<f64, N>,
+    /// When it spoke last; before that, since when it is listened to. NaN: not yet.
+    spoke_at_s: f64,
+    spoke: bool,
+    same: u32,
+    same_since_s: f64,
+}
+
+impl<const N: usize> Default for Voice<N> {
+    fn default() -> Self {
+        Self {
+            last: SVector::repeat(f64::NAN),
+            spoke_at_s: f64::NAN,
+            spoke: false,
+            same: 0,
+            same_since_s: f64::NAN,
+        }
+    }
+}
+
+impl<const N: usize> Voice<N> {
+    /// Takes a frame's sample, if there is one. What is not a number was not said.
+    fn take(&mut self, said: Option<[f64; N]>, time_s: f64) {
+        if self.spoke_at_s.is_nan() {
+            self.spoke_at_s = time_s;
+        }
+        let Some(said) = said.filter(|said| said.iter().all(|value| value.is_finite())) else { return };
+        let again = self.spoke && said == self.last.data.0[0];
+        if !again {
+            self.same_since_s = time_s;
+        }
+        self.same = if again { self.same.saturating_add(1) } else { 0 };
+        (self.last, self.spoke_at_s, self.spoke) = (said.into(), time_s, true);
+    }
+
+    /// The last sample, if it is not older than this, s.
+    pub fn fresh(&self, time_s: f64, within_s: f64) -> Option<[f64; N]> {
+        (self.spoke && self.silent_s(time_s) <= within_s).then(|| self.last.into())
+    }
+
+    /// For how long it has said nothing, s.
+    pub fn silent_s(&self, time_s: f64) -> f64 {
+        time_s - self.spoke_at_s
+    }
+
+    fn repeats_for_s(&self, frozen: u32, time_s: f64) -> Option<f64> {
+        (self.same >= frozen).then(|| time_s - self.same_since_s)
+    }
+}
+
+/// The watch over all sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SensorWatch {
+    time_s: f64,
+    /// The computer gets measurements, and not the truth.
+    measures: bool,
+    gyro: Voice<3>,
+    accelerometer: Voice<3>,
+    /// Height, m.
+    barometer: Voice<1>,
+    /// Position and velocity, world, m and m/s.
+    gnss: Voice<6>,
+    /// Range, m.
+    lidar: Voice<1>,
+    /// Means over [`RESTS_OVER_S`], body, rad/s and m/s^2.
+    turns_rad_s: Vector3<f64>,
+    felt_m_s2: Vector3<f64>,
+    /// Where the fixes lie in the mean, world, m.
+    fixed_m: Vector3<f64>,
+}
+
+/// Where a vehicle stands while its sensors are asked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rests {
+    /// On its rail, there, m.
+    OnRail(Vector3<f64>),
+    /// On its legs, there, m: the lidar may be too near to see the ground.
+    OnLegs(Vector3<f64>),
+    /// Below a drone, which moves.
+    Hanging,
+}
+
+impl SensorWatch {
+    /// Takes a frame's measurements; without sensors (not `measures`) what they would say.
+    pub fn take(&mut self, measured: &Measurements, measures: bool, time_s: f64) {
+        let frame_s = if self.gyro.spoke { time_s - self.time_s } else { RESTS_OVER_S };
+        (self.time_s, self.measures) = (time_s, measures);
+        let imu = &measured.imu;
+        self.gyro.take(Some(imu.gyro_rad_s.into()).filter(|_| imu.is_plausible()), time_s);
+        self.accelerometer.take(Some(imu.specific_force_m_s2.into()).filter(|_| imu.is_plausible()), time_s);
+        self.barometer.take(measured.pressure_altitude_m.map(|height_m| [height_m]), time_s);
+        self.lidar.take(measured.lidar_range_m.map(|range_m| [range_m]), time_s);
+        let fix = measured.gnss.map(|fix| {
+            let ([x, y, z], [u, v, w]) = (fix.position_m.into(), fix.velocity_m_s.into());
+            [x, y, z, u, v, w]
+        });
+        let share = if self.gnss.spoke { NEWEST_FIX } else { 1.0 };
+        if let Some(fix) =
+            measured.gnss.filter(|fix| fix.position_m.iter().all(|place_m| place_m.is_finite()))
+        {
+            self.fixed_m += (fix.position_m - self.fixed_m) * share;
+        }
+        self.gnss.take(fix, time_s);
+        if imu.is_plausible() {
+            let share = (frame_s / RESTS_OVER_S).clamp(0.0, 1.0);
+            self.turns_rad_s += (imu.gyro_rad_s - self.turns_rad_s) * share;
+            self.felt_m_s2 += (imu.specific_force_m_s2 - self.felt_m_s2) * share;
+        }
+    }
+
+    /// The computer has sensors, and does not get the truth.
+    pub fn measures(&self) -> bool {
+        self.measures
+    }
+
+    /// The satellite receiver has a fix.
+    pub fn gnss_speaks(&self) -> bool {
+        self.gnss.fresh(self.time_s, GNSS_LOST_S).is_some()
+    }
+
+    /// Pressure altitude, m, unless the barometer is silent.
+    pub fn pressure_altitude_m(&self) -> Option<f64> {
+        self.barometer.fresh(self.time_s, BAROMETER_LOST_S).map(|[height_m]| height_m)
+    }
+
+    /// The vertical velocity of the last fix, m/s, if it is not older than this, s.
+    pub fn gnss_vertical_m_s(&self, within_s: f64) -> Option<f64> {
+        self.gnss.fresh(self.time_s, within_s).map(|[.., vertical_m_s]| vertical_m_s)
+    }
+
+    /// The lidar's range, m, unless it sees nothing.
+    pub fn lidar_range_m(&self) -> Option<f64> {
+        self.lidar.fresh(self.time_s, LIDAR_LOST_S).map(|[range_m]| range_m)
+    }
+
+    /// For how long each of them has said nothing, s: barometer, satellites, lidar.
+    pub fn silent_s(&self) -> [f64; 3] {
+        let time_s = self.time_s;
+        [self.barometer.silent_s(time_s), self.gnss.silent_s(time_s), self.lidar.silent_s(time_s)]
+    }
+
+    /// For how long the accelerometer has repeated one sample, s; `None` if it does not.
+    pub fn accelerometer_frozen_s(&self) -> Option<f64> {
+        self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s).filter(|_| self.measures)
+    }
+
+    /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.
+    pub fn feels_nothing_for_s(&self) -> f64 {
+        let lost_s = |frozen_s: Option<f64>, silent_s: f64| frozen_s.unwrap_or(0.0).max(silent_s);
+        let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s);
+        let [felt_s, turned_s] = [
+            lost_s(self.accelerometer_frozen_s(), self.accelerometer.silent_s(self.time_s)),
+            lost_s(gyro_s, self.gyro.silent_s(self.time_s)),
+        ];
+        if self.measures { felt_s.max(turned_s) } else { 0.0 }
+    }
+
+    /// Mean rotation rate over the last moment, rad/s.
+    pub fn turns_rad_s(&self) -> f64 {
+        self.turns_rad_s.norm()
+    }
+
+    /// What is wrong with each sensor of a vehicle at rest, in the crew's words: accelerometer, gyro, barometer, satellites,
+    /// lidar. The state of a vehicle without sensors is known, and nothing is wrong.
+    pub fn defects(&self, rests: Rests) -> [Option<String>; 5] {
+        if !self.measures {
+            return [const { None }; 5];
+        }
+        let time_s = self.time_s;
+        let silent = |name: &str, silent_s: f64, longest_s: f64| {
+            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.0} s"))
+        };
+        let repeats = |name: &str, for_s: Option<f64>| {
+            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.0} s"))
+        };
+        let felt_m_s2 = self.felt_m_s2.norm();
+        let accelerometer = silent("accelerometer", self.accelerometer.silent_s(time_s), IMU_LOST_S)
+            .or_else(|| repeats("accelerometer", self.accelerometer_frozen_s()))
+            .or_else(|| {
+                let wrong = !FELT_AT_REST_M_S2.contains(&felt_m_s2) && rests != Rests::Hanging;
+                wrong.then(|| format!("accelerometer feels {felt_m_s2:.1} m/s2 at rest, not 9.8"))
+            });
+        let gyro = silent("gyro", self.gyro.silent_s(time_s), IMU_LOST_S)
+            .or_else(|| repeats("gyro", self.gyro.repeats_for_s(FROZEN_IMU, time_s)));
+        let place_m = match rests {
+            Rests::OnRail(place_m) | Rests::OnLegs(place_m) => Some(place_m),
+            Rests::Hanging => None,
+        };
+        let barometer = silent("barometer", self.barometer.silent_s(time_s), BAROMETER_LOST_S)
+            .or_else(|| repeats("barometer", self.barometer.repeats_for_s(FROZEN_BAROMETER, time_s)))
+            .or_else(|| {
+                let off_m = self.barometer.last[0] - place_m?.z;
+                (off_m.abs() > BAROMETER_OFF_M)
+                    .then(|| format!("barometer {off_m:.0} m off: power cycle to zero it"))
+            });
+        let gnss_silent_s = self.gnss.silent_s(time_s);
+        let gnss = (gnss_silent_s > GNSS_LOST_S)
+            .then(|| format!("no GNSS fix for {gnss_silent_s:.0} s"))
+            .or_else(|| repeats("GNSS", self.gnss.repeats_for_s(FROZEN_FIXES, time_s)))
+            .or_else(|| {
+                let off_m = (self.fixed_m - place_m?).norm();
+                (self.gnss.spoke && off_m > GNSS_OFF_M).then(|| format!("GNSS {off_m:.0} m off"))
+            });
+        let lidar = match rests {
+            Rests::OnRail(_) => silent("lidar", self.lidar.silent_s(time_s), LIDAR_LOST_S),
+            Rests::OnLegs(_) | Rests::Hanging => None,
+        };
+        [accelerometer, gyro, barometer, gnss, lidar]
+    }
+}
