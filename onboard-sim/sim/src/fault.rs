@@ -8,6 +8,7 @@ use core::fmt;
 use core::str::FromStr;
 
 use crate::world::Fault;
+use crate::world::sensors::{Defect, Sensor};
 use flight::rules::phase::Phase;
 
 use crate::draw::fault_shares;
@@ -17,20 +18,8 @@ use crate::draw::fault_shares;
 pub enum Breakage {
     /// Motor, gimbal or fins.
     Vehicle(Fault),
-    /// The satellite receiver sends no more fixes.
-    GnssOut,
-    /// The barometer sends no more samples.
-    BarometerOut,
-    /// The lidar sends no more ranges.
-    LidarOut,
-    /// Every gyro axis has this bias from now on, degrees per second.
-    GyroBiasStep(f64),
-    /// Every accelerometer axis has this bias from now on, thousandths of gravity.
-    AccelerometerBiasStep(f64),
-    /// Every accelerometer axis reads nothing from now on.
-    AccelerometerDead,
-    /// The barometer's height is wrong by this from now on, m.
-    BarometerStep(f64),
+    /// A sensor.
+    Sensor(Sensor, Defect),
     /// The radio is silent. Nothing on board depends on it.
     LinkLoss,
     /// Messages in both directions arrive this much later, s.
@@ -77,13 +66,6 @@ const NAMES: &[(&str, &str, Build)] = &[
     ("link-delay", "s, 0 to 60", |value| {
         value.filter(|delay_s| (0.0..=60.0).contains(delay_s)).map(Breakage::LinkDelay)
     }),
-    ("gnss-out", "", |value| value.is_none().then_some(Breakage::GnssOut)),
-    ("barometer-out", "", |value| value.is_none().then_some(Breakage::BarometerOut)),
-    ("lidar-out", "", |value| value.is_none().then_some(Breakage::LidarOut)),
-    ("gyro-bias", "deg/s", |value| value.map(Breakage::GyroBiasStep)),
-    ("accelerometer-bias", "mg", |value| value.map(Breakage::AccelerometerBiasStep)),
-    ("accelerometer-dead", "", |value| value.is_none().then_some(Breakage::AccelerometerDead)),
-    ("barometer-step", "m", |value| value.map(Breakage::BarometerStep)),
     ("fin-stuck", "0 to 3", |value| {
         let fin =
             value.filter(|fin| (0.0..=3.0).contains(fin) && libm::trunc(*fin).to_bits() == fin.to_bits())?;
@@ -123,6 +105,57 @@ const NAMES: &[(&str, &str, Build)] = &[
     ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
 ];
 
+/// The sensors, with their names and units in the text of a fault.
+const SENSORS: [(Sensor, &str, &str); 5] = [
+    (Sensor::Gyro, "gyro", "deg/s"),
+    (Sensor::Accelerometer, "accelerometer", "mg"),
+    (Sensor::Barometer, "barometer", "m"),
+    (Sensor::Gnss, "gnss", "m"),
+    (Sensor::Lidar, "lidar", "m"),
+];
+
+/// The defects of a sensor without a value, and those with one.
+const SILENT: [(&str, Defect); 4] =
+    [("out", Defect::Out), ("dead", Defect::Dead), ("stuck", Defect::Stuck), ("nan", Defect::NotANumber)];
+type OfValue = fn(f64) -> Defect;
+const WRONG: [(&str, OfValue); 6] = [
+    ("step", Defect::Step),
+    ("bias", Defect::Step),
+    ("ramp", Defect::Ramp),
+    ("spike", Defect::Spike),
+    ("noise", Defect::Noise),
+    ("blocked", Defect::Blocked),
+];
+
+fn named(sensor: Sensor) -> (&'static str, &'static str) {
+    SENSORS.iter().find(|(known, ..)| *known == sensor).map_or(("?", ""), |(_, name, unit)| (name, unit))
+}
+
+/// A defect's name and value.
+fn how(defect: Defect) -> (&'static str, Option<f64>) {
+    let same = |known: Defect| core::mem::discriminant(&known) == core::mem::discriminant(&defect);
+    let silent = SILENT.iter().find(|(_, known)| same(*known)).map(|(name, _)| (*name, None));
+    let value = match defect {
+        Defect::Step(value) | Defect::Ramp(value) | Defect::Spike(value) => value,
+        Defect::Noise(value) | Defect::Blocked(value) => value,
+        Defect::Out | Defect::Dead | Defect::Stuck | Defect::NotANumber => f64::NAN,
+    };
+    let wrong = || WRONG.iter().find(|(_, of)| same(of(value))).map_or("?", |(name, _)| *name);
+    silent.unwrap_or_else(|| (wrong(), Some(value)))
+}
+
+/// A sensor's defect by its name; the value it takes, if it takes one, and the unit of that value.
+fn sensor_fault(name: &str, value: Option<f64>) -> Option<(&'static str, Option<Breakage>)> {
+    let (sensor, how) = name.rsplit_once('-')?;
+    let (sensor, _, unit) = SENSORS.iter().find(|(_, known, _)| *known == sensor)?;
+    let silent = SILENT.iter().find(|(known, _)| *known == how);
+    if let Some((_, defect)) = silent {
+        return Some(("", value.is_none().then_some(Breakage::Sensor(*sensor, *defect))));
+    }
+    let (_, of) = WRONG.iter().find(|(known, _)| *known == how)?;
+    Some((unit, value.map(|value| Breakage::Sensor(*sensor, of(value)))))
+}
+
 /// The phases, with their names in the text of a fault.
 const PHASES: &[(&str, Phase)] = &[
     ("pad", Phase::PadIdle),
@@ -151,7 +184,12 @@ fn known() -> String {
     let with_value = |(name, value, _): &(&str, &str, Build)| {
         if value.is_empty() { (*name).to_owned() } else { format!("{name}:VALUE ({value})") }
     };
-    NAMES.iter().map(with_value).collect::<Vec<_>>().join(", ")
+    let names = NAMES.iter().map(with_value).collect::<Vec<_>>().join(", ");
+    let sensors = SENSORS.map(|(_, name, unit)| format!("{name} ({unit})")).join(", ");
+    let (silent, wrong) = (SILENT.map(|(name, _)| name).join(", "), WRONG.map(|(name, _)| name).join(", "));
+    format!(
+        "{names}, or SENSOR-DEFECT with a sensor of {sensors} and a defect of {silent}, or with :VALUE of {wrong}"
+    )
 }
 
 fn phases() -> String {
@@ -202,15 +240,16 @@ impl FromStr for TimedFault {
         let (what, when) = given.split_once('@').ok_or_else(|| refuse("no `@`".to_owned()))?;
         let when = when.parse().map_err(refuse)?;
         let (name, value) = what.split_once(':').map_or((what, None), |(name, value)| (name, Some(value)));
-        let (_, unit, build) = NAMES
-            .iter()
-            .find(|(known, ..)| *known == name)
-            .ok_or_else(|| refuse(format!("no fault is named `{name}`")))?;
         let value = match value {
             Some(text) => Some(number(text).ok_or_else(|| refuse(format!("`{text}` is no number")))?),
             None => None,
         };
-        let breakage = build(value).ok_or_else(|| {
+        let known = NAMES.iter().find(|(known, ..)| *known == name);
+        let (unit, breakage) = known
+            .map(|(_, unit, build)| (*unit, build(value)))
+            .or_else(|| sensor_fault(name, value))
+            .ok_or_else(|| refuse(format!("no fault is named `{name}`")))?;
+        let breakage = breakage.ok_or_else(|| {
             refuse(if unit.is_empty() {
                 format!("{name} takes no value")
             } else {
@@ -237,13 +276,12 @@ impl fmt::Display for TimedFault {
         match self.breakage {
             Breakage::LinkLoss => write!(f, "link-loss"),
             Breakage::LinkDelay(delay_s) => write!(f, "link-delay:{delay_s}"),
-            Breakage::GnssOut => write!(f, "gnss-out"),
-            Breakage::BarometerOut => write!(f, "barometer-out"),
-            Breakage::LidarOut => write!(f, "lidar-out"),
-            Breakage::GyroBiasStep(deg_s) => write!(f, "gyro-bias:{deg_s}"),
-            Breakage::AccelerometerBiasStep(mg) => write!(f, "accelerometer-bias:{mg}"),
-            Breakage::AccelerometerDead => write!(f, "accelerometer-dead"),
-            Breakage::BarometerStep(step_m) => write!(f, "barometer-step:{step_m}"),
+            Breakage::Sensor(sensor, defect) => {
+                let (name, _) = named(sensor);
+                let (how, value) = how(defect);
+                write!(f, "{name}-{how}")?;
+                value.map_or(Ok(()), |value| write!(f, ":{value}"))
+            }
             Breakage::Reboot(down_s) => write!(f, "reboot:{down_s}"),
             Breakage::Abort => write!(f, "abort"),
             Breakage::Vehicle(Fault::NoLight) => write!(f, "no-light"),
@@ -328,6 +366,12 @@ mod tests {
             "gimbal-stuck@powered",
             "accelerometer-dead@boost",
             "barometer-step:-20@coast+1",
+            "barometer-ramp:-80@boost+0.5",
+            "gnss-spike:200@coast",
+            "gyro-stuck@descent",
+            "accelerometer-nan@descent",
+            "gyro-noise:7@powered",
+            "lidar-blocked:0.3@armed",
             "ascent-self-lights@pad-armed+3",
             "gimbal-jams:3@powered+0.5..2",
             "ascent-weak:0.6@boost",
@@ -338,7 +382,7 @@ mod tests {
             "reboot:0.5@descent+4",
             "link-loss@0",
             "link-delay:1.5@descent",
-            "accelerometer-bias:50@armed",
+            "accelerometer-step:50@armed",
             "abort@ignition+0..4.5",
         ] {
             assert_eq!(text.parse::<TimedFault>().unwrap().to_string(), text);

@@ -77,9 +77,10 @@ impl Surroundings {
         for _ in 0..FRAME_MS {
             self.world.step(&self.actuators);
             if let Some(sensors) = &mut self.sensors {
-                measured = sensors.observe(&SensorTruth::of(&self.world), &self.faults).or(measured);
+                measured = sensors.observe(&SensorTruth::of(&self.world)).or(measured);
             }
         }
+        let measured = measured.map(|measured| self.faults.heard(&measured));
         let lit =
             [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
         self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);

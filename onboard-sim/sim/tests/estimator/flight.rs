@@ -8,7 +8,7 @@ use flight::estimation::estimator::{
 };
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
-use sim::world::sensors::{SensorFaults, SensorParams, SensorTruth, Sensors, believed_start};
+use sim::world::sensors::{SensorParams, SensorTruth, Sensors, believed_start};
 
 const MS_S: f64 = 1e-3;
 const CG_OVER_FEET_M: f64 = 0.6;
@@ -25,7 +25,8 @@ pub(crate) struct Scene {
     pub(crate) seed: u64,
     /// Wind at the start height; it decreases with the 1/7 power of height.
     pub(crate) wind_m_s: Vector2<f64>,
-    pub(crate) faults: fn(f64) -> SensorFaults,
+    /// What becomes of the measurements at a time, s.
+    pub(crate) faults: fn(f64, &mut Measurements),
     pub(crate) sensors: SensorParams,
     /// The true force of the air divided by the force in the estimator's model.
     pub(crate) air_scale: f64,
@@ -63,7 +64,7 @@ impl Scene {
         Self {
             seed,
             wind_m_s,
-            faults: |_| SensorFaults::default(),
+            faults: |_, _| {},
             sensors: SensorParams::default(),
             air_scale: 1.0 + 0.1 * libm::sin(2.4 * seed as f64),
         }
@@ -113,7 +114,8 @@ impl Scene {
             let truth =
                 SensorTruth::of_motion(&state, &specific_force_m_s2, through_air_m_s.norm(), CG_OVER_FEET_M);
             let time_s = f64::from(ms) * MS_S;
-            if let Some(measurements) = sensors.observe(&truth, &(self.faults)(time_s)) {
+            if let Some(mut measurements) = sensors.observe(&truth) {
+                (self.faults)(time_s, &mut measurements);
                 let vehicle = VehicleNow {
                     mass_kg: MASS_KG,
                     air_density_kg_m3: DENSITY_KG_M3,

@@ -7,21 +7,19 @@ mod plant;
 
 use std::sync::LazyLock;
 
-use ::flight::estimation::estimator::{Doubt, Health};
-use nalgebra::Vector3;
-use sim::world::sensors::SensorFaults;
+use ::flight::estimation::estimator::{Doubt, Health, Measurements};
 
 use self::flight::{Frame, Scene};
 
 /// Flights of a Monte Carlo run.
 const FLIGHTS: u64 = 200;
 
-fn fly(flights: u64, faults: fn(f64) -> SensorFaults) -> Vec<Vec<Frame>> {
+fn fly(flights: u64, faults: fn(f64, &mut Measurements)) -> Vec<Vec<Frame>> {
     (0..flights).map(|seed| Scene { faults, ..Scene::of(seed) }.fly()).collect()
 }
 
 /// Flights without faults, shared by several tests.
-static HEALTHY: LazyLock<Vec<Vec<Frame>>> = LazyLock::new(|| fly(FLIGHTS, |_| SensorFaults::default()));
+static HEALTHY: LazyLock<Vec<Vec<Frame>>> = LazyLock::new(|| fly(FLIGHTS, |_, _| {}));
 
 fn rms(frames: &[&Frame], error: impl Fn(&Frame) -> f64) -> f64 {
     (frames.iter().map(|frame| error(frame).powi(2)).sum::<f64>() / frames.len() as f64).sqrt()
@@ -125,7 +123,7 @@ fn the_two_heights_agree_at_ignition_and_show_a_jump_of_the_barometer() {
 
 #[test]
 fn without_satellites_in_the_last_five_seconds_the_error_stays_within_the_stated_deviation() {
-    let flights = &fly(FLIGHTS, |time_s| SensorFaults { gnss_out: time_s > 6.9, ..SensorFaults::default() });
+    let flights = &fly(FLIGHTS, |time_s, heard| heard.gnss = heard.gnss.filter(|_| time_s <= 6.9));
     let down = last(flights);
     let silent_s = down.iter().map(|frame| frame.time_s - 6.9).fold(f64::INFINITY, f64::min);
     println!(
@@ -144,12 +142,13 @@ fn without_satellites_in_the_last_five_seconds_the_error_stays_within_the_stated
 
 #[test]
 fn one_height_sensor_is_enough_for_the_descent() {
-    let no_barometer =
-        fly(50, |time_s| SensorFaults { barometer_out: time_s > 3.0, ..SensorFaults::default() });
+    let no_barometer = fly(50, |time_s, heard| {
+        heard.pressure_altitude_m = heard.pressure_altitude_m.filter(|_| time_s <= 3.0);
+    });
     let down = last(&no_barometer);
     assert!(height_rms_m(&down) < 0.05 && velocity_rms_m_s(&down) < 0.05);
     assert!(down.iter().all(|frame| frame.estimate.heights.barometric_m.is_none()));
-    let no_lidar = fly(50, |_| SensorFaults { lidar_out: true, ..SensorFaults::default() });
+    let no_lidar = fly(50, |_, heard| heard.lidar_range_m = None);
     let down = last(&no_lidar);
     println!("without lidar: height {:.2} m", height_rms_m(&down));
     assert!(height_rms_m(&down) < 0.5 && velocity_rms_m_s(&down) < 0.05);
@@ -157,13 +156,10 @@ fn one_height_sensor_is_enough_for_the_descent() {
 
 #[test]
 fn after_a_jump_of_the_inertial_unit_the_estimate_is_unhealthy_and_then_recovers() {
-    let jumps: [fn(f64) -> SensorFaults; 3] = [
-        |time_s| gyro_jump(time_s, 1.0),
-        |time_s| gyro_jump(time_s, 5.0),
-        |time_s| {
-            let step = if time_s > 4.0 { 0.5 } else { 0.0 };
-            SensorFaults { accelerometer_bias_step_m_s2: Vector3::y() * step, ..SensorFaults::default() }
-        },
+    let jumps: [fn(f64, &mut Measurements); 3] = [
+        |time_s, heard| gyro_jump(time_s, heard, 1.0),
+        |time_s, heard| gyro_jump(time_s, heard, 5.0),
+        |time_s, heard| heard.imu.specific_force_m_s2.y += if time_s > 4.0 { 0.5 } else { 0.0 },
     ];
     for jump in jumps {
         let flights = &fly(50, jump);
@@ -181,9 +177,8 @@ fn after_a_jump_of_the_inertial_unit_the_estimate_is_unhealthy_and_then_recovers
     }
 }
 
-fn gyro_jump(time_s: f64, deg_s: f64) -> SensorFaults {
-    let step = if time_s > 4.0 { deg_s.to_radians() } else { 0.0 };
-    SensorFaults { gyro_bias_step_rad_s: Vector3::y() * step, ..SensorFaults::default() }
+fn gyro_jump(time_s: f64, heard: &mut Measurements, deg_s: f64) {
+    heard.imu.gyro_rad_s.y += if time_s > 4.0 { deg_s.to_radians() } else { 0.0 };
 }
 
 #[test]

@@ -13,7 +13,7 @@ use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
 use nalgebra::{Vector2, Vector3};
-use sim::world::sensors::{SensorFaults, SensorParams, SensorTruth, Sensors, believed_start};
+use sim::world::sensors::{SensorParams, SensorTruth, Sensors, believed_start};
 use sim::world::wind::Wind;
 use sim::world::{Actuators, Truth, World};
 
@@ -103,7 +103,7 @@ fn fly(seed: u64) -> Vec<Frame> {
         world.step(&actuators);
         let state = *world.state();
         let seen = SensorTruth::of(&world);
-        let Some(measurements) = sensors.observe(&seen, &SensorFaults::default()) else { continue };
+        let Some(measurements) = sensors.observe(&seen) else { continue };
         let time_s = world.time_s();
         let before = motor.ignition_s().map_or(0.0, |ignition_s| time_s - ignition_s);
         let mass = masses.at(curve.propellant_burnt_kg(before));

@@ -6,6 +6,7 @@ use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use super::Sensed;
+use super::vertical_speed::{APART_OF_TWO_M_S, RATE_OVER_S, VerticalSpeeds};
 use crate::computer::news::Severity;
 use crate::computer::pad::ANSWERING_RAD;
 use crate::estimation::estimator::Estimate;
@@ -35,14 +36,8 @@ const SUNK_S: f64 = 0.2;
 /// static ports show a metre or two.
 const RISEN_M: f64 = 15.0;
 const RISEN_S: f64 = 0.1;
-/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6 m/s.
-const RATE_OVER_S: f64 = 0.2;
 /// A barometer that shows this much, m/s, climbs, and has not sunk.
 const CLIMBS_M_S: f64 = 10.0;
-/// The speeds of two sensors that differ by more, m/s, cannot both be right: the wake, a late fix and a tilted rail make 5 of it.
-const APART_M_S: f64 = 15.0;
-/// A fix this old still tells the speed, s: three fixes are missing.
-const FIX_KEEPS_S: f64 = 0.6;
 /// After the separation charge the pressure in the vehicle is not that of the air, s: three times its time of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
 /// What was felt as a lift-off is looked at for so long, s: the weakest motor that leaves the rail rises by 10 m in it.
@@ -51,9 +46,6 @@ const DOUBTED_S: f64 = 2.0;
 /// vehicle that stands.
 const STANDS_M: f64 = 5.0;
 const STANDS_M_S: f64 = 3.0;
-/// A barometer that says the same for so many samples says nothing.
-const FROZEN_SAMPLES: u32 = 10;
-
 /// What the watch sees of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AscentReadings {
@@ -62,11 +54,8 @@ pub(super) struct AscentReadings {
     pub(super) phase: Phase,
     /// Along the axis, as measured, m/s^2.
     pub(super) axial_specific_force_m_s2: f64,
-    /// Upwards, from what was felt and the attitude, m/s^2.
-    pub(super) vertical_m_s2: f64,
     pub(super) pressure_altitude_m: Option<f64>,
-    /// Of a fix, up, m/s.
-    pub(super) gnss_m_s: Option<f64>,
+    pub(super) speeds: VerticalSpeeds,
     /// As estimated, up, m/s.
     pub(super) vertical_m_s: f64,
     /// The wire between booster and vehicle is whole.
@@ -76,8 +65,7 @@ pub(super) struct AscentReadings {
     pub(super) burn_time_s: f64,
 }
 
-/// The watch's memory. Three speeds say whether the vehicle rises: what was felt since the lift-off, without anything that
-/// corrects it; the pressure's; the satellites'. None of them alone makes an event.
+/// The watch's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct AscentWatch {
     gained_m_s: f64,
@@ -90,26 +78,13 @@ pub(super) struct AscentWatch {
     braking_s: f64,
     separating_since_s: Option<f64>,
     falling_frames: u32,
-    /// Felt, m/s; it begins with the estimate.
-    felt_m_s: Option<f64>,
-    /// The last fix's, m/s, and when it came, s.
-    gnss_m_s: f64,
-    gnss_at_s: f64,
-    altitude_m: f64,
-    same_samples: u32,
     highest_m: f64,
     sunk_s: f64,
-    /// The estimate's speed when the pressure began to show a fall, m/s.
+    /// The estimate's largest speed since the pressure shows a fall, m/s.
     sunk_from_m_s: f64,
     /// The first pressure altitude.
     ground_m: Option<f64>,
     risen_s: f64,
-    /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
-    mark_m: f64,
-    marked_at_s: f64,
-    /// What the last one gave, m/s, and when, s.
-    pressure_m_s: f64,
-    pressure_at_s: f64,
 }
 
 impl Default for AscentWatch {
@@ -123,20 +98,11 @@ impl Default for AscentWatch {
             braking_s: 0.0,
             separating_since_s: None,
             falling_frames: 0,
-            felt_m_s: None,
-            gnss_m_s: 0.0,
-            gnss_at_s: f64::NEG_INFINITY,
-            altitude_m: f64::INFINITY,
-            same_samples: 0,
             highest_m: f64::NEG_INFINITY,
             sunk_s: 0.0,
             sunk_from_m_s: 0.0,
             ground_m: None,
             risen_s: 0.0,
-            mark_m: 0.0,
-            marked_at_s: f64::NEG_INFINITY,
-            pressure_m_s: 0.0,
-            pressure_at_s: f64::NEG_INFINITY,
         }
     }
 }
@@ -152,14 +118,8 @@ impl AscentWatch {
         self.separating_since_s.is_some()
     }
 
-    /// The same watch after a reset: what was felt meanwhile is in the estimate alone.
-    pub(super) fn resumed(self) -> Self {
-        Self { felt_m_s: None, ..self }
-    }
-
     /// The event of this frame, if there is one.
     pub(super) fn update(&mut self, seen: &AscentReadings) -> Option<Event> {
-        self.update_speeds(seen);
         self.update_heights(seen);
         if !self.lifted_off {
             return self.wait_for_lift_off(seen);
@@ -173,7 +133,7 @@ impl AscentWatch {
                 self.separating_since_s = Some(seen.time_s);
                 Some(Event::SeparationDue)
             }
-            Phase::Boost | Phase::Coast if self.has_passed_apogee(seen) => {
+            Phase::Coast if self.has_passed_apogee(seen) => {
                 Some(Event::Apogee { booster_attached: seen.booster_attached })
             }
             _ => None,
@@ -206,43 +166,27 @@ impl AscentWatch {
     /// A push alone is no lift-off. Whoever says that the vehicle moves confirms it; if barometer or satellites say that it
     /// stands, there was none. In doubt it flies: a barometer that has failed does not stand still on its pad.
     fn doubt_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
-        let fix_m_s = self.gnss_m_s(seen.time_s);
-        let off_m = self.ground_m.filter(|_| self.pressure_speaks(seen.time_s)).map(|ground_m| self.altitude_m - ground_m);
+        let (time_s, speeds) = (seen.time_s, &seen.speeds);
+        let fix_m_s = speeds.gnss_m_s(time_s);
+        let off_m =
+            self.ground_m.zip(speeds.altitude_m(time_s)).map(|(ground_m, altitude_m)| altitude_m - ground_m);
+        let pressure_m_s = speeds.pressure_m_s(time_s, None).unwrap_or(0.0);
         let moves = self.risen_s >= RISEN_S
-            || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M && self.pressure_m_s.abs() > STANDS_M_S)
+            || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M && pressure_m_s.abs() > STANDS_M_S)
             || fix_m_s.is_some_and(|m_s| m_s.abs() > STANDS_M_S);
         // A barometer needs a moment before it tells a speed.
-        let since_s = seen.time_s - self.lifted_off_at_s;
+        let since_s = time_s - self.lifted_off_at_s;
         let nobody_says = off_m.is_none() && fix_m_s.is_none() && since_s > 2.0 * RATE_OVER_S;
         if moves || nobody_says {
             self.confirmed = true;
         } else if since_s >= DOUBTED_S {
             self.confirmed = off_m.is_some_and(|off_m| off_m.abs() > STANDS_M);
             if !self.confirmed {
-                (self.lifted_off, self.denied, self.felt_m_s) = (false, true, None);
+                (self.lifted_off, self.denied) = (false, true);
                 return Some(Event::NoLiftOff);
             }
         }
         None
-    }
-
-    /// The barometer is heard, and does not repeat itself.
-    fn pressure_speaks(&self, time_s: f64) -> bool {
-        time_s - self.pressure_at_s <= 2.0 * RATE_OVER_S && self.same_samples < FROZEN_SAMPLES
-    }
-
-    /// The speed that the pressure shows, m/s. Through the gas of the separation charge it is that of before, less what a
-    /// coasting vehicle loses.
-    fn pressure_m_s(&self, time_s: f64) -> Option<f64> {
-        let charged =
-            self.separating_since_s.is_some_and(|since_s| time_s - since_s < CHARGE_LASTS_S + 2.0 * RATE_OVER_S);
-        if self.pressure_speaks(time_s) {
-            Some(self.pressure_m_s)
-        } else if charged && self.pressure_at_s.is_finite() {
-            Some(self.pressure_m_s - STANDARD_GRAVITY_M_S2 * (time_s - self.pressure_at_s))
-        } else {
-            None
-        }
     }
 
     fn has_burnt_out(&mut self, seen: &AscentReadings) -> bool {
@@ -262,65 +206,31 @@ impl AscentWatch {
         self.falling_frames = if self.rises_m_s(seen) < 0.0 { self.falling_frames + 1 } else { 0 };
         // The pressure shows a fall, and satellites do; without them the pressure is believed when the estimate rises slowly,
         // or after the time in which a vehicle as fast as the estimate has fallen, too.
-        let sunk = match self.gnss_m_s(seen.time_s) {
+        let sunk = match seen.speeds.gnss_m_s(seen.time_s) {
             Some(gnss_m_s) => gnss_m_s < 0.0 && self.sunk_s >= SUNK_S,
-            None if seen.vertical_m_s <= APART_M_S => self.sunk_s >= SUNK_S,
+            None if seen.vertical_m_s <= APART_OF_TWO_M_S => self.sunk_s >= SUNK_S,
             None => self.sunk_s >= 1.0 + self.sunk_from_m_s / STANDARD_GRAVITY_M_S2,
         };
         self.falling_frames >= FALLING_FRAMES || sunk
     }
 
-    /// The speed of the last fix, m/s, if it is not too old.
-    fn gnss_m_s(&self, time_s: f64) -> Option<f64> {
-        (time_s - self.gnss_at_s <= FIX_KEEPS_S).then_some(self.gnss_m_s)
-    }
-
-    /// How fast the vehicle rises, m/s: as estimated, unless the sensors say otherwise. Of three the middle one is right. Of two
-    /// that contradict each other the one that rises faster counts: nothing is parted or opened on the way up.
     fn rises_m_s(&self, seen: &AscentReadings) -> f64 {
-        let estimated_m_s = seen.vertical_m_s;
-        let apart = |m_s: f64| (m_s - estimated_m_s).abs() > APART_M_S;
-        match (self.pressure_m_s(seen.time_s), self.gnss_m_s(seen.time_s)) {
-            (Some(pressure_m_s), Some(gnss_m_s)) => {
-                let mut three_m_s = [self.felt_m_s.unwrap_or(estimated_m_s), pressure_m_s, gnss_m_s];
-                three_m_s.sort_by(f64::total_cmp);
-                if apart(three_m_s[1]) { three_m_s[1] } else { estimated_m_s }
-            }
-            (Some(other_m_s), None) | (None, Some(other_m_s)) if apart(other_m_s) => {
-                estimated_m_s.max(other_m_s)
-            }
-            _ => estimated_m_s,
-        }
+        let charged = self.separating_since_s.is_some().then_some(CHARGE_LASTS_S + 3.0 * RATE_OVER_S);
+        seen.speeds.rises_m_s(seen.vertical_m_s, seen.time_s, charged)
     }
 
-    fn update_speeds(&mut self, seen: &AscentReadings) {
-        let felt_m_s = self.felt_m_s.get_or_insert(seen.vertical_m_s);
-        if seen.vertical_m_s2.is_finite() {
-            *felt_m_s += seen.vertical_m_s2 * seen.frame_s;
-        }
-        if let Some(gnss_m_s) = seen.gnss_m_s.filter(|m_s| m_s.is_finite()) {
-            (self.gnss_m_s, self.gnss_at_s) = (gnss_m_s, seen.time_s);
-        }
+    /// The gas of the separation charge is still in the vehicle.
+    pub(super) fn is_charged(&self, time_s: f64) -> bool {
+        self.separating_since_s.is_some_and(|since_s| time_s - since_s < CHARGE_LASTS_S)
     }
 
     fn update_heights(&mut self, seen: &AscentReadings) {
-        let disturbed = self.separating_since_s.is_some_and(|since_s| seen.time_s - since_s < CHARGE_LASTS_S);
+        let disturbed = self.is_charged(seen.time_s);
         let sample_m = seen.pressure_altitude_m.filter(|altitude_m| altitude_m.is_finite());
         if let Some(altitude_m) = sample_m.filter(|_| !disturbed) {
-            let same = altitude_m.to_bits() == self.altitude_m.to_bits();
-            self.same_samples = if same { self.same_samples.saturating_add(1) } else { 0 };
-            self.altitude_m = altitude_m;
             self.ground_m.get_or_insert(altitude_m);
-            let since_s = seen.time_s - self.marked_at_s;
-            if since_s >= RATE_OVER_S {
-                // The first sample after a pause only begins a window.
-                if since_s <= 2.0 * RATE_OVER_S {
-                    (self.pressure_m_s, self.pressure_at_s) = ((altitude_m - self.mark_m) / since_s, seen.time_s);
-                }
-                (self.mark_m, self.marked_at_s) = (altitude_m, seen.time_s);
-            }
             // What climbs has not sunk: a pressure that has jumped down climbs on from there.
-            let climbs = self.pressure_m_s >= CLIMBS_M_S;
+            let climbs = seen.speeds.pressure_m_s(seen.time_s, None).is_some_and(|m_s| m_s >= CLIMBS_M_S);
             self.highest_m = if climbs { altitude_m } else { self.highest_m.max(altitude_m) };
         }
         let ground_m = self.ground_m.unwrap_or(f64::INFINITY);
@@ -329,10 +239,9 @@ impl AscentWatch {
         let risen = is_now(&|altitude_m| altitude_m > ground_m + RISEN_M);
         let sunk = is_now(&|altitude_m| altitude_m < self.highest_m - SUNK_M);
         self.risen_s = lasts_s(self.risen_s, risen, seen.frame_s);
-        if self.sunk_s <= 0.0 {
-            self.sunk_from_m_s = seen.vertical_m_s.max(0.0);
-        }
         self.sunk_s = lasts_s(self.sunk_s, sunk, seen.frame_s);
+        let before_m_s = if self.sunk_s > 0.0 { self.sunk_from_m_s } else { 0.0 };
+        self.sunk_from_m_s = before_m_s.max(seen.vertical_m_s);
     }
 }
 
@@ -427,6 +336,7 @@ mod tests {
     use alloc::vec::Vec;
 
     use crate::computer::FRAME_S;
+    use crate::computer::pilot::vertical_speed::SpeedReadings;
 
     fn seen(time_s: f64, phase: Phase, force_m_s2: f64, vertical_m_s: f64) -> AscentReadings {
         AscentReadings {
@@ -434,14 +344,31 @@ mod tests {
             frame_s: 0.005,
             phase,
             axial_specific_force_m_s2: force_m_s2,
-            vertical_m_s2: force_m_s2 - STANDARD_GRAVITY_M_S2,
             pressure_altitude_m: None,
-            gnss_m_s: None,
+            speeds: VerticalSpeeds::default(),
             vertical_m_s,
             booster_attached: false,
             separate_before_apogee_s: 2.0,
             burn_time_s: 0.8,
         }
+    }
+
+    /// The same with what the three speeds make of it, of a vehicle that feels such an acceleration, m/s^2, and gets such a fix.
+    fn heard(
+        speeds: &mut VerticalSpeeds,
+        seen: AscentReadings,
+        vertical_m_s2: f64,
+        gnss_m_s: Option<f64>,
+    ) -> AscentReadings {
+        speeds.take(&SpeedReadings {
+            time_s: seen.time_s,
+            frame_s: seen.frame_s,
+            vertical_m_s2,
+            pressure_altitude_m: seen.pressure_altitude_m,
+            gnss_m_s,
+            estimated_m_s: seen.vertical_m_s,
+        });
+        AscentReadings { speeds: *speeds, ..seen }
     }
 
     fn lifted_off() -> AscentWatch {
@@ -501,7 +428,7 @@ mod tests {
     /// lift-off, and no apogee is believed while it climbs.
     #[test]
     fn with_a_dead_accelerometer_the_barometer_sees_lift_off_and_apogee() {
-        let mut watch = AscentWatch::default();
+        let (mut watch, mut speeds) = (AscentWatch::default(), VerticalSpeeds::default());
         let mut events = Vec::new();
         // 60 m/s at once, then braking by 10 m/s^2: 180 m after 6 s.
         for frame in 0..1_800 {
@@ -513,7 +440,15 @@ mod tests {
                 ..seen(time_s, Phase::Boost, 0.0, -9.81 * time_s)
             };
             let phase = if events.len() < 2 { Phase::Boost } else { Phase::Coast };
-            events.extend(watch.update(&AscentReadings { phase, ..dead }).map(|event| (time_s, event)));
+            // The separation charge's gas is no pressure of the air.
+            let gas = watch.is_charged(time_s);
+            let dead = AscentReadings {
+                phase,
+                pressure_altitude_m: dead.pressure_altitude_m.filter(|_| !gas),
+                ..dead
+            };
+            let dead = heard(&mut speeds, dead, -9.81, None);
+            events.extend(watch.update(&dead).map(|event| (time_s, event)));
         }
         assert_eq!(events[0].1, Event::LiftOff);
         // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
@@ -528,7 +463,7 @@ mod tests {
     /// A jump of the pressure by 20 m while it climbs at 40 m/s is no apogee.
     #[test]
     fn a_jump_of_the_pressure_is_no_apogee_while_the_estimate_rises_fast() {
-        let mut watch = lifted_off();
+        let (mut watch, mut speeds) = (lifted_off(), VerticalSpeeds::default());
         for frame in 0..400 {
             let time_s = 0.005 * f64::from(frame);
             let jump_m = if time_s < 1.0 { 0.0 } else { -20.0 };
@@ -536,7 +471,7 @@ mod tests {
                 pressure_altitude_m: Some(100.0 + 40.0 * time_s + jump_m),
                 ..seen(time_s, Phase::Coast, -2.0, 40.0)
             };
-            assert_eq!(watch.update(&climbing), None, "{time_s}");
+            assert_eq!(watch.update(&heard(&mut speeds, climbing, 0.0, None)), None, "{time_s}");
         }
     }
 
@@ -546,16 +481,17 @@ mod tests {
     fn a_barometer_alone_ends_no_ascent() {
         for (fix_m_s, ends) in [(None, false), (Some(50.0), false), (Some(-5.0), true)] {
             for ramp_m_s in [0.0, -80.0] {
-                let mut watch = lifted_off();
+                let (mut watch, mut speeds) = (lifted_off(), VerticalSpeeds::default());
                 let apogee = (0..400).any(|frame| {
                     let time_s = 0.005 * f64::from(frame);
                     let wrong_m = if time_s < 0.5 { 0.0 } else { -60.0 + ramp_m_s * (time_s - 0.5) };
                     let lying = AscentReadings {
-                        pressure_altitude_m: (frame % 4 == 0).then_some(50.0 * time_s + wrong_m + 1e-3 * time_s),
-                        gnss_m_s: fix_m_s,
+                        pressure_altitude_m: (frame % 4 == 0)
+                            .then_some(50.0 * time_s + wrong_m + 1e-3 * time_s),
                         burn_time_s: 10.0,
-                        ..seen(time_s, Phase::Boost, 9.81, 50.0)
+                        ..seen(time_s, Phase::Coast, 9.81, 50.0)
                     };
+                    let lying = heard(&mut speeds, lying, 0.0, fix_m_s);
                     matches!(watch.update(&lying), Some(Event::Apogee { .. }))
                 });
                 assert_eq!(apogee, ends, "fix {fix_m_s:?}, ramp {ramp_m_s}");
@@ -566,15 +502,18 @@ mod tests {
     /// An accelerometer that pushes while barometer and satellites stand is denied; one whose others are silent is believed.
     #[test]
     fn a_push_that_only_the_accelerometer_feels_is_no_lift_off() {
-        for (pressure, fix, denied) in [(true, true, true), (true, false, true), (false, true, true), (false, false, false)] {
-            let mut watch = AscentWatch::default();
+        for (pressure, fix, denied) in
+            [(true, true, true), (true, false, true), (false, true, true), (false, false, false)]
+        {
+            let (mut watch, mut speeds) = (AscentWatch::default(), VerticalSpeeds::default());
             let mut events = Vec::new();
             for frame in 0..600 {
                 let pushed = AscentReadings {
-                    pressure_altitude_m: (pressure && frame % 4 == 0).then_some(0.1 * libm::sin(f64::from(frame))),
-                    gnss_m_s: fix.then_some(0.05),
+                    pressure_altitude_m: (pressure && frame % 4 == 0)
+                        .then_some(0.1 * libm::sin(f64::from(frame))),
                     ..seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 40.0)
                 };
+                let pushed = heard(&mut speeds, pushed, 40.0, fix.then_some(0.05));
                 events.extend(watch.update(&pushed));
             }
             assert_eq!(events[0], Event::LiftOff);

@@ -8,6 +8,7 @@ mod ascent;
 mod prediction;
 mod step;
 mod vehicle_model;
+mod vertical_speed;
 
 use alloc::boxed::Box;
 use nalgebra::Vector3;
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
 pub use self::prediction::{ApogeeAhead, Prediction, touchdown_from_below_m, touchdown_m};
 use self::vehicle_model::VehicleModel;
+use self::vertical_speed::VerticalSpeeds;
 use crate::computer::Input;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
@@ -61,6 +63,9 @@ pub struct Pilot {
     /// Apart: a pilot is moved when it is made, and its memory on a board's stack is short.
     estimator: Box<Estimator>,
     estimate: Option<Estimate>,
+    /// Position and velocity of the last fix.
+    last_fix: Option<(Vector3<f64>, Vector3<f64>)>,
+    speeds: VerticalSpeeds,
     ascent: AscentWatch,
     /// Height at which the fall begins or began, m.
     apogee_m: f64,
@@ -101,6 +106,8 @@ impl Pilot {
         Self {
             estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
             estimate: None,
+            last_fix: None,
+            speeds: VerticalSpeeds::default(),
             ascent: AscentWatch::default(),
             apogee_m: match mission.start.at {
                 // The fall is felt a moment after it began.
@@ -278,6 +285,7 @@ pub struct SavedPilot {
     motor: MotorEstimate,
     other_curve: Option<usize>,
     estimate: Option<Estimate>,
+    speeds: VerticalSpeeds,
     ascent: AscentWatch,
     apogee_m: f64,
     ignited_at_s: Option<f64>,
@@ -293,6 +301,7 @@ impl Pilot {
             motor: self.model.motor,
             other_curve: self.model.others.chosen(),
             estimate: self.estimate,
+            speeds: self.speeds,
             ascent: self.ascent,
             apogee_m: self.apogee_m,
             ignited_at_s: self.ignited_at_s,
@@ -332,6 +341,7 @@ impl Pilot {
             motor,
             other_curve,
             estimate,
+            speeds,
             ascent,
             apogee_m,
             ignited_at_s,
@@ -343,7 +353,8 @@ impl Pilot {
         let mut resumed = Self {
             estimator,
             estimate,
-            ascent: ascent.resumed(),
+            speeds: speeds.resumed(),
+            ascent,
             apogee_m,
             ignited_at_s,
             fin_share,

@@ -115,6 +115,8 @@ const LASTS_S: f64 = 0.5;
 /// The decision is taken this long before the room for the parachute ends, s. As long may a due ignition be refused: a fin
 /// that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights.
 const BEFORE_S: f64 = 0.1;
+/// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a slow offset.
+const HEIGHTS_APART_M: f64 = 8.0;
 /// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
 /// them: such a vehicle tumbles, or does not know where it is.
 const FAR_BEYOND: f64 = 2.0;
@@ -132,8 +134,10 @@ impl Pilot {
         estimate: &Estimate,
         sensors: &SensorWatch,
     ) -> Option<Event> {
-        // What is felt carries the estimate: without it nobody knows the attitude, and the pressure alone knows the height.
-        if mode.phase.in_descent() && sensors.feels_nothing_for_s() >= LASTS_S {
+        // What is felt carries the estimate: without it nobody knows the attitude, and the pressure alone knows the height. The same
+        // where two of three speeds contradict the estimate.
+        let astray = sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate();
+        if mode.phase.in_descent() && astray {
             let fills_m = self.prediction.filling_height_m();
             let parachute_fills = sensors.pressure_altitude_m().is_none_or(|height_m| height_m > fills_m);
             return Some(Event::GateShutForGood { parachute_fills });
@@ -151,7 +155,13 @@ impl Pilot {
             // A stuck fin has already been watched for long enough.
             self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S
         });
-        let feet_m = self.feet_height_m(estimate);
+        // The parachute comes anyway: of two heights the lower one says when.
+        let estimated_m = self.feet_height_m(estimate);
+        let below_cg_m = estimate.state.position_m.z - estimated_m;
+        let pressure_m = self.speeds.altitude_m(input.time_s).map(|altitude_m| altitude_m - below_cg_m);
+        let feet_m = pressure_m
+            .filter(|pressure_m| lasts && *pressure_m < estimated_m - HEIGHTS_APART_M)
+            .unwrap_or(estimated_m);
         let decided_m = BEFORE_S * (-estimate.state.velocity_m_s.z).max(0.0);
         let filling_m = self.prediction.filling_height_m();
         let above_commit_m = feet_m - self.prediction.commit_height_m;
@@ -171,7 +181,8 @@ impl Pilot {
                 || too_low
         };
         // Any lower, the parachute reaches the ground before it is ejected.
-        let ejected = feet_m > filling_m - self.model.airframe().parachute.inflation_distance_m;
+        let ejected =
+            feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
         (hopeless && ejected).then_some(Event::GateShutForGood { parachute_fills: feet_m > filling_m })
     }
 

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::ascent::{AscentReadings, axial_m_s2, words_of_ascent};
 use super::prediction::{commit_height_m, touchdown_m};
 use super::vehicle_model::Burning;
+use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction, Sensed};
 use crate::computer::Input;
 use crate::computer::table::PhaseTable;
@@ -65,6 +66,7 @@ impl Pilot {
     /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
     pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
         let Some(estimate) = self.estimate else { return };
+        self.watch_the_speeds(input, &estimate);
         // Before the prediction: at apogee an abort has to know at once whether the parachute has room.
         self.watch_the_ascent(table, input, &estimate);
         // A drop lasts 2 to 3 s, so it is predicted in every planning frame.
@@ -151,7 +153,8 @@ impl Pilot {
     fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
         match input.sensed {
             Sensed::Known(estimate) => estimate,
-            Sensed::Measured(measurements) => {
+            Sensed::Measured(mut measurements) => {
+                self.silence_what_is_wrong(&mut measurements, input.time_s);
                 let burning_s = self.model.burning_s(input.time_s);
                 let mass = self.model.mass_now(burning_s);
                 let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
@@ -172,6 +175,19 @@ impl Pilot {
                 self.estimator.step(&measurements, &vehicle)
             }
         }
+    }
+
+    /// A sensor that repeats itself has stopped, and a fix may be outvoted.
+    fn silence_what_is_wrong(&mut self, measurements: &mut Measurements, time_s: f64) {
+        let said = measurements.gnss.map(|fix| (fix.position_m, fix.velocity_m_s));
+        let repeated = said.is_some() && said == self.last_fix;
+        self.last_fix = said.or(self.last_fix);
+        let outvoted = said.zip(self.estimate).is_some_and(|((_, velocity_m_s), estimate)| {
+            self.speeds.outvote(velocity_m_s.z, estimate.state.velocity_m_s.z, time_s)
+        });
+        measurements.gnss = measurements.gnss.filter(|_| !repeated && !outvoted);
+        measurements.pressure_altitude_m =
+            measurements.pressure_altitude_m.filter(|altitude_m| !self.speeds.repeats(*altitude_m));
     }
 
     /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
@@ -247,27 +263,40 @@ impl Pilot {
         };
     }
 
+    fn watch_the_speeds(&mut self, input: &Input<'_>, estimate: &Estimate) {
+        let (felt_m_s2, pressure_altitude_m, fix) = match &input.sensed {
+            Sensed::Known(estimate) => (estimate.specific_force_m_s2, None, None),
+            Sensed::Measured(measured) => {
+                (measured.imu.specific_force_m_s2, measured.pressure_altitude_m, measured.gnss)
+            }
+        };
+        self.speeds.take(&SpeedReadings {
+            time_s: input.time_s,
+            frame_s: self.model.mission.estimator.frame_s,
+            vertical_m_s2: (estimate.state.world_from_body * felt_m_s2).z - self.model.mission.gravity_m_s2,
+            pressure_altitude_m: pressure_altitude_m.filter(|_| !self.ascent.is_charged(input.time_s)),
+            gnss_m_s: fix.map(|fix| fix.velocity_m_s.z),
+            estimated_m_s: estimate.state.velocity_m_s.z,
+        });
+    }
+
     /// Moves through the phases up to apogee.
     fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
         let phase = table.mode().phase;
         let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
         };
-        let (felt_m_s2, pressure_altitude_m, fix) = match &input.sensed {
-            Sensed::Known(_) => (estimate.specific_force_m_s2, None, None),
-            Sensed::Measured(measured) => {
-                (measured.imu.specific_force_m_s2, measured.pressure_altitude_m, measured.gnss)
-            }
+        let pressure_altitude_m = match &input.sensed {
+            Sensed::Known(_) => None,
+            Sensed::Measured(measured) => measured.pressure_altitude_m,
         };
-        let weight_m_s2 = self.model.mission.gravity_m_s2;
         let seen = AscentReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             phase,
             axial_specific_force_m_s2: axial_m_s2(&input.sensed),
-            vertical_m_s2: (estimate.state.world_from_body * felt_m_s2).z - weight_m_s2,
             pressure_altitude_m,
-            gnss_m_s: fix.map(|fix| fix.velocity_m_s.z),
+            speeds: self.speeds,
             vertical_m_s: estimate.state.velocity_m_s.z,
             booster_attached: input.booster_attached,
             separate_before_apogee_s: launch.separate_before_apogee_s,

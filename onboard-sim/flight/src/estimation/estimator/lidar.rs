@@ -10,6 +10,9 @@ const ASKEW_SAMPLES: f64 = 20.0;
 /// Ranges that do not fit the estimate must agree with each other by this before they are believed instead of it, m: two
 /// hundredths of a second apart the estimate's error changes by centimetres, and an outlier by metres.
 const AGREES_M: f64 = 0.5;
+/// A height that is farther from that of the barometer, m, is not believed instead of the estimate, whatever agrees: the own
+/// exhaust is worth 3 m of pressure, a slow offset some more.
+const ASTRAY_M: f64 = 8.0;
 /// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
 /// ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
@@ -57,7 +60,9 @@ impl Estimator {
         let correction = take(self);
         self.aids.lidar.take(&correction);
         let agrees = (correction.innovation - before_m).abs() < AGREES_M;
-        if agrees && self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
+        let barometric_m = self.heights.sources().barometric_m;
+        let astray = barometric_m.is_some_and(|height_m| (measured_m * nose.z - height_m).abs() > ASTRAY_M);
+        if agrees && !astray && self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
             self.aids.lidar.refused_in_a_row = 0;
             self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
             // At once: the barometer's next sample would end the doubt at the height that no range fits.

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::noise::Flaws;
 use super::params::{above_zero, not_below_zero};
-use super::{SensorFaults, SensorParamError, SensorParams, SensorTruth, Sensors};
+use super::{SensorParamError, SensorParams, SensorTruth, Sensors};
 
 /// Inertial measurement unit.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -103,7 +103,7 @@ impl Sensors {
             + rate.cross(&rate.cross(place))
     }
 
-    pub(super) fn imu(&mut self, burning: bool, faults: &SensorFaults) -> ImuSample {
+    pub(super) fn imu(&mut self, burning: bool) -> ImuSample {
         let imu = &self.params.imu;
         let mean = |sum: &mut Vector3<f64>| core::mem::take(sum) / f64::from(FRAME_MS);
         // White noise of this density, averaged over a frame.
@@ -124,7 +124,6 @@ impl Sensors {
             + rectified_rad_s
             + shaken_rad_s
             + self.errors.gyro_bias_rad_s
-            + faults.gyro_bias_step_rad_s
             + gyro_white;
 
         let force_white = self.imu_noise.next3() * (imu.accelerometer_noise_mg_sqrt_hz * milli_g * spread);
@@ -134,10 +133,7 @@ impl Sensors {
             + rectified_m_s2
             + shaken_m_s2
             + self.errors.accelerometer_bias_m_s2
-            + faults.accelerometer_bias_step_m_s2
             + force_white;
-
-        let force = if faults.accelerometer_dead { Vector3::zeros() } else { force };
 
         let clip = |value: Vector3<f64>, range: f64| value.map(|axis| axis.clamp(-range, range));
         ImuSample {

@@ -5,6 +5,7 @@
 //! out, so a fault in one sensor does not change the noise of another.
 
 mod barometer;
+mod faults;
 mod gnss;
 mod imu;
 mod lidar;
@@ -18,6 +19,7 @@ use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
 pub use self::barometer::BarometerParams;
+pub use self::faults::{Defect, Sensor, SensorFaults};
 pub use self::gnss::GnssParams;
 pub use self::imu::ImuParams;
 pub use self::lidar::LidarParams;
@@ -99,25 +101,6 @@ impl SensorTruth {
             boosted: world.booster_thrust_n() > 0.0,
         }
     }
-}
-
-/// The faults of the sensors at this moment.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SensorFaults {
-    /// No satellite fixes.
-    pub gnss_out: bool,
-    /// No barometer samples.
-    pub barometer_out: bool,
-    /// No lidar ranges.
-    pub lidar_out: bool,
-    /// Added to the gyro's bias, body, rad/s.
-    pub gyro_bias_step_rad_s: Vector3<f64>,
-    /// Added to the accelerometer's bias, body, m/s^2.
-    pub accelerometer_bias_step_m_s2: Vector3<f64>,
-    /// Every axis of the accelerometer reads nothing.
-    pub accelerometer_dead: bool,
-    /// Added to the barometer's height, m.
-    pub barometer_step_m: f64,
 }
 
 /// The true sensor errors that a filter estimates, for comparison.
@@ -217,7 +200,7 @@ impl Sensors {
     }
 
     /// Measures the truth after one more millisecond; returns a frame's measurements after every fifth.
-    pub fn observe(&mut self, truth: &SensorTruth, faults: &SensorFaults) -> Option<Measurements> {
+    pub fn observe(&mut self, truth: &SensorTruth) -> Option<Measurements> {
         self.elapsed_ms += 1;
         self.rate_sum_rad_s += truth.state.rate_rad_s;
         self.force_sum_m_s2 += self.force_at_unit_m_s2(truth);
@@ -225,18 +208,15 @@ impl Sensors {
             self.boosted_ms = Some(self.elapsed_ms);
         }
         let unlocked = self.boosted_ms.is_some_and(|at_ms| self.elapsed_ms - at_ms < REACQUIRED_MS);
-        self.watch_satellites(truth, faults.gnss_out || unlocked);
+        self.watch_satellites(truth, unlocked);
         if !self.elapsed_ms.is_multiple_of(FRAME_MS) {
             return None;
         }
         Some(Measurements {
-            imu: self.imu(truth.burning, faults),
-            pressure_altitude_m: self
-                .barometer(truth)
-                .filter(|_| !faults.barometer_out)
-                .map(|height_m| height_m + faults.barometer_step_m),
+            imu: self.imu(truth.burning),
+            pressure_altitude_m: self.barometer(truth),
             gnss: self.arrived(),
-            lidar_range_m: self.lidar(truth).filter(|_| !faults.lidar_out),
+            lidar_range_m: self.lidar(truth),
         })
     }
 }

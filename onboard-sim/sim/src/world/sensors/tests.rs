@@ -8,15 +8,28 @@ fn falling(speed_m_s: f64, height_m: f64) -> SensorTruth {
     SensorTruth::of_motion(&state, &Vector3::new(9.8, 0.1, -0.2), speed_m_s, 0.6)
 }
 
-fn frames(seed: u64, truth: &SensorTruth, faults: &SensorFaults, frames: usize) -> Vec<Measurements> {
+fn frames(seed: u64, truth: &SensorTruth, frames: usize) -> Vec<Measurements> {
+    frames_with(seed, truth, &[], frames)
+}
+
+fn frames_with(
+    seed: u64,
+    truth: &SensorTruth,
+    broken: &[(Sensor, Defect)],
+    frames: usize,
+) -> Vec<Measurements> {
     let mut sensors = Sensors::new(&SensorParams::default(), seed, 0.0).unwrap();
+    let mut faults = SensorFaults::default();
+    for (sensor, defect) in broken {
+        faults.break_down(*sensor, *defect);
+    }
     let steps = frames * FRAME_MS as usize;
-    (0..steps).filter_map(|_| sensors.observe(truth, faults)).collect()
+    (0..steps).filter_map(|_| sensors.observe(truth)).map(|measured| faults.heard(&measured)).collect()
 }
 
 #[test]
 fn each_sensor_reports_at_its_own_rate() {
-    let seen = frames(1, &falling(10.0, 5.0), &SensorFaults::default(), 400);
+    let seen = frames(1, &falling(10.0, 5.0), 400);
     assert_eq!(seen.len(), 400);
     assert_eq!(seen.iter().filter(|m| m.pressure_altitude_m.is_some()).count(), 100);
     assert_eq!(seen.iter().filter(|m| m.lidar_range_m.is_some()).count(), 200);
@@ -25,7 +38,7 @@ fn each_sensor_reports_at_its_own_rate() {
 
 #[test]
 fn a_fix_is_120_ms_old_at_the_frame_that_gets_it() {
-    let seen = frames(2, &falling(10.0, 5.0), &SensorFaults::default(), 400);
+    let seen = frames(2, &falling(10.0, 5.0), 400);
     for (frame, measurements) in seen.iter().enumerate() {
         if let Some(fix) = measurements.gnss {
             let age_s = (frame + 1) as f64 * 0.005 - fix.valid_at_s;
@@ -37,10 +50,7 @@ fn a_fix_is_120_ms_old_at_the_frame_that_gets_it() {
 #[test]
 fn the_lidar_is_silent_high_up_and_on_its_side() {
     let lidar_of = |truth: &SensorTruth| {
-        frames(3, truth, &SensorFaults::default(), 100)
-            .iter()
-            .filter_map(|m| m.lidar_range_m)
-            .collect::<Vec<_>>()
+        frames(3, truth, 100).iter().filter_map(|m| m.lidar_range_m).collect::<Vec<_>>()
     };
     assert!(lidar_of(&falling(5.0, 13.0)).is_empty());
     let mut leaning = falling(5.0, 5.0);
@@ -63,10 +73,10 @@ fn the_lidar_is_silent_high_up_and_on_its_side() {
 #[test]
 fn a_fault_silences_its_sensor_and_does_not_change_the_noise_of_others() {
     let truth = falling(10.0, 5.0);
-    let healthy = frames(4, &truth, &SensorFaults::default(), 400);
-    let step = Vector3::new(0.1, 0.0, -0.2);
-    let faults = SensorFaults { gnss_out: true, gyro_bias_step_rad_s: step, ..SensorFaults::default() };
-    let broken = frames(4, &truth, &faults, 400);
+    let healthy = frames(4, &truth, 400);
+    let step = Vector3::from_element(5f64.to_radians());
+    let broken =
+        frames_with(4, &truth, &[(Sensor::Gnss, Defect::Out), (Sensor::Gyro, Defect::Step(5.0))], 400);
     for (well, ill) in healthy.iter().zip(&broken) {
         assert!(ill.gnss.is_none());
         assert_eq!(ill.pressure_altitude_m, well.pressure_altitude_m);
@@ -74,20 +84,44 @@ fn a_fault_silences_its_sensor_and_does_not_change_the_noise_of_others() {
         assert_eq!(ill.imu.specific_force_m_s2, well.imu.specific_force_m_s2);
         assert!((ill.imu.gyro_rad_s - well.imu.gyro_rad_s - step).norm() < 1e-12);
     }
-    let silent = SensorFaults { barometer_out: true, lidar_out: true, ..SensorFaults::default() };
+    let silent = [(Sensor::Barometer, Defect::Out), (Sensor::Lidar, Defect::Out)];
+    let silent = frames_with(4, &truth, &silent, 400);
+    assert!(silent.iter().all(|m| m.pressure_altitude_m.is_none() && m.lidar_range_m.is_none()));
+}
+
+/// By the definition of each defect, on a barometer that is 10 m up and speaks in every fourth frame.
+#[test]
+fn each_defect_says_what_it_is() {
+    let said = |defect| {
+        let frames = frames_with(4, &falling(0.0, 10.0), &[(Sensor::Barometer, defect)], 400);
+        frames.iter().filter_map(|m| m.pressure_altitude_m).collect::<Vec<_>>()
+    };
+    let well = said(Defect::Step(0.0));
+    let off = |defect| said(defect).iter().zip(&well).map(|(ill, well)| ill - well).collect::<Vec<_>>();
+    assert!(said(Defect::Out).is_empty());
+    assert!(said(Defect::Dead).iter().all(|height_m| height_m.abs() < 1e-12));
+    assert!(said(Defect::NotANumber).iter().all(|height_m| height_m.is_nan()));
+    assert!(said(Defect::Stuck).windows(2).all(|pair| pair[0].to_bits() == pair[1].to_bits()));
+    assert_eq!(said(Defect::Blocked(0.3)).len(), 400);
+    assert!(off(Defect::Step(-55.0)).iter().all(|off_m| (off_m + 55.0).abs() < 1e-9));
+    // The last sample is the 400th frame's, 1.995 s after the first.
+    assert!((off(Defect::Ramp(20.0)).last().unwrap() - 20.0 * 1.995).abs() < 1e-9);
+    let spike = off(Defect::Spike(100.0));
     assert!(
-        frames(4, &truth, &silent, 400)
-            .iter()
-            .all(|m| m.pressure_altitude_m.is_none() && m.lidar_range_m.is_none())
+        spike[..5].iter().all(|off_m| (off_m - 100.0).abs() < 1e-9)
+            && spike[5..].iter().all(|off_m| off_m.abs() < 1e-9)
     );
+    let noise = off(Defect::Noise(0.8));
+    let sigma_m = (noise.iter().map(|off_m| off_m * off_m).sum::<f64>() / noise.len() as f64).sqrt();
+    assert!((0.6..1.0).contains(&sigma_m), "{sigma_m}");
 }
 
 #[test]
 fn noise_has_the_stated_size_and_a_seed_repeats_it() {
     let truth = falling(30.0, 200.0);
-    let seen = frames(5, &truth, &SensorFaults::default(), 4000);
-    assert_eq!(seen, frames(5, &truth, &SensorFaults::default(), 4000));
-    assert_ne!(seen, frames(6, &truth, &SensorFaults::default(), 4000));
+    let seen = frames(5, &truth, 4000);
+    assert_eq!(seen, frames(5, &truth, 4000));
+    assert_ne!(seen, frames(6, &truth, 4000));
     let spread = |values: Vec<f64>| {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
@@ -106,7 +140,7 @@ fn over_many_flights_the_ram_error_has_its_size() {
     let n = 300;
     let squares: f64 = (0..n)
         .map(|seed| {
-            let seen = frames(seed, &falling(30.0, 200.0), &SensorFaults::default(), 4);
+            let seen = frames(seed, &falling(30.0, 200.0), 4);
             let error = seen.last().and_then(|m| m.pressure_altitude_m).map_or(f64::NAN, |m| m - 200.0);
             error * error
         })
@@ -137,7 +171,7 @@ fn quiet() -> SensorParams {
 }
 
 fn one_frame(sensors: &mut Sensors, truth: &SensorTruth) -> Measurements {
-    (0..FRAME_MS).find_map(|_| sensors.observe(truth, &SensorFaults::default())).unwrap()
+    (0..FRAME_MS).find_map(|_| sensors.observe(truth)).unwrap()
 }
 
 #[test]
@@ -250,7 +284,7 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
 /// The last measurement of each sensor after 0.4 s: with the same noise for the same seed, whatever the parameters.
 fn last_of_each(params: &SensorParams, truth: &SensorTruth) -> Measurements {
     let mut sensors = Sensors::new(params, 5, 0.0).unwrap();
-    let frames = (0..400).filter_map(|_| sensors.observe(truth, &SensorFaults::default()));
+    let frames = (0..400).filter_map(|_| sensors.observe(truth));
     frames
         .reduce(|last, now| Measurements {
             imu: now.imu,

@@ -1,0 +1,173 @@
+//! How fast the vehicle rises or falls, by three that know nothing of each other: what was felt since the start, the pressure,
+//! and the satellites. One of them alone decides nothing.
+
+use serde::{Deserialize, Serialize};
+
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+
+/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6 m/s.
+pub(super) const RATE_OVER_S: f64 = 0.2;
+/// A fix this old still tells the speed, s: three fixes are missing.
+const FIX_KEEPS_S: f64 = 0.6;
+/// A barometer that says the same for so many samples, a tenth of a second, says nothing.
+const FROZEN_SAMPLES: u32 = 5;
+/// Speeds that differ by more, m/s, cannot both be right: a late fix and the pressure of the last window make 3 of it while
+/// the vehicle coasts, 15 under the ascent motor, where there are no fixes.
+const APART_OF_THREE_M_S: f64 = 8.0;
+pub(super) const APART_OF_TWO_M_S: f64 = 15.0;
+/// For how long the middle one of three contradicts an estimate that is given up, s.
+const CONTRADICTED_S: f64 = 0.5;
+
+/// What is new in a frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpeedReadings {
+    pub(super) time_s: f64,
+    pub(super) frame_s: f64,
+    /// Upwards, from what was felt and the attitude, m/s^2.
+    pub(super) vertical_m_s2: f64,
+    /// `None` also while the gas of a charge is in the vehicle.
+    pub(super) pressure_altitude_m: Option<f64>,
+    /// Of a fix, up, m/s.
+    pub(super) gnss_m_s: Option<f64>,
+    /// As estimated, up, m/s.
+    pub(super) estimated_m_s: f64,
+}
+
+/// The three speeds, up, m/s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct VerticalSpeeds {
+    /// It begins with the estimate.
+    felt_m_s: Option<f64>,
+    gnss_m_s: f64,
+    gnss_at_s: f64,
+    /// The last pressure altitude.
+    altitude_m: f64,
+    same_samples: u32,
+    /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
+    mark_m: f64,
+    marked_at_s: f64,
+    /// What the last one gave, m/s, and when, s.
+    pressure_m_s: f64,
+    pressure_at_s: f64,
+    contradicted_s: f64,
+}
+
+impl Default for VerticalSpeeds {
+    fn default() -> Self {
+        Self {
+            felt_m_s: None,
+            gnss_m_s: 0.0,
+            gnss_at_s: f64::NEG_INFINITY,
+            altitude_m: f64::INFINITY,
+            same_samples: 0,
+            mark_m: 0.0,
+            marked_at_s: f64::NEG_INFINITY,
+            pressure_m_s: 0.0,
+            pressure_at_s: f64::NEG_INFINITY,
+            contradicted_s: 0.0,
+        }
+    }
+}
+
+impl VerticalSpeeds {
+    /// After a reset what was felt meanwhile is in the estimate alone.
+    pub(super) fn resumed(self) -> Self {
+        Self { felt_m_s: None, ..self }
+    }
+
+    pub(super) fn take(&mut self, seen: &SpeedReadings) {
+        let felt_m_s = self.felt_m_s.get_or_insert(seen.estimated_m_s);
+        if seen.vertical_m_s2.is_finite() {
+            *felt_m_s += seen.vertical_m_s2 * seen.frame_s;
+        }
+        if let Some(gnss_m_s) = seen.gnss_m_s.filter(|m_s| m_s.is_finite()) {
+            (self.gnss_m_s, self.gnss_at_s) = (gnss_m_s, seen.time_s);
+        }
+        if let Some(altitude_m) = seen.pressure_altitude_m.filter(|altitude_m| altitude_m.is_finite()) {
+            self.take_pressure(altitude_m, seen.time_s);
+        }
+        let middle_m_s = self.middle_m_s(seen.time_s, None).filter(|m_s| {
+            // An estimate that is not a number is contradicted by anything.
+            let near = (m_s - seen.estimated_m_s).abs() <= APART_OF_TWO_M_S;
+            !near
+        });
+        self.contradicted_s = middle_m_s.map_or(0.0, |_| self.contradicted_s + seen.frame_s);
+    }
+
+    fn take_pressure(&mut self, altitude_m: f64, time_s: f64) {
+        let same = altitude_m.to_bits() == self.altitude_m.to_bits();
+        self.same_samples = if same { self.same_samples.saturating_add(1) } else { 0 };
+        self.altitude_m = altitude_m;
+        let since_s = time_s - self.marked_at_s;
+        if since_s >= RATE_OVER_S {
+            // The first sample after a pause only begins a window.
+            if since_s <= 2.0 * RATE_OVER_S {
+                (self.pressure_m_s, self.pressure_at_s) = ((altitude_m - self.mark_m) / since_s, time_s);
+            }
+            (self.mark_m, self.marked_at_s) = (altitude_m, time_s);
+        }
+    }
+
+    /// A barometer that repeats this sample has stopped.
+    pub(super) fn repeats(&self, altitude_m: f64) -> bool {
+        self.same_samples >= FROZEN_SAMPLES && altitude_m.to_bits() == self.altitude_m.to_bits()
+    }
+
+    /// A fix that contradicts both the estimate and the pressure is outvoted.
+    pub(super) fn outvote(&self, gnss_m_s: f64, estimated_m_s: f64, time_s: f64) -> bool {
+        self.pressure_m_s(time_s, None).is_some_and(|pressure_m_s| {
+            let near = |m_s: f64| (m_s - pressure_m_s).abs() <= APART_OF_THREE_M_S;
+            near(estimated_m_s) && !near(gnss_m_s)
+        })
+    }
+
+    /// The last pressure altitude, m, of a barometer that is heard and does not repeat itself.
+    pub(super) fn altitude_m(&self, time_s: f64) -> Option<f64> {
+        (time_s - self.pressure_at_s <= 2.0 * RATE_OVER_S && self.same_samples < FROZEN_SAMPLES)
+            .then_some(self.altitude_m)
+    }
+
+    /// What the pressure shows. `through_gas_s`: for so long after the last window the vehicle coasts, and the pressure is that of
+    /// a charge's gas.
+    pub(super) fn pressure_m_s(&self, time_s: f64, through_gas_s: Option<f64>) -> Option<f64> {
+        let age_s = time_s - self.pressure_at_s;
+        if self.altitude_m(time_s).is_some() {
+            Some(self.pressure_m_s)
+        } else if through_gas_s.is_some_and(|most_s| age_s <= most_s) {
+            Some(self.pressure_m_s - STANDARD_GRAVITY_M_S2 * age_s)
+        } else {
+            None
+        }
+    }
+
+    /// That of the last fix, if it is not too old.
+    pub(super) fn gnss_m_s(&self, time_s: f64) -> Option<f64> {
+        (time_s - self.gnss_at_s <= FIX_KEEPS_S).then_some(self.gnss_m_s)
+    }
+
+    /// The middle one, if all three speak: if one is wrong it is right.
+    fn middle_m_s(&self, time_s: f64, through_gas_s: Option<f64>) -> Option<f64> {
+        let mut three_m_s =
+            [self.felt_m_s?, self.pressure_m_s(time_s, through_gas_s)?, self.gnss_m_s(time_s)?];
+        three_m_s.sort_by(f64::total_cmp);
+        Some(three_m_s[1])
+    }
+
+    /// How fast the vehicle rises: as estimated, unless the three say otherwise. Of two that contradict each other the one that
+    /// rises faster counts: nothing is parted or opened on the way up.
+    pub(super) fn rises_m_s(&self, estimated_m_s: f64, time_s: f64, through_gas_s: Option<f64>) -> f64 {
+        let apart = |m_s: f64, most_m_s: f64| (m_s - estimated_m_s).abs() > most_m_s;
+        if let Some(middle_m_s) = self.middle_m_s(time_s, through_gas_s) {
+            return if apart(middle_m_s, APART_OF_THREE_M_S) { middle_m_s } else { estimated_m_s };
+        }
+        match self.pressure_m_s(time_s, through_gas_s).or(self.gnss_m_s(time_s)) {
+            Some(other_m_s) if apart(other_m_s, APART_OF_TWO_M_S) => estimated_m_s.max(other_m_s),
+            _ => estimated_m_s,
+        }
+    }
+
+    /// Two of the three have contradicted the estimate for long enough to give it up.
+    pub(super) fn contradict_the_estimate(&self) -> bool {
+        self.contradicted_s >= CONTRADICTED_S
+    }
+}

@@ -1,0 +1,144 @@
+//! What a broken sensor says, in the place of what it has measured.
+
+use flight::computer::FRAME_S;
+use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, Measurements};
+use nalgebra::Vector3;
+
+use super::noise::Normal;
+
+/// A sensor that can break.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {
+    Gyro,
+    Accelerometer,
+    Barometer,
+    Gnss,
+    Lidar,
+}
+
+/// How it breaks. Values are in the sensor's unit: deg/s, thousandths of gravity, m; on every axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Defect {
+    /// It says nothing.
+    Out,
+    /// It says zero.
+    Dead,
+    /// It repeats what it said last.
+    Stuck,
+    /// It says what is no number.
+    NotANumber,
+    /// It says this, and in every frame.
+    Blocked(f64),
+    /// It is off by this.
+    Step(f64),
+    /// It is off by this much more in every second. Satellites show the velocity, too.
+    Ramp(f64),
+    /// It is off by this for a tenth of a second.
+    Spike(f64),
+    /// Noise of this standard deviation comes on top.
+    Noise(f64),
+}
+
+/// How long a spike lasts, s.
+const SPIKE_S: f64 = 0.1;
+
+/// The broken sensors, in the order in which they broke.
+#[derive(Debug, Clone)]
+pub struct SensorFaults {
+    broken: Vec<Broken>,
+    noise: Normal,
+}
+
+#[derive(Debug, Clone)]
+struct Broken {
+    sensor: Sensor,
+    defect: Defect,
+    since_frames: u32,
+    /// What a stuck sensor repeats, or a satellite fix with its velocity.
+    held: Option<(Vector3<f64>, Vector3<f64>)>,
+}
+
+impl Default for SensorFaults {
+    fn default() -> Self {
+        Self { broken: Vec::new(), noise: Normal::new(0, 0) }
+    }
+}
+
+impl SensorFaults {
+    /// A sensor breaks now.
+    pub fn break_down(&mut self, sensor: Sensor, defect: Defect) {
+        self.broken.push(Broken { sensor, defect, since_frames: 0, held: None });
+    }
+
+    /// What the computer hears of a frame's measurements.
+    pub fn heard(&mut self, measured: &Measurements) -> Measurements {
+        let mut heard = *measured;
+        let Self { broken, noise } = self;
+        for broken in broken {
+            broken.distort(&mut heard, noise);
+            broken.since_frames += 1;
+        }
+        heard
+    }
+}
+
+impl Broken {
+    fn distort(&mut self, heard: &mut Measurements, noise: &mut Normal) {
+        let none = Vector3::zeros();
+        match self.sensor {
+            Sensor::Gyro => {
+                let said = self.says((heard.imu.gyro_rad_s, none), 1f64.to_radians(), noise);
+                heard.imu.gyro_rad_s = said.map_or(NOT_SAID, |(rate_rad_s, _)| rate_rad_s);
+            }
+            Sensor::Accelerometer => {
+                let said = self.says((heard.imu.specific_force_m_s2, none), 1e-3 * GRAVITY_M_S2, noise);
+                heard.imu.specific_force_m_s2 = said.map_or(NOT_SAID, |(force_m_s2, _)| force_m_s2);
+            }
+            Sensor::Barometer => self.distort_one(&mut heard.pressure_altitude_m, noise),
+            Sensor::Lidar => self.distort_one(&mut heard.lidar_range_m, noise),
+            Sensor::Gnss => {
+                heard.gnss = heard.gnss.and_then(|fix| {
+                    let (position_m, velocity_m_s) =
+                        self.says((fix.position_m, fix.velocity_m_s), 1.0, noise)?;
+                    Some(GnssFix { position_m, velocity_m_s, ..fix })
+                });
+            }
+        }
+    }
+
+    fn distort_one(&mut self, value: &mut Option<f64>, noise: &mut Normal) {
+        let blocked = matches!(self.defect, Defect::Blocked(_)).then_some(0.0);
+        *value = value.or(blocked).and_then(|value| {
+            self.says((Vector3::from_element(value), Vector3::zeros()), 1.0, noise).map(|(said, _)| said.x)
+        });
+    }
+
+    /// What it says, and how that changes a second, in the place of what was measured; the defect's values are in this unit.
+    fn says(
+        &mut self,
+        measured: (Vector3<f64>, Vector3<f64>),
+        unit: f64,
+        noise: &mut Normal,
+    ) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let every = |value: f64| Vector3::from_element(unit * value);
+        let since_s = f64::from(self.since_frames) * FRAME_S;
+        let (value, rate) = measured;
+        Some(match self.defect {
+            Defect::Out => return None,
+            Defect::Dead => (Vector3::zeros(), Vector3::zeros()),
+            Defect::Stuck => *self.held.get_or_insert(measured),
+            Defect::NotANumber => (every(f64::NAN), every(f64::NAN)),
+            Defect::Blocked(at) => (every(at), Vector3::zeros()),
+            Defect::Step(off) => (value + every(off), rate),
+            Defect::Ramp(off_s) => (value + every(off_s * since_s), rate + every(off_s)),
+            Defect::Spike(off) if since_s < SPIKE_S => (value + every(off), rate),
+            Defect::Spike(_) => measured,
+            Defect::Noise(sigma) => {
+                (value + noise.next3() * (unit * sigma), rate + noise.next3() * (unit * sigma))
+            }
+        })
+    }
+}
+
+/// What an inertial unit that is silent leaves in its place.
+const NOT_SAID: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);

@@ -1,0 +1,142 @@
+//! One sensor wrong in each way and each phase: no event out of its phase, no parachute above its speed, and nothing lost that two
+//! other sensors could have saved.
+
+use flight::vehicle::mission::StartPoint;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+
+/// A defect of each kind and size, in the sensor's unit (deg/s, mg, m).
+const DEFECTS: &[&str] = &[
+    "gyro-step:20",
+    "gyro-ramp:10",
+    "gyro-spike:200",
+    "gyro-stuck",
+    "gyro-noise:7",
+    "gyro-out",
+    "gyro-nan",
+    "accelerometer-step:500",
+    "accelerometer-step:-500",
+    "accelerometer-ramp:500",
+    "accelerometer-spike:4000",
+    "accelerometer-stuck",
+    "accelerometer-dead",
+    "accelerometer-noise:90",
+    "accelerometer-out",
+    "accelerometer-nan",
+    "barometer-step:55",
+    "barometer-step:-55",
+    "barometer-ramp:40",
+    "barometer-ramp:-80",
+    "barometer-spike:100",
+    "barometer-spike:-100",
+    "barometer-stuck",
+    "barometer-noise:0.8",
+    "barometer-out",
+    "barometer-nan",
+    "gnss-step:50",
+    "gnss-ramp:30",
+    "gnss-ramp:-30",
+    "gnss-spike:200",
+    "gnss-stuck",
+    "gnss-noise:10",
+    "gnss-out",
+    "gnss-nan",
+    "lidar-step:2",
+    "lidar-ramp:2",
+    "lidar-spike:5",
+    "lidar-stuck",
+    "lidar-noise:0.6",
+    "lidar-blocked:0.3",
+    "lidar-blocked:5",
+    "lidar-out",
+    "lidar-nan",
+];
+
+const WHEN: &[&str] =
+    &["boost+0.1", "boost+0.5", "coast+0.5", "coast+3", "apogee", "descent+2", "armed", "powered+0.5"];
+
+/// How a flight went, by the truth: vertical speeds, m/s, up.
+struct Flown {
+    /// When the vehicle took itself for past its apogee.
+    apogee_m_s: f64,
+    ejected_m_s: Option<f64>,
+    impact_m_s: f64,
+    landed: bool,
+}
+
+fn fly(mission: &str, dispersion: &str, fault: &str, seed: u64) -> Flown {
+    let mut recipe = Recipe::built_in(mission, dispersion).unwrap().starting_at(StartPoint::Pad).unwrap();
+    recipe.seed = seed;
+    recipe.faults = vec![fault.parse().unwrap()];
+    let mut flight = Sortie::new(&recipe, 0).unwrap();
+    let (mut apogee_m_s, mut ejected_m_s) = (None, None);
+    while flight.goes_on() {
+        flight.step();
+        let up_m_s = flight.world().state().velocity_m_s.z;
+        if !flight.computer().mode().phase.before_apogee() {
+            apogee_m_s.get_or_insert(up_m_s);
+        }
+        if flight.world().parachute_ejected() {
+            ejected_m_s.get_or_insert(up_m_s);
+        }
+    }
+    Flown {
+        apogee_m_s: apogee_m_s.unwrap(),
+        ejected_m_s,
+        impact_m_s: flight.world().touchdown().map_or(f64::NAN, |touchdown| touchdown.vertical_m_s),
+        landed: flight.outcome().failure.is_none(),
+    }
+}
+
+/// Where nothing else can help: in the burn the inertial unit alone knows the attitude, and an accelerometer that is wrong by
+/// half a g on every axis passes for motion.
+fn may_be_lost(defect: &str, when: &str) -> bool {
+    let of_the_unit = defect.starts_with("gyro") || defect.starts_with("accelerometer");
+    let pushes = defect.starts_with("accelerometer-step") || defect.starts_with("accelerometer-spike");
+    of_the_unit && (when.starts_with("powered") || pushes)
+}
+
+fn fly_all(mission: &str, dispersion: &str) {
+    let mut lost = 0;
+    for defect in DEFECTS {
+        for when in WHEN {
+            let Flown { apogee_m_s, ejected_m_s, impact_m_s, landed } =
+                fly(mission, dispersion, &format!("{defect}@{when}"), 1);
+            let context = format!("{mission} {dispersion} {defect}@{when}: {impact_m_s} m/s");
+            // A second before or after the apogee; the parachute bears the speed of a fall on open fins.
+            assert!((-10.0..10.0).contains(&apogee_m_s), "{context}, apogee at {apogee_m_s} m/s");
+            assert!(ejected_m_s.is_none_or(|m_s| (-50.0..10.0).contains(&m_s)), "{context}, {ejected_m_s:?}");
+            let saved = landed || impact_m_s.abs() < 10.0;
+            assert!(saved || may_be_lost(defect, when), "{context}");
+            lost += u32::from(!saved);
+        }
+    }
+    assert!(lost < 15, "{lost} lost in the burn");
+}
+
+#[test]
+fn one_sensor_wrong_in_any_way_in_any_phase_makes_no_event_out_of_its_phase_and_loses_nothing_in_field() {
+    fly_all("mk2", "field");
+}
+
+#[test]
+fn one_sensor_wrong_in_any_way_in_any_phase_makes_no_event_out_of_its_phase_and_loses_nothing_in_real() {
+    fly_all("mk3", "real");
+}
+
+/// A bay that opens, or a charge: the pressure jumps half a second into the boost.
+#[test]
+fn a_pressure_that_jumps_under_thrust_opens_no_parachute_there() {
+    for mission in ["mk2", "mk3"] {
+        for step_m in [-50, -55, -60] {
+            for seed in 1..=8 {
+                let flown = fly(mission, "real", &format!("barometer-step:{step_m}@boost+0.5"), seed);
+                assert!(
+                    flown.apogee_m_s.abs() < 3.0,
+                    "{mission} {step_m} m, seed {seed}: {}",
+                    flown.apogee_m_s
+                );
+            }
+        }
+    }
+}
