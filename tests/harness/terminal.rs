@@ -27,6 +27,10 @@ const REPEATS_ANSWER: &[u8] = b"\x1b[?0u";
 /// Every terminal answers this when it is asked what it is; it ends the wait for the answer above.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
+/// The program asks with this whether the terminal still takes what is written, and any terminal answers.
+const STATUS_QUERY: &[u8] = b"\x1b[5n";
+const STATUS_ANSWER: &[u8] = b"\x1b[0n";
+
 /// A crew that sees no effect of its keys types them again after this time.
 const RETYPE_AFTER: Duration = Duration::from_secs(3);
 /// The program asks this when the keys of a word came faster than a hand types.
@@ -305,16 +309,19 @@ fn window_size((columns, rows): (u16, u16)) -> Winsize {
 /// Processes the program's output until its end, and answers as a terminal does.
 fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
     let mut buffer = [0; 16 * 1024];
-    // The question arrives in one piece, at most together with the first frame.
+    // A question arrives in one piece, at most together with a frame.
     while let Ok(length @ 1..) = pipe.read(&mut buffer) {
         drop(shown.reading.lock());
         shown.lock().take(&buffer[..length]);
         shown.changed.notify_all();
-        if buffer[..length].windows(REPEATS_QUERY.len()).any(|bytes| bytes == REPEATS_QUERY) {
-            let known = if tells_repeats { REPEATS_ANSWER } else { &[] };
-            if pipe.write_all(&[known, DEVICE_ATTRIBUTES].concat()).is_err() {
-                break;
-            }
+        let asked = |query: &[u8]| buffer[..length].windows(query.len()).filter(|bytes| *bytes == query).count();
+        let mut answers = STATUS_ANSWER.repeat(asked(STATUS_QUERY));
+        if asked(REPEATS_QUERY) > 0 {
+            answers.extend(if tells_repeats { REPEATS_ANSWER } else { &[] });
+            answers.extend(DEVICE_ATTRIBUTES);
+        }
+        if pipe.write_all(&answers).is_err() {
+            break;
         }
     }
     shown.lock().close();

@@ -34,7 +34,7 @@ const NEVER_WRITTEN: [&[u8]; 14] = [
     b"\x1b\\",
     b"\x1bc",
     b"\x1b#",
-    b"\x1b[5n",
+    b"\x1b[6n",
     b"\x1b[8;1;1t",
     b"\xc2\x9b",
     b"\xc2\x9d",

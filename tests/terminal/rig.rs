@@ -19,7 +19,7 @@ pub(crate) fn ground(folder: &Path, arguments: &[&str]) -> Command {
 pub(crate) struct Rig {
     pub(crate) terminal: Terminal,
     pub(crate) proxy: UdpProxy,
-    vehicle: Running,
+    pub(crate) vehicle: Running,
     profile: &'static str,
     pub(crate) folder: tempfile::TempDir,
 }
@@ -29,6 +29,14 @@ impl Rig {
         Self::on_terminal(profile, false, "xterm-256color")
     }
 
+    /// The same with a vehicle that has this fault.
+    pub(crate) fn with_fault(profile: &'static str, fault: &str) -> Self {
+        let mut rig = Self::new(profile);
+        rig.vehicle.signal(Signal::SIGKILL);
+        rig.restart_vehicle(&["--fault", fault]);
+        rig
+    }
+
     /// The same on a terminal of this kind; `tells_repeats` says whether it distinguishes key repeats from presses.
     pub(crate) fn on_terminal(profile: &'static str, tells_repeats: bool, kind: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
@@ -36,14 +44,20 @@ impl Rig {
         let link = proxy.ground_link();
         let mut command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
         let terminal = Terminal::start(command.env("TERM", kind), SIZE, tells_repeats);
-        let vehicle = vehicle(profile, &proxy, folder.path());
+        let vehicle = Running::start(&mut vehicle(profile, &proxy, folder.path()));
         Self { terminal, proxy, vehicle, profile, folder }
     }
 
     /// Kills the vehicle and starts it again.
     pub(crate) fn reboot_vehicle(&mut self) {
         self.vehicle.signal(Signal::SIGKILL);
-        self.vehicle = vehicle(self.profile, &self.proxy, self.folder.path());
+        self.restart_vehicle(&[]);
+    }
+
+    /// Starts the vehicle again, with these options.
+    pub(crate) fn restart_vehicle(&mut self, options: &[&str]) {
+        let mut vehicle = vehicle(self.profile, &self.proxy, self.folder.path());
+        self.vehicle = Running::start(vehicle.args(options));
     }
 
     /// How often the ground has sent this command with this first parameter.
@@ -102,7 +116,7 @@ impl Pad {
     pub(crate) fn new() -> Self {
         let proxy = UdpProxy::new();
         let folder = tempfile::tempdir().unwrap();
-        let vehicle = vehicle("mk2", &proxy, folder.path());
+        let vehicle = Running::start(&mut vehicle("mk2", &proxy, folder.path()));
         Self { folder, proxy, _vehicle: vehicle }
     }
 
@@ -122,11 +136,11 @@ impl Pad {
 }
 
 /// It keeps its unique id, so that it is known again after a reboot.
-fn vehicle(profile: &str, proxy: &UdpProxy, folder: &Path) -> Running {
+fn vehicle(profile: &str, proxy: &UdpProxy, folder: &Path) -> Command {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--stay", "--profile", profile, "--mavlink", &proxy.vehicle_link()]);
     command.arg("--uid-file").arg(folder.join("vehicle.uid"));
-    Running::start(&mut command)
+    command
 }
 
 /// The number in ` ABORT  commanded 12.3 s x4  acknowledged waiting  observed yes`.

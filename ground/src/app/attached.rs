@@ -12,7 +12,7 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
-use super::output::{Lines, Output};
+use super::output::{Lines, Output, print};
 use super::replaying::Again;
 use super::server::read_one;
 use super::stations;
@@ -30,6 +30,10 @@ const TICK: Duration = Duration::from_millis(100);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// How many messages from the station may wait.
 const WAITING_MAX: usize = 4_096;
+
+/// What a person reads whose terminal shows no screen.
+const LINES_ONLY: &[u8] =
+    b"this terminal shows lines only and takes no keys: it can neither hold nor abort, and does not count as a screen\n";
 
 /// The person at an attached screen.
 #[derive(Debug, Clone)]
@@ -65,6 +69,9 @@ pub async fn session(
         live = told == ToScreen::Live;
         check_version(&told)?;
         take(&mut model, told, at, viewer);
+    }
+    if !interactive {
+        print(LINES_ONLY)?;
     }
     let mut output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
@@ -131,6 +138,9 @@ pub async fn session(
                 Vec::new()
             }
             _ = ticks.tick() => {
+                if output.answers(clock.now()) {
+                    link.ask(&ToStation::Here).await;
+                }
                 again.pass(&mut model, &mut output, clock.now(), times.theirs(clock.now()));
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
             }

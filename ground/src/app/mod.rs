@@ -1,5 +1,6 @@
 //! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
 
+mod answers;
 pub mod attached;
 pub mod clock;
 pub mod download;
@@ -48,7 +49,7 @@ use next_log::NextLog;
 use output::{Output, print};
 use replaying::Again;
 use server::{Server, Watchers, hello};
-use station::Station;
+use station::{Answers, Station};
 use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
@@ -90,8 +91,8 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
                 args.operator.operator.or(config.operator.clone()),
             );
             let viewer = Viewer {
-                // Nobody can command through a feed.
-                watch: args.watch || args.from.is_some(),
+                // Nobody can command through a feed, or without keys.
+                watch: args.watch || args.from.is_some() || !interactive,
                 feed: args.from,
                 operator: operator(who.as_deref()),
                 keys: config.keys.clone(),
@@ -265,7 +266,7 @@ async fn start(
         server,
         screens: Vec::new(),
         alarm_command: config.alarm_command.clone(),
-        quiet_input: None,
+        own: Answers::default(),
         signatures,
         book: None,
         again: Again::default(),

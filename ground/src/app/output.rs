@@ -51,6 +51,11 @@ impl Output {
         }
     }
 
+    /// Whether the terminal has shown since the last call that it takes what is written.
+    pub(super) fn answers(&mut self, now: Duration) -> bool {
+        self.screen.as_mut().is_some_and(|screen| screen.answers(now))
+    }
+
     pub(super) fn mark_message(&mut self, msg: &Msg, model: &Model) {
         if let Some(screen) = &mut self.screen {
             screen.pace.mark_message(msg, model);

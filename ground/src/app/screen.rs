@@ -3,7 +3,6 @@
 use std::io;
 use std::io::Write;
 use std::mem::ManuallyDrop;
-use std::os::fd::OwnedFd;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -27,6 +26,7 @@ use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
 
+use super::answers;
 use super::pace::Pace;
 use super::programs::{Voice, VoiceEnded};
 use super::terminal::Thrifty;
@@ -43,6 +43,9 @@ const TOGETHER_MAX: usize = 1_024;
 const QUIET_FOR: Duration = Duration::from_millis(50);
 /// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
+
+/// How often the terminal is asked whether it answers.
+const ASK_EVERY: Duration = Duration::from_millis(250);
 
 /// The reason when a screen ends without a signal.
 pub const GONE: &str = "the terminal is gone";
@@ -69,6 +72,7 @@ pub struct Screen {
     /// A message that arrived after the keys that are passed on first.
     waiting: Option<Msg>,
     input_ended: bool,
+    ask_at: Duration,
 }
 
 impl Screen {
@@ -94,6 +98,7 @@ impl Screen {
             whole: false,
             waiting: None,
             input_ended: false,
+            ask_at: Duration::ZERO,
         })
     }
 
@@ -145,6 +150,18 @@ impl Screen {
     /// Whether the terminal distinguishes a held key's repeats from presses.
     pub fn reports_repeats(&self) -> bool {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
+    }
+
+    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if it has taken what was written.
+    pub fn answers(&mut self, now: Duration) -> bool {
+        if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
+            self.ask_at = now + ASK_EVERY;
+            // Writing to a buffer in memory cannot fail.
+            let _ = io::Write::write_all(&mut self.terminal.backend_mut().terminal, answers::QUESTION);
+            answers::note_question();
+            self.writer.send();
+        }
+        answers::has_answered()
     }
 
     /// Rings the terminal's bell.
@@ -216,6 +233,7 @@ fn theme(config: &Config) -> Theme {
 fn take_terminal() -> io::Result<(Terminal<Thrifty<FrameBuffer>>, TerminalWriter)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
+    answers::begin()?;
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
@@ -240,6 +258,7 @@ fn restore() {
     if !TAKEN.swap(false, Ordering::Relaxed) {
         return;
     }
+    answers::end();
     // Before raw mode ends: in line mode the rest of a paste could not be read and discarded.
     drain_input();
     let _ = disable_raw_mode();
@@ -271,17 +290,6 @@ fn drain_input() {
         }
         let _ = rustix::termios::tcflush(&stdin, QueueSelector::IFlush);
     }
-}
-
-/// Replaces standard input, whose terminal is gone, by a pipe that never delivers anything while the returned end is
-/// kept open.
-///
-/// The thread that reads terminal events cannot be stopped. Reads from a terminal that is gone return at once, so the
-/// thread would loop and use half a core.
-pub fn quiet_input() -> Option<OwnedFd> {
-    let (silent, held) = rustix::pipe::pipe().ok()?;
-    rustix::stdio::dup2_stdin(&silent).ok()?;
-    Some(held)
 }
 
 /// Prints a panic message on the restored terminal, because the alternate screen disappears.

@@ -1,6 +1,5 @@
 //! The run loop of a station: link, log, clock, signals, screen and attached screens around the model.
 
-use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -42,11 +41,11 @@ pub(super) struct Station {
     /// The socket path that was given, if any.
     pub(super) socket: Option<PathBuf>,
     pub(super) server: Option<Server>,
-    /// The attached screens, and whether each only watches.
-    pub(super) screens: Vec<(Seat, bool)>,
+    /// The attached screens.
+    pub(super) screens: Vec<Attached>,
+    /// Whether the station's own screen answers.
+    pub(super) own: Answers,
     pub(super) alarm_command: Option<String>,
-    /// The open end of the pipe that replaces a lost terminal.
-    pub(super) quiet_input: Option<OwnedFd>,
     /// The files of the last place could not be written.
     pub(super) place_failed: bool,
     /// The feed for other machines ends with the station.
@@ -64,6 +63,40 @@ pub(super) struct Station {
     /// When the links are reported next.
     pub(super) report_at: Duration,
     pub(super) next_log: NextLog,
+}
+
+/// An attached screen.
+#[derive(Debug)]
+pub(super) struct Attached {
+    pub(super) seat: Seat,
+    /// It only watches.
+    pub(super) watch: bool,
+    answers: Answers,
+}
+
+/// A screen that has not answered for so many ticks does not count; together they are `UNATTENDED_MAX`.
+const SILENT_AFTER: u8 = 8;
+
+/// Whether a screen's terminal answers.
+#[derive(Debug, Default)]
+pub(super) struct Answers {
+    ever: bool,
+    /// For how many ticks it has not. A station that stood still has counted none meanwhile.
+    silence: u8,
+}
+
+impl Answers {
+    fn is_silent(&self) -> bool {
+        self.silence >= SILENT_AFTER
+    }
+
+    fn tick(&mut self) {
+        self.silence = self.silence.saturating_add(1);
+    }
+
+    fn hear(&mut self) {
+        *self = Self { ever: true, silence: 0 };
+    }
 }
 
 /// What the loop does next.
@@ -100,6 +133,8 @@ impl Station {
                 _ = ticks.tick() => {
                     let now = self.clock.now();
                     self.again.pass(model, &mut self.output, now, now);
+                    self.count_silence(now);
+                    self.tell_crew(model, wire);
                     self.tick_msgs(model)
                 }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
@@ -141,13 +176,29 @@ impl Station {
         }
     }
 
+    fn count_silence(&mut self, now: Duration) {
+        self.screens.iter_mut().for_each(|screen| screen.answers.tick());
+        self.own.tick();
+        if self.output.answers(now) {
+            self.own.hear();
+        }
+    }
+
     /// Reports who can command, if that has changed.
     fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
-        let own = self.output.screen.is_some().then(|| model.settings.seat.clone());
-        let attached = self.screens.iter().filter(|(_, watch)| !watch).map(|(seat, _)| seat.clone());
-        let seats: Vec<Seat> = own.into_iter().chain(attached).collect();
-        if seats != model.crew.seats() {
-            self.step(model, wire, Msg::Crew(seats));
+        let own = self.output.screen.is_some().then(|| (&model.settings.seat, &self.own));
+        let attached = self.screens.iter().filter(|screen| !screen.watch);
+        let all = own.into_iter().chain(attached.map(|screen| (&screen.seat, &screen.answers)));
+        let (mut seats, mut silent) = (Vec::new(), Vec::new());
+        for (seat, answers) in all {
+            if answers.is_silent() {
+                silent.push(seat.clone());
+            } else if answers.ever {
+                seats.push(seat.clone());
+            }
+        }
+        if seats != model.crew.seats() || silent != model.crew.silent() {
+            self.step(model, wire, Msg::Crew { seats, silent });
         }
     }
 
@@ -174,9 +225,6 @@ impl Station {
     /// Continues without the full screen, and serves attached screens from now on.
     async fn lose_screen(&mut self, lines: Lines, model: &Model) {
         self.output = Output { screen: None, lines };
-        if self.quiet_input.is_none() {
-            self.quiet_input = screen::quiet_input();
-        }
         if self.server.is_none() {
             // If another station uses the path, this one continues without a socket.
             self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
@@ -188,14 +236,19 @@ impl Station {
     fn hear(&mut self, news: ServerEvent, model: &Model) -> Vec<Msg> {
         match news {
             ServerEvent::ScreenJoined { seat, watch } => {
-                self.screens.push((seat, watch));
+                self.screens.push(Attached { seat, watch, answers: Answers::default() });
                 Vec::new()
             }
             ServerEvent::ScreenLeft(number) => {
-                self.screens.retain(|(seat, _)| seat.screen != number);
+                self.screens.retain(|screen| screen.seat.screen != number);
                 Vec::new()
             }
             ServerEvent::FromScreen(by, ToStation::Request(request)) => vec![Msg::Asked { request, by }],
+            ServerEvent::FromScreen(by, ToStation::Here) => {
+                let heard = self.screens.iter_mut().filter(|screen| screen.seat == by);
+                heard.for_each(|screen| screen.answers.hear());
+                Vec::new()
+            }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
                 Vec::new()

@@ -13,6 +13,7 @@ use tokio::io::AsyncWriteExt as _;
 
 use super::output::{absolute, print};
 use super::server::read_one;
+use super::station::Attached;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
 use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
 use crate::exit::Exit;
@@ -25,7 +26,7 @@ const ENDS_WITHIN: Duration = Duration::from_secs(10);
 const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(50);
 
 /// The status of this station.
-pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
+pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let settings = &model.settings;
     let vehicle = &model.vehicle;
     let boot = vehicle.status.as_ref().map_or(0, |status| status.value.boot_number);
@@ -39,9 +40,9 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
     let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
     let armed = vehicle.is_armed();
     let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
-    let own = model.crew.seats().iter().find(|seat| **seat == settings.seat).map(Seat::to_string);
-    let attached =
-        screens.iter().map(|(seat, watch)| format!("{seat}{}", if *watch { " (watches)" } else { "" }));
+    let watching = screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
+    let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
+    let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
     StationStatus {
         pid: std::process::id(),
         link: settings.link_name.clone(),
@@ -50,7 +51,7 @@ pub(super) fn of(model: &Model, screens: &[(Seat, bool)]) -> StationStatus {
         phase: format!("{phase} {}", if armed { "ARMED" } else { "disarmed" }),
         at_risk: model.is_at_risk(),
         log: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
-        screens: own.into_iter().chain(attached).collect::<Vec<_>>().join("; "),
+        screens: screens.collect::<Vec<_>>().join("; "),
     }
 }
 

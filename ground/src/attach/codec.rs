@@ -245,7 +245,7 @@ mod tests {
     /// No memory is taken for what is not there.
     #[test]
     fn a_wrong_count_ends_with_the_bytes() {
-        let mut bytes = encode_to_screen(&ToScreen::Msg(Msg::Crew(Vec::new())), Duration::ZERO).unwrap();
+        let mut bytes = encode_to_screen(&ToScreen::Msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() }), Duration::ZERO).unwrap();
         bytes.pop();
         bytes.extend([0xFF; 9]);
         bytes.push(1);
@@ -286,6 +286,7 @@ mod tests {
             ToStation::Request(Request::Untested),
             ToStation::Request(Request::Sign { step: 7, void: true }),
             ToStation::Key("Ctrl-X".to_owned()),
+            ToStation::Here,
         ];
         for asked in asked {
             assert_eq!(decode_to_station(&encode_to_station(&asked)[4..]), Ok(asked));
@@ -371,7 +372,7 @@ mod tests {
                 }
             ),
             (kind, seat()).prop_map(|(kind, by)| Msg::command(kind, by)),
-            vec(seat(), 0..4).prop_map(Msg::Crew),
+            (vec(seat(), 0..4), vec(seat(), 0..2)).prop_map(|(seats, silent)| Msg::Crew { seats, silent }),
             seat().prop_map(|by| Msg::Asked { request: Request::RangeTest, by }),
             (seat(), any::<u32>()).prop_map(|(by, boot)| Msg::Asked { request: Request::Choose(boot), by }),
             seat().prop_map(|by| Msg::Asked { request: Request::WithoutLog, by }),

@@ -15,7 +15,7 @@ use crate::update::Msg;
 // What a station and its screens say to each other.
 
 /// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 11;
+pub const VERSION: u32 = 12;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
@@ -86,4 +86,6 @@ pub enum ToStation {
     Request(Request),
     /// A key was pressed; for the log.
     Key(String),
+    /// The screen's terminal answers. A screen that has not said so for a second does not count.
+    Here,
 }

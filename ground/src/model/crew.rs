@@ -8,14 +8,17 @@ use serde::{Deserialize, Serialize};
 
 use super::{Model, why_not_seat};
 
-/// How long a countdown may continue without a commanding screen. The vehicle is to be held 1 s after the last one has gone: the
+/// How long a countdown may continue without a commanding screen that answers. The vehicle is to be held 1 s after the last one has gone: the
 /// rest is for the hold and its way.
 pub const UNATTENDED_MAX: Duration = Duration::from_millis(800);
 
-/// The seats at commanding screens: the station's own screen and the attached ones without `--watch`.
+/// The seats at commanding screens: the station's own screen and the attached ones without `--watch`, as long as
+/// their terminals answer.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crew {
     seats: Vec<Seat>,
+    /// The screens that could command if they answered.
+    silent: Vec<Seat>,
     /// When the last one left; `None` while somebody is there.
     gone_at: Option<Duration>,
     /// When the next hold is to be sent; `None` while no hold is needed.
@@ -25,18 +28,24 @@ pub struct Crew {
 }
 
 impl Crew {
-    /// Sets who is there now.
-    pub fn set_seats(&mut self, seats: Vec<Seat>, now: Duration) {
+    /// Sets who is there now, and which screens do not answer: they have been silent for [`UNATTENDED_MAX`] already.
+    pub fn set_seats(&mut self, seats: Vec<Seat>, silent: Vec<Seat>, now: Duration) {
         if !seats.is_empty() {
             self.gone_at = None;
+        } else if !silent.is_empty() {
+            self.gone_at = Some(now.saturating_sub(UNATTENDED_MAX));
         } else if !self.seats.is_empty() {
             self.gone_at = Some(now);
         }
-        self.seats = seats;
+        (self.seats, self.silent) = (seats, silent);
     }
 
     pub fn seats(&self) -> &[Seat] {
         &self.seats
+    }
+
+    pub fn silent(&self) -> &[Seat] {
+        &self.silent
     }
 
     /// The first word of each operator's name, or the screen.
@@ -55,11 +64,15 @@ impl Crew {
 
     /// A sentence that says who can command.
     pub fn words(&self) -> String {
-        if self.seats.is_empty() {
-            return "nobody commands".to_owned();
+        let listed = |seats: &[Seat]| seats.iter().map(Seat::to_string).collect::<Vec<_>>().join("; ");
+        let there = match &self.seats[..] {
+            [] => "nobody commands".to_owned(),
+            seats => format!("at the controls: {}", listed(seats)),
+        };
+        match &self.silent[..] {
+            [] => there,
+            silent => format!("{there}; does not answer, so it does not count: {}", listed(silent)),
         }
-        let seats: Vec<String> = self.seats.iter().map(Seat::to_string).collect();
-        format!("at the controls: {}", seats.join("; "))
     }
 }
 

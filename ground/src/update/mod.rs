@@ -41,8 +41,11 @@ pub enum Msg {
         /// The operator and the screen.
         by: Seat,
     },
-    /// The seats that can command have changed to these.
-    Crew(Vec<Seat>),
+    /// Who can command has changed: the seats at screens that answer, and at those that do not.
+    Crew {
+        seats: Vec<Seat>,
+        silent: Vec<Seat>,
+    },
     /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station keeps
     /// running.
     ScreenQuit,
@@ -154,8 +157,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
         Msg::Asked { request, by } => on_request(model, request, by, now),
-        Msg::Crew(seats) => {
-            model.crew.set_seats(seats, now);
+        Msg::Crew { seats, silent } => {
+            model.crew.set_seats(seats, silent, now);
             model.info(now, model.crew.words());
         }
         Msg::Checklist(list) => model.checklist = Some(*list),

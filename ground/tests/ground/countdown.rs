@@ -69,7 +69,7 @@ impl Pad {
             up: Vec::new(),
             down: Vec::new(),
         };
-        pad.msg(Msg::Crew(vec![anna()]));
+        pad.msg(Msg::Crew { seats: vec![anna()], silent: Vec::new() });
         pad
     }
 
@@ -90,7 +90,7 @@ impl Pad {
     fn lose(&mut self, loss: Loss) {
         self.lost = Some(loss);
         if loss == Loss::Screen {
-            self.msg(Msg::Crew(Vec::new()));
+            self.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
         }
     }
 

@@ -28,7 +28,7 @@ fn requested(kind: CommandKind, by: Seat) -> Msg {
 /// A station with Anna at its own screen.
 fn with_anna() -> Rig {
     let mut rig = Rig::new(Settings { seat: anna(), ..settings(false, true) });
-    rig.msg(Msg::Crew(vec![anna()]));
+    rig.msg(Msg::Crew { seats: vec![anna()], silent: Vec::new() });
     rig.run(1.0);
     rig.take_commands();
     rig
@@ -107,7 +107,7 @@ fn a_countdown_without_a_commanding_screen_is_held() {
     let mut rig = counting();
     rig.run(10.0);
     assert_eq!(holds(&mut rig), 0, "Anna is there");
-    rig.msg(Msg::Crew(Vec::new()));
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.run(0.7);
     assert_eq!(holds(&mut rig), 0);
     rig.run(1.0);
@@ -132,7 +132,7 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     let mut rig = counting();
     assert!(rig.screen(80, 24).contains("; hold until T-2"), "{}", rig.screen(80, 24));
     rig.countdown_ms = 1_900;
-    rig.msg(Msg::Crew(Vec::new()));
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.run(5.0);
     assert_eq!(holds(&mut rig), 0);
     let said = "no commanding screen in the countdown: TOO LATE for a hold, only an abort ends it";
@@ -140,7 +140,7 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     // A hold that was being sent ends there, too.
     let mut rig = counting();
     rig.countdown_ms = 2_500;
-    rig.msg(Msg::Crew(Vec::new()));
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.run(3.0);
     assert!(holds(&mut rig) > 5);
     rig.countdown_ms = 2_000;
@@ -148,7 +148,7 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     assert_eq!(holds(&mut rig), 0);
     assert!(rig.events().contains("TOO LATE for a hold"), "{}", rig.events());
     // Somebody at a screen is told what still works.
-    rig.msg(Msg::Crew(vec![anna()]));
+    rig.msg(Msg::Crew { seats: vec![anna()], silent: Vec::new() });
     rig.keys(&[Key::Char('H'), Key::Enter]);
     assert_eq!(holds(&mut rig), 0);
     assert!(rig.events().contains("too late for a hold: Ctrl-X, then Enter, aborts"));
@@ -158,9 +158,9 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
 #[test]
 fn a_crew_that_returns_in_time_prevents_the_hold() {
     let mut rig = counting();
-    rig.msg(Msg::Crew(Vec::new()));
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.run(0.5);
-    rig.msg(Msg::Crew(vec![ben()]));
+    rig.msg(Msg::Crew { seats: vec![ben()], silent: Vec::new() });
     rig.run(10.0);
     assert_eq!(holds(&mut rig), 0);
 }
@@ -172,11 +172,11 @@ fn a_countdown_of_another_station_and_a_flight_are_not_held() {
     other.phase = TdPhase::TD_PHASE_PAD_ARMED;
     other.armed_here = false;
     other.countdown_ms = 20_000;
-    other.msg(Msg::Crew(Vec::new()));
+    other.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     other.run(10.0);
     assert_eq!(holds(&mut other), 0, "another crew's countdown");
     let mut released = counting();
-    released.msg(Msg::Crew(Vec::new()));
+    released.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     released.run(0.5);
     released.phase = TdPhase::TD_PHASE_BOOST;
     released.run(10.0);

@@ -62,7 +62,7 @@ fn a_vehicle_that_contradicts_itself_is_live() {
 fn several_operators_are_named() {
     let mut rig = Rig::crewed();
     let seats = vec![Seat::new(1, "ann on pts/1"), Seat::new(2, "bob on pts/2")];
-    rig.msg(Msg::Crew(seats));
+    rig.msg(Msg::Crew { seats, silent: Vec::new() });
     assert!(first_line(&rig, 80, 24).contains("by ann,bob"), "{}", first_line(&rig, 80, 24));
 }
 

@@ -98,7 +98,7 @@ fn who_armed_the_vehicle_is_on_the_screen() {
     assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
     // Whoever else sits here: the silence of this station holds the countdown.
     let seats = |names: &[&str]| (1..).zip(names).map(|(number, name)| Seat::new(number, *name)).collect();
-    rig.msg(Msg::Crew(seats(&["ann", "ann", "bob", "ann", "ann", "ann"])));
+    rig.msg(Msg::Crew { seats: seats(&["ann", "ann", "bob", "ann", "ann", "ann"]), silent: Vec::new() });
     assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
     rig.armed = false;
     rig.phase = TdPhase::TD_PHASE_PAD_IDLE;

@@ -311,8 +311,8 @@ fn what_another_session_armed_is_never_armed_here() {
     }
     assert!(first_line(&rig, 100, 30).contains("armed by another 255/190"), "{}", first_line(&rig, 100, 30));
     // Without a screen here, the countdown of the other one is not held from here.
-    rig.msg(Msg::Crew(vec![Seat::new(1, "ann")]));
-    rig.msg(Msg::Crew(Vec::new()));
+    rig.msg(Msg::Crew { seats: vec![Seat::new(1, "ann")], silent: Vec::new() });
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.take_commands();
     rig.run(5.0);
     assert_eq!(rig.take_commands(), []);

@@ -1,0 +1,164 @@
+//! Asks the terminal whether it still shows what is written to it, and takes its answers out of what is typed.
+//!
+//! Bytes that a program has written may wait for ever: in a terminal that hangs, or for a connection that is dead. Only an answer
+//! to a question that went the same way shows that somebody may be reading. crossterm drops such an answer without a word. So
+//! this stands between the terminal and crossterm: a thread reads the terminal, and passes on everything else over a
+//! pseudo-terminal, which crossterm takes for standard input.
+
+use std::fs::File;
+use std::io;
+use std::io::{Read as _, Write as _};
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
+
+/// Device status report (ECMA-48, 8.3.35), which every terminal answers.
+pub(super) const QUESTION: &[u8] = b"\x1b[5n";
+const ANSWER: &[u8] = b"\x1b[0n";
+/// How long the rest of an answer may take; a lone Escape waits for as long.
+const REST_WITHIN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
+/// How long the last answer may take when the screen ends: later it would be typed into the shell.
+const LAST_WITHIN: Duration = Duration::from_millis(500);
+const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(2);
+
+/// Answers that nobody has taken note of yet, and questions without an answer. There is only one terminal.
+static ANSWERS: AtomicU32 = AtomicU32::new(0);
+static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
+
+/// What standard input was, and our end of the pseudo-terminal that replaces it.
+static REPLACED: Mutex<Option<(OwnedFd, File)>> = Mutex::new(None);
+
+/// Notes that the terminal is asked.
+pub(super) fn note_question() {
+    OPEN_QUESTIONS.fetch_add(1, Ordering::Relaxed);
+}
+
+/// Whether the terminal has answered since the last call.
+pub(super) fn has_answered() -> bool {
+    ANSWERS.swap(0, Ordering::Relaxed) > 0
+}
+
+/// Begins to stand between the terminal, which is in raw mode already, and crossterm, which has read nothing yet.
+///
+/// # Errors
+/// The system gives no pseudo-terminal.
+pub(super) fn begin() -> io::Result<()> {
+    let stdin = io::stdin().as_fd().try_clone_to_owned()?;
+    let typed = match isatty(&stdin) {
+        true => File::from(stdin.try_clone()?),
+        false => File::open("/dev/tty")?,
+    };
+    let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+    rustix::io::fcntl_setfd(&ours, rustix::io::FdFlags::CLOEXEC)?;
+    grantpt(&ours)?;
+    unlockpt(&ours)?;
+    let no_controlling_terminal = i32::try_from(OpenptFlags::NOCTTY.bits()).unwrap_or(0);
+    let mut open = File::options();
+    open.read(true).write(true).custom_flags(no_controlling_terminal);
+    let crossterms = open.open(ptsname(&ours, Vec::new())?.to_string_lossy().as_ref())?;
+    let mut modes = tcgetattr(&crossterms)?;
+    modes.make_raw();
+    tcsetattr(&crossterms, OptionalActions::Now, &modes)?;
+    rustix::stdio::dup2_stdin(&crossterms)?;
+    let ours = File::from(ours);
+    *replaced() = Some((stdin, ours.try_clone()?));
+    let pass = move || pass_on(&typed, &ours);
+    std::thread::Builder::new().name("keyboard".to_owned()).spawn(pass).map(drop)
+}
+
+/// Gives standard input back. The last answers are waited for, or they would be typed into the shell.
+pub(super) fn end() {
+    for _ in 0..LAST_WITHIN.as_millis() / LOOK_AGAIN_AFTER.as_millis() {
+        if OPEN_QUESTIONS.load(Ordering::Relaxed) <= 0 {
+            break;
+        }
+        std::thread::sleep(LOOK_AGAIN_AFTER);
+    }
+    // The pseudo-terminal's other end is closed by this: crossterm sees no end of it, at which it would loop.
+    if let Some((stdin, _ours)) = replaced().take() {
+        // Fails only if there is no standard input, and then nobody reads it.
+        let _ = rustix::stdio::dup2_stdin(&stdin);
+    }
+}
+
+fn replaced() -> std::sync::MutexGuard<'static, Option<(OwnedFd, File)>> {
+    REPLACED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Passes on what is typed, without the answers, until the screen or the terminal ends.
+fn pass_on(mut typed: &File, mut ours: &File) {
+    let mut buffer = [0; 1024];
+    let mut sieve = Sieve::default();
+    while replaced().is_some() {
+        let rest = match poll(&mut [PollFd::new(typed, PollFlags::IN)], Some(&REST_WITHIN)) {
+            Ok(0) => sieve.give_up(),
+            _ => match typed.read(&mut buffer) {
+                Ok(count @ 1..) => sieve.pass(&buffer[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                _ => return,
+            },
+        };
+        if ours.write_all(&rest).is_err() {
+            return;
+        }
+    }
+}
+
+/// Takes the answers out of a stream of bytes.
+#[derive(Debug, Default)]
+struct Sieve {
+    /// How many bytes of an answer were the last ones.
+    begun: usize,
+}
+
+impl Sieve {
+    /// The bytes without answers, and without the beginning of one at their end.
+    fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut rest = Vec::with_capacity(bytes.len());
+        for byte in bytes {
+            if ANSWER[self.begun] != *byte {
+                rest.extend(self.give_up());
+            }
+            if ANSWER[self.begun] == *byte {
+                self.begun += 1;
+            } else {
+                rest.push(*byte);
+            }
+            if self.begun == ANSWER.len() {
+                self.begun = 0;
+                ANSWERS.fetch_add(1, Ordering::Relaxed);
+                OPEN_QUESTIONS.fetch_sub(1, Ordering::Relaxed);
+            }
+        }
+        rest
+    }
+
+    /// What seemed to be the beginning of an answer.
+    fn give_up(&mut self) -> Vec<u8> {
+        ANSWER[..std::mem::take(&mut self.begun)].to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However the bytes arrive, every key comes through and no answer does.
+    #[test]
+    fn answers_are_taken_out_of_what_is_typed() {
+        let typed = b"a\x1b[0n\x1b\x1b[A\x1b[0nq\x1b[0~\x1b\x1b[0n\x1b[0\x1b[0n";
+        for length in 1..=typed.len() {
+            let mut sieve = Sieve::default();
+            let mut keys: Vec<u8> = typed.chunks(length).flat_map(|part| sieve.pass(part)).collect();
+            keys.extend(sieve.give_up());
+            assert_eq!(keys, b"a\x1b\x1b[Aq\x1b[0~\x1b\x1b[0", "{length}");
+        }
+        assert!(has_answered() && !has_answered());
+    }
+}
