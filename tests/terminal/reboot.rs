@@ -38,7 +38,7 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
 }
 
 #[test]
-fn a_reset_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() {
+fn a_power_cycle_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() {
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
@@ -48,6 +48,22 @@ fn a_reset_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() {
     rig.terminal.wait_until("a start that is no longer observed", |window| {
         (!window.shows("observed yes")).then_some(())
     });
+    rig.terminal.signal(Signal::SIGTERM);
+    rig.terminal.wait_for_end();
+}
+
+/// The vehicle stays switched on: neither its boot nor its clock tells it.
+#[test]
+fn a_reset_in_the_countdown_is_an_alarm_and_hides_go_until_somebody_has_seen_it() {
+    let mut rig = Rig::with_fault("mk2", "reboot:0.1@pad-armed+7");
+    rig.arm();
+    rig.start();
+    rig.terminal.wait_for("the vehicle has REBOOTED in the countdown");
+    rig.terminal.wait_for("every arming check passes");
+    // It stays for longer than its cause holds, until somebody has seen it.
+    rig.terminal.wait_for("ended alarm: the vehicle has REBOOTED");
+    rig.terminal.type_bytes(b" ");
+    rig.terminal.wait_until("an alarm that was seen", |window| (!window.shows("REBOOTED")).then_some(()));
     rig.terminal.signal(Signal::SIGTERM);
     rig.terminal.wait_for_end();
 }

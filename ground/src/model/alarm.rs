@@ -166,6 +166,11 @@ impl Alarms {
         })
     }
 
+    /// Whether there is an alarm of this kind that nobody has acknowledged.
+    pub fn is_unseen(&self, kind: AlarmKind) -> bool {
+        self.list.iter().any(|alarm| alarm.kind == kind && !alarm.acknowledged)
+    }
+
     /// How many alarms nobody has acknowledged.
     pub fn unacknowledged(&self) -> usize {
         self.list.iter().filter(|alarm| !alarm.acknowledged).count()

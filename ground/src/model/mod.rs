@@ -264,7 +264,7 @@ pub struct Model {
     /// `None` for a live flight.
     pub playing: Option<Playback>,
     /// When the vehicle rebooted, and what it did then.
-    pub(crate) rebooted: Option<(String, Duration)>,
+    pub(crate) rebooted: Option<(&'static str, Duration)>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
     pub(crate) auto_step: AutoStep,
@@ -293,6 +293,11 @@ impl Model {
     pub fn is_at_risk(&self) -> bool {
         let armed = self.vehicle.is_armed();
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
+    }
+
+    /// Whether the last reset was one of a vehicle that was armed or flew.
+    pub fn was_reset_at_work(&self) -> bool {
+        self.rebooted.is_some_and(|(did, _)| !did.is_empty())
     }
 
     /// When something is due before the next tick: the abort chord, or a command to resend.

@@ -174,6 +174,7 @@ fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
 }
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
+    vehicle_changes::hear_of_reset(model, &text.text, now);
     let level = EventLevel::of_severity(text.severity);
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }

@@ -39,6 +39,23 @@ impl Announced {
     }
 }
 
+/// How the vehicle says that its flight computer has restarted.
+pub const RESTARTED: &str = "the flight computer has restarted";
+/// News of one reset come within this time.
+const ONE_RESET: Duration = Duration::from_secs(5);
+
+impl Announced {
+    /// What a vehicle did when it was reset.
+    fn words_of_reset(&self) -> &'static str {
+        match self.phase {
+            _ if self.counting => " in the countdown",
+            Some(TdPhase::TD_PHASE_PAD_ARMED) => " while it was armed",
+            Some(phase) if is_flight(phase) => " in flight",
+            _ => "",
+        }
+    }
+}
+
 /// Shows another run if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
     let Some(former) = model.runs.shown() else { return };
@@ -72,22 +89,37 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     }
 }
 
-/// What a vehicle did when it was reset, by its last status: a heartbeat may be the first one after the reset.
-fn reset_words(vehicle: &Vehicle) -> String {
-    let counted = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    match vehicle.status.as_ref().map(|status| status.value.phase) {
-        Some(TdPhase::TD_PHASE_PAD_ARMED) if counted => " in the countdown".to_owned(),
-        Some(TdPhase::TD_PHASE_PAD_ARMED) => " while it was armed".to_owned(),
-        Some(phase) if is_flight(phase) => " in flight".to_owned(),
-        _ => String::new(),
+/// The same by its last status: a heartbeat may be the first one after the reset.
+fn reset_words(vehicle: &Vehicle) -> &'static str {
+    let phase = vehicle.status.as_ref().map(|status| status.value.phase);
+    let counting = vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
+        && phase == Some(TdPhase::TD_PHASE_PAD_ARMED);
+    Announced { phase, counting, ..Announced::default() }.words_of_reset()
+}
+
+/// The flight computer has restarted within one power-up, as it says, or as a return to its self-test shows. Both tell of one reset.
+fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
+    if model.rebooted.as_ref().is_some_and(|(_, at)| now.saturating_sub(*at) < ONE_RESET) {
+        return;
+    }
+    let text = format!("the flight computer has restarted{did}");
+    model.say(now, Speaker::Ground, EventLevel::Error, text);
+    model.rebooted = Some((did, now));
+    model.outbox.push(Action::SyncLog);
+}
+
+/// The vehicle says that its flight computer has restarted.
+pub(super) fn hear_of_reset(model: &mut Model, text: &str, now: Duration) {
+    if text.starts_with(RESTARTED) {
+        note_reset(model, reset_words(&model.vehicle), now);
     }
 }
 
 /// Another run has the screen: after a reset, and what the vehicle did then, or of another vehicle.
-fn on_shown(model: &mut Model, reset: Option<String>, now: Duration) {
+fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
-    let text = match &reset {
+    let text = match reset {
         Some(did) => format!("the vehicle has rebooted{did}{which}: all earlier values are dropped"),
         None => format!("another vehicle is shown{which}"),
     };
@@ -129,6 +161,10 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
     if let Some(phase) = after.phase
         && after.phase != before.phase
     {
+        // Nothing but a restart leads there.
+        if phase == TdPhase::TD_PHASE_SAFE && before.phase.is_some() {
+            note_reset(model, before.words_of_reset(), now);
+        }
         on_phase(model, before.phase, phase, now);
     }
     if after.counting && !before.counting {

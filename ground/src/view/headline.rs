@@ -13,7 +13,7 @@ use super::pictures::map::comes_down;
 use super::top_lines::{level, readiness};
 use super::{STALE_MARK, TextRole, Theme};
 use crate::model::{
-    Approach, Ending, Model, Page, Sample, Spot,
+    AlarmKind, Approach, Ending, Model, Page, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
@@ -158,6 +158,10 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     }
     if vehicle.is_armed() {
         return word("ARMED", TextRole::Caution);
+    }
+    // A vehicle that was reset while it was armed may do it again.
+    if model.alarms.is_unseen(AlarmKind::Rebooted) && model.was_reset_at_work() {
+        return word("RESET", TextRole::Alarm);
     }
     match readiness(model, now) {
         Some((_, TextRole::Good)) => word("GO", TextRole::Good),

@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::{AlarmKind, CommandKind, RING_EVERY, Role, Settings};
+use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
+use ground::view::headline::pad;
 use protocol::dialect::{MavCmd, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdPhase};
 use protocol::signing::SigningCounters;
 
@@ -48,6 +50,35 @@ fn an_alarm_that_has_ended_stays_until_it_is_acknowledged() {
     assert!(screen.contains(" ended alarm: LINK LOST") && screen.contains(" ended 1 s ago"), "{screen}");
     rig.key(Key::Char(' '));
     assert!(!rig.screen(80, 24).contains("ALARM"));
+}
+
+/// Boot number and clock go on: the vehicle was not switched off.
+#[test]
+fn a_reset_of_the_flight_computer_is_an_alarm_and_no_go_until_it_is_seen() {
+    for (says_it, is_seen_in_its_test) in [(true, false), (false, true), (true, true)] {
+        let mut rig = Rig::crewed();
+        rig.armed = true;
+        rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+        rig.countdown_ms = 7_000;
+        rig.run(1.0);
+        if says_it {
+            rig.text(RESTARTED);
+        }
+        (rig.armed, rig.countdown_ms) = (false, i32::MAX);
+        if is_seen_in_its_test {
+            rig.phase = TdPhase::TD_PHASE_SAFE;
+            rig.run(1.0);
+        }
+        rig.phase = TdPhase::TD_PHASE_PAD_IDLE;
+        rig.run(15.0);
+        let word = |rig: &Rig| pad(&rig.model, rig.now).text;
+        let screen = rig.screen(100, 30);
+        assert!(screen.contains("ended alarm: the vehicle has REBOOTED in the countdown"), "{screen}");
+        assert_eq!(word(&rig), "RESET");
+        assert_eq!(rig.events().matches("the flight computer has restarted in the countdown").count(), 1);
+        rig.key(Key::Char(' '));
+        assert_eq!(word(&rig), "GO");
+    }
 }
 
 /// A screen that attaches receives the whole history. It rings only for alarms that still hold.
