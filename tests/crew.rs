@@ -15,25 +15,22 @@ use crate::pages::{commands_of, lines_of_code, page};
 const SIZE: (u16, u16) = (100, 34);
 const READY: &str = "every arming check passes";
 
-/// What the page calls the station's address, the watchers' address and the radios is here something else.
+/// What the page calls the station's address and the radios is here something else.
 struct Places {
     station: SocketAddr,
-    watchers: SocketAddr,
     radio: SerialLine,
 }
 
 impl Places {
     fn new() -> Self {
-        Self { station: unshared_address(), watchers: unshared_address(), radio: SerialLine::new(57_600) }
+        Self { station: unshared_address(), radio: SerialLine::new(57_600) }
     }
 
     fn here(&self, word: &str) -> String {
-        let [station, watchers] = [self.station, self.watchers].map(|address| address.to_string());
+        let station = self.station.to_string();
         let of_page = [
             ("0.0.0.0:14550", station.clone()),
             ("192.168.1.20:14550", station),
-            ("0.0.0.0:14600", watchers.clone()),
-            ("192.168.1.20:14600", watchers),
             ("serial:/dev/ttyUSB0:57600", self.radio.near_link()),
             ("serial:/dev/ttyUSB1:57600", self.radio.far_link()),
         ];
@@ -70,15 +67,13 @@ impl Places {
 }
 
 /// How each line of the page begins; the tests below run them.
-const LINES: [&str; 22] = [
+const LINES: [&str; 20] = [
     "ground daemon --connect",
     "ground attach ",
     "ground attach --watch",
     "ground status",
     "ground stop",
     "ground --replay",
-    "ground daemon --watchers",
-    "ground attach --from",
     "onboard-sim fly --mavlink udpout",
     "onboard-sim fly --mavlink serial",
     "ground --connect udpin",
@@ -106,7 +101,7 @@ fn every_command_of_the_crews_page_is_run_here() {
 }
 
 #[test]
-fn a_station_of_the_crews_page_has_screens_and_watchers() {
+fn a_station_of_the_crews_page_has_screens() {
     let (folder, places) = (tempfile::tempdir().unwrap(), Places::new());
     let folder = folder.path();
     let mut station = Running::start(&mut places.command(folder, "ground daemon --connect"));
@@ -119,12 +114,6 @@ fn a_station_of_the_crews_page_has_screens_and_watchers() {
     // It has seen no flight.
     assert_eq!(station.wait().code, Some(5));
     drop((attached, watching));
-    let mut station = Running::start(
-        places.command(folder, "ground daemon --watchers").args(["--connect", "udpin:127.0.0.1:0"]),
-    );
-    station.wait_for_line("type next: ground attach");
-    drop(places.screen(folder, "ground attach --from", "WATCH"));
-    places.answer(folder, "ground stop", "");
     flown.signal(Signal::SIGINT);
     flown.wait();
 }

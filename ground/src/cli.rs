@@ -162,10 +162,6 @@ pub struct StationArgs {
     #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect")]
     pub speed: Option<Speed>,
 
-    /// Feed watchers on other machines: ADDRESS:PORT to listen on (TCP). It is not encrypted, and takes no commands.
-    #[arg(long, value_name = "ADDRESS:PORT")]
-    pub watchers: Option<String>,
-
     /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
     #[arg(long)]
     pub auto: bool,
@@ -183,7 +179,7 @@ pub enum Command {
         station: Box<StationArgs>,
     },
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
-    #[command(after_help = "Examples:\n  ground attach\n  ground attach --from station.local:14600")]
+    #[command(after_help = "Examples:\n  ground attach\n  ssh station.local -t ground attach --watch")]
     Attach(AttachArgs),
     /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
     ///
@@ -233,9 +229,6 @@ pub struct AttachArgs {
     /// Show only; command nothing.
     #[arg(long)]
     pub watch: bool,
-    /// Watch a station on another machine: the HOST:PORT of its --watchers.
-    #[arg(long, value_name = "HOST:PORT", conflicts_with = "socket")]
-    pub from: Option<String>,
     #[command(flatten)]
     pub socket: SocketArgs,
     #[command(flatten)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use e2e::{
-    Bound, Impairment, Program, Running, Signal, Terminal, UdpProxy, program, raw_frames_of, unshared_address,
+    Impairment, Program, Running, Signal, Terminal, UdpProxy, program, raw_frames_of,
 };
 use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA};
 use protocol::frame::Framer;
@@ -55,20 +55,18 @@ impl Field {
         std::fs::create_dir_all(&folder)?;
         crate::make_key(&folder)?;
         let proxy = UdpProxy::new();
-        let watchers = unshared_address().to_string();
         let mut command = crate::ground(&folder);
-        command.args(["daemon", "--connect", &proxy.ground_link(), "--log", LOG, "--watchers", &watchers]);
+        command.args(["daemon", "--connect", &proxy.ground_link(), "--log", LOG]);
         command.args(["--key", KEY]);
         let mut station = Running::start(&mut command);
-        // The feed is opened last.
-        station.bound_port(Bound::Tcp);
+        station.wait_for_line("type next: ground attach");
         let attach = |options: &[&str], size| {
             Terminal::start(crate::ground(&folder).arg("attach").args(options), size, false)
         };
         let screens = [
             attach(&[], (80, 24)),
             attach(&["--watch"], (140, 45)),
-            attach(&["--from", &watchers], (200, 60)),
+            attach(&["--watch"], (200, 60)),
         ];
         Ok(Self { folder, proxy, station, screens, flights: 0 })
     }
@@ -81,7 +79,7 @@ impl Field {
                 .with_log(self.folder.join(LOG)),
             screen("its screen, 80x24", 0),
             screen("a screen that only watches, 140x45", 1),
-            screen("a watcher over TCP, 200x60", 2),
+            screen("another one, 200x60", 2),
         ]
     }
 

@@ -6,7 +6,6 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::log::record::{EventLevel, Record};
 use tokio::io::{AsyncRead, AsyncWriteExt as _};
-use tokio::net::TcpStream;
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval};
@@ -39,8 +38,6 @@ const LINES_ONLY: &[u8] =
 #[derive(Debug, Clone)]
 pub struct Viewer {
     pub watch: bool,
-    /// The feed of a station on another machine, HOST:PORT; `None` for a station on this one.
-    pub feed: Option<String>,
     pub operator: String,
     pub keys: Bindings,
     pub talk: Talk,
@@ -175,12 +172,8 @@ fn check_version(told: &ToScreen) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Connects to the feed, or to the station of this machine.
+/// Connects to the station of this machine.
 async fn open_first(named: Option<&Path>, viewer: &Viewer) -> anyhow::Result<StationConnection> {
-    if let Some(feed) = &viewer.feed {
-        let no_feed = || format!("no station feeds watchers at {feed}; its flag is --watchers ADDRESS:PORT");
-        return StationConnection::of_feed(feed).await.with_context(no_feed);
-    }
     let path = stations::the_station(named).await?;
     StationConnection::open(&path, viewer).await.with_context(|| {
         format!("no ground station serves {}; start one with `ground daemon`", path.display())
@@ -234,9 +227,6 @@ async fn act(
 /// Finds the station on the named socket, otherwise the one that now holds the same link; never a station of another
 /// vehicle.
 async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<StationConnection> {
-    if let Some(feed) = &viewer.feed {
-        return StationConnection::of_feed(feed).await.ok();
-    }
     let place = match named {
         Some(path) => path.to_owned(),
         None => stations::station_over(links).await?,
@@ -323,30 +313,20 @@ impl Times {
 
 struct StationConnection {
     told: mpsc::Receiver<(ToScreen, Duration)>,
-    /// `None` for a feed, which takes nothing.
-    write: Option<OwnedWriteHalf>,
+    write: OwnedWriteHalf,
 }
 
 impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
         let (read, write) = socket::connect(path).await?.into_split();
-        let mut link = Self { told: listen(read), write: Some(write) };
+        let mut link = Self { told: listen(read), write };
         link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 
-    /// Connects to the feed of a station on another machine. Nothing is ever sent to it.
-    async fn of_feed(address: &str) -> std::io::Result<Self> {
-        let stream = TcpStream::connect(address).await?;
-        Ok(Self { told: listen(stream), write: None })
-    }
-
     /// Sends a message. Returns whether the station still takes it.
     async fn ask(&mut self, asked: &ToStation) -> bool {
-        match &mut self.write {
-            Some(write) => write.write_all(&encode_to_station(asked)).await.is_ok(),
-            None => false,
-        }
+        self.write.write_all(&encode_to_station(asked)).await.is_ok()
     }
 }
 

@@ -48,7 +48,7 @@ use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_
 use next_log::NextLog;
 use output::{Output, print};
 use replaying::Again;
-use server::{Server, Watchers, hello};
+use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
 
@@ -91,9 +91,8 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
                 args.operator.operator.or(config.operator.clone()),
             );
             let viewer = Viewer {
-                // Nobody can command through a feed, or without keys.
-                watch: args.watch || args.from.is_some() || !interactive,
-                feed: args.from,
+                // Nobody can command without keys.
+                watch: args.watch || !interactive,
                 operator: operator(who.as_deref()),
                 keys: config.keys.clone(),
                 talk: config.talk(),
@@ -252,7 +251,6 @@ async fn start(
     model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
     announce_what_is_there(&mut model, is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
-    let watchers = feed(args.watchers.as_deref(), server.as_ref()).await?;
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
@@ -270,7 +268,6 @@ async fn start(
         signatures,
         book: None,
         again: Again::default(),
-        _watchers: watchers,
         report: None,
         download: None,
         place_failed: false,
@@ -332,19 +329,6 @@ async fn serve(
             model.warn(clock.now(), format!("no other screen can attach: {error:#}"));
             Ok(None)
         }
-    }
-}
-
-/// Opens the feed for watchers, if one is wanted.
-async fn feed(address: Option<&str>, server: Option<&Server>) -> anyhow::Result<Option<Watchers>> {
-    match (address, server) {
-        (Some(address), Some(server)) => Watchers::open(address, server.shared()).await.map(Some),
-        (Some(_), None) => {
-            anyhow::bail!(
-                "--watchers needs a station that serves screens: one with a link, or `ground daemon`"
-            )
-        }
-        (None, _) => Ok(None),
     }
 }
 

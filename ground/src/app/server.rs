@@ -1,5 +1,4 @@
-//! The station's side of its sockets: sends history and news to attached screens and to watchers, and receives the
-//! requests of screens.
+//! The station's side of its socket: sends history and news to attached screens, and receives their requests.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -11,8 +10,8 @@ use anyhow::Context as _;
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
-use tokio::net::{TcpListener, TcpStream, UnixStream, tcp};
-use tokio::sync::{Semaphore, broadcast, mpsc, oneshot};
+use tokio::net::UnixStream;
+use tokio::sync::{broadcast, mpsc, oneshot};
 
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
 use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
@@ -86,18 +85,6 @@ impl History {
     }
 }
 
-/// The end of a block: whole messages, at most this much of them.
-fn end_of(block: &[u8], most_bytes: usize) -> &[u8] {
-    let mut rest = block;
-    while rest.len() > most_bytes
-        && let Some((prefix, _)) = rest.split_first_chunk()
-        && let Ok(length) = length(*prefix)
-    {
-        rest = rest.get(prefix.len() + length..).unwrap_or_default();
-    }
-    rest
-}
-
 /// Serves screens until it goes out of scope.
 pub struct Server {
     paths: Vec<PathBuf>,
@@ -107,7 +94,7 @@ pub struct Server {
 }
 
 /// What the tasks of all screens share.
-pub(super) struct Shared {
+struct Shared {
     history: Mutex<History>,
     news: broadcast::Sender<Bytes>,
     next_screen: AtomicU32,
@@ -144,11 +131,6 @@ impl Server {
             }
         });
         Ok(Self { paths, shared, requests, accepting })
-    }
-
-    /// What a feed for watchers tells.
-    pub(super) fn shared(&self) -> Arc<Shared> {
-        Arc::clone(&self.shared)
     }
 
     /// Sends a message to every screen, and keeps it for later ones.
@@ -201,29 +183,6 @@ fn absolute(path: &str) -> String {
 }
 
 impl Shared {
-    /// The greeting, at most this much of the latest past, and a receiver for everything after it.
-    pub(super) fn for_watcher(&self, past_bytes: usize) -> (Vec<u8>, broadcast::Receiver<Bytes>) {
-        let (all, live) = self.snapshot(0);
-        let has_checklist = self.history.lock().is_ok_and(|history| history.checklist.is_some());
-        // The greeting and the checklist come first, before what may be left out.
-        let first = all.len().min(1 + usize::from(has_checklist));
-        let (first, past) = all.split_at(first);
-        let mut left = past_bytes;
-        let mut latest: Vec<&[u8]> = Vec::new();
-        for block in past.iter().rev() {
-            let end = end_of(block, left);
-            latest.push(end);
-            left -= end.len();
-            if end.len() < block.len() {
-                break;
-            }
-        }
-        let live_mark = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
-        let first = first.iter().map(|bytes| &bytes[..]);
-        let told = first.chain(latest.into_iter().rev()).chain(live_mark.iter().map(|bytes| &bytes[..]));
-        (told.flatten().copied().collect(), live)
-    }
-
     /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
@@ -336,97 +295,6 @@ pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-// The feed for watchers: what every screen gets, over TCP, one way. Nothing that a watcher sends is ever read, so
-// nobody can command through it.
-
-/// How many may watch at once.
-pub(super) const WATCHERS_MAX: usize = 8;
-/// The most that one watcher is sent, bytes per second: ten times a radio link with its framing.
-const BYTES_S: u32 = 32 * 1024;
-/// The most that is written at once.
-const PART_BYTES: usize = 4 * 1024;
-/// How much of the past a watcher gets.
-const PAST_BYTES: usize = 64 * 1024;
-/// A watcher that takes nothing for so long is gone.
-const TAKES_WITHIN: Duration = Duration::from_secs(10);
-
-/// Serves watchers until it goes out of scope.
-pub(super) struct Watchers {
-    accepting: tokio::task::JoinHandle<()>,
-}
-
-impl Watchers {
-    /// Listens on this address.
-    ///
-    /// # Errors
-    /// The address is in use, or is none of this machine's.
-    pub(super) async fn open(address: &str, shared: Arc<Shared>) -> anyhow::Result<Self> {
-        let listening = || format!("serving watchers on {address}");
-        let listener = TcpListener::bind(address).await.with_context(listening)?;
-        Ok(Self::serving(listener, shared))
-    }
-
-    fn serving(listener: TcpListener, shared: Arc<Shared>) -> Self {
-        let accepting = tokio::spawn(async move {
-            let seats = Arc::new(Semaphore::new(WATCHERS_MAX));
-            let mut feeds = tokio::task::JoinSet::new();
-            loop {
-                let Ok((stream, _)) = listener.accept().await else {
-                    // Probably out of file descriptors; some may be free later.
-                    tokio::time::sleep(Duration::from_millis(200)).await;
-                    continue;
-                };
-                // Tasks that have ended are dropped.
-                while feeds.try_join_next().is_some() {}
-                if let Ok(seat) = Arc::clone(&seats).try_acquire_owned() {
-                    let shared = Arc::clone(&shared);
-                    feeds.spawn(async move {
-                        feed(stream, &shared).await;
-                        drop(seat);
-                    });
-                }
-            }
-        });
-        Self { accepting }
-    }
-}
-
-impl Drop for Watchers {
-    fn drop(&mut self) {
-        self.accepting.abort();
-    }
-}
-
-/// Tells one watcher the latest past, and then everything.
-async fn feed(stream: TcpStream, shared: &Shared) {
-    // The half that reads stays closed in here: it is never used.
-    let (_unread, mut write) = stream.into_split();
-    let (past, mut live) = shared.for_watcher(PAST_BYTES);
-    if send(&mut write, &past).await.is_err() {
-        return;
-    }
-    // Too far behind, or gone; the watcher sees the end and connects again.
-    while let Ok(bytes) = live.recv().await {
-        if send(&mut write, &bytes).await.is_err() {
-            return;
-        }
-    }
-}
-
-/// Writes in parts, with a pause after each, so that no watcher takes more than its share of a link.
-async fn send(write: &mut tcp::OwnedWriteHalf, bytes: &[u8]) -> std::io::Result<()> {
-    for part in bytes.chunks(PART_BYTES) {
-        tokio::time::timeout(TAKES_WITHIN, write.write_all(part)).await??;
-        tokio::time::sleep(pause(part.len())).await;
-    }
-    Ok(())
-}
-
-/// How long nothing is sent after so many bytes.
-fn pause(bytes: usize) -> Duration {
-    Duration::from_secs_f64(bytes as f64 / f64::from(BYTES_S))
-}
-
 #[cfg(test)]
 mod server_tests {
     use super::*;
@@ -459,85 +327,5 @@ mod server_tests {
         assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1) && numbers.last() == Some(&199_999));
         assert!(kept.len() > HISTORY_BYTES_MAX - 2 * BLOCK_BYTES, "no more than a block is given up at once");
         assert!(history.blocks.len() <= HISTORY_BYTES_MAX / (BLOCK_BYTES - 400) + 1);
-    }
-
-    #[test]
-    fn a_watcher_gets_the_end_of_the_past_in_whole_messages() {
-        let all: Vec<u8> = (0..100).flat_map(message).collect();
-        for most in [0, 1, 400, 1_000, all.len() - 1, all.len(), all.len() + 1] {
-            let end = end_of(&all, most);
-            assert!(end.len() <= most && all.ends_with(end));
-            let numbers = numbers(end);
-            assert!(numbers.last().is_none_or(|last| *last == 99));
-            let more = numbers.first().map_or(99, |first| first.saturating_sub(1));
-            assert!(end.len() == all.len() || end.len() + message(more).len() > most, "no less than fits");
-        }
-    }
-}
-
-#[cfg(test)]
-mod watchers_tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    use crate::attach::codec::{decode_to_screen, encode_to_station};
-    use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
-    use crate::model::{CommandKind, Request};
-    use crate::update::Msg;
-
-    #[test]
-    fn a_watcher_is_told_everything_and_asks_nothing() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("s.sock");
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        runtime.block_on(async {
-            let hello = Hello { version: VERSION, station: Settings::on_screen("a"), ..Hello::default() };
-            let mut server = Server::open(Some(&path), hello, 1).await.unwrap();
-            server.publish(&Msg::LinkUp("before".to_owned()), Duration::from_secs(1));
-            let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-            let address = listener.local_addr().unwrap();
-            let watchers = Watchers::serving(listener, server.shared());
-            let mut watcher = TcpStream::connect(address).await.unwrap();
-            // A greeting and a command, as an attached screen would send them.
-            let operator = "Eve".to_owned();
-            for asked in [
-                ToStation::Hello { watch: false, operator },
-                ToStation::Request(Request::Command(CommandKind::Arm)),
-            ] {
-                watcher.write_all(&encode_to_station(&asked)).await.unwrap();
-            }
-            let mut told = Vec::new();
-            while told.len() < 3 {
-                let length = watcher.read_u32_le().await.unwrap();
-                let mut bytes = vec![0; length as usize];
-                watcher.read_exact(&mut bytes).await.unwrap();
-                told.push(decode_to_screen(&bytes).unwrap().0);
-            }
-            assert!(matches!(&told[0], ToScreen::Hello(hello) if hello.station.link_name == "a"));
-            assert_eq!(told[1], ToScreen::Msg(Msg::LinkUp("before".to_owned())));
-            assert_eq!(told[2], ToScreen::Live);
-            server.publish(&Msg::LinkUp("after".to_owned()), Duration::from_secs(2));
-            let length = watcher.read_u32_le().await.unwrap();
-            let mut bytes = vec![0; length as usize];
-            watcher.read_exact(&mut bytes).await.unwrap();
-            assert_eq!(decode_to_screen(&bytes).unwrap().0, ToScreen::Msg(Msg::LinkUp("after".to_owned())));
-            // The first that the station hears of anybody is a screen on its own socket.
-            let (_read, mut write) = socket::connect(&path).await.unwrap().into_split();
-            let hello = ToStation::Hello { watch: true, operator: "Ann".to_owned() };
-            write.write_all(&encode_to_station(&hello)).await.unwrap();
-            let first = format!("{:?}", server.next().await);
-            assert!(first.contains("ScreenJoined") && first.contains("Ann"), "{first}");
-            drop(watchers);
-        });
-    }
-
-    proptest! {
-        /// Whatever is sent, its pauses keep it below the bound.
-        #[test]
-        fn the_pauses_keep_the_rate(sizes in prop::collection::vec(1..=PART_BYTES, 1..200)) {
-            let sent: usize = sizes.iter().sum();
-            let paused: Duration = sizes.iter().map(|size| pause(*size)).sum();
-            prop_assert!(paused.as_secs_f64() * f64::from(BYTES_S) >= sent as f64 * 0.999);
-        }
     }
 }

@@ -16,7 +16,7 @@ use super::files::{SignatureFile, SpaceWatch, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
 use super::replaying::Again;
-use super::server::{Server, ServerEvent, Watchers, hello};
+use super::server::{Server, ServerEvent, hello};
 use super::wire::Wire;
 use super::{files, programs, screen, stations};
 use crate::attach::{ToScreen, ToStation};
@@ -48,8 +48,6 @@ pub(super) struct Station {
     pub(super) alarm_command: Option<String>,
     /// The files of the last place could not be written.
     pub(super) place_failed: bool,
-    /// The feed for other machines ends with the station.
-    pub(super) _watchers: Option<Watchers>,
     /// The flight just flown, again on the station's own screen.
     pub(super) again: Again,
     /// The report that is being written.
