@@ -13,4 +13,5 @@ mod pasted_keys;
 mod reboot;
 mod resize;
 mod rig;
+mod standstill;
 mod stations;

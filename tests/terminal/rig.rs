@@ -109,15 +109,20 @@ impl Rig {
 pub(crate) struct Pad {
     pub(crate) folder: tempfile::TempDir,
     pub(crate) proxy: UdpProxy,
-    _vehicle: Running,
+    pub(crate) vehicle: Running,
 }
 
 impl Pad {
     pub(crate) fn new() -> Self {
+        Self::with_vehicle(&[])
+    }
+
+    /// The same with a vehicle that has these options.
+    pub(crate) fn with_vehicle(options: &[&str]) -> Self {
         let proxy = UdpProxy::new();
         let folder = tempfile::tempdir().unwrap();
-        let vehicle = Running::start(&mut vehicle("mk2", &proxy, folder.path()));
-        Self { folder, proxy, _vehicle: vehicle }
+        let vehicle = Running::start(vehicle("mk2", &proxy, folder.path()).args(options));
+        Self { folder, proxy, vehicle }
     }
 
     /// A ground station without a screen that holds the link.

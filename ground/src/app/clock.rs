@@ -1,8 +1,9 @@
 //! The clock, the only place that reads the time; and the signals that end the program.
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context as _;
+use rustix::time::{ClockId, clock_gettime};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use crate::demo::LogClock;
@@ -10,7 +11,7 @@ use crate::demo::LogClock;
 /// Time since the start of the run.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
-    start: Instant,
+    start: Duration,
     start_unix_ns: u64,
 }
 
@@ -19,13 +20,12 @@ impl Clock {
     #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
     pub fn start() -> Self {
         let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Self { start: Instant::now(), start_unix_ns: nanoseconds(since_epoch) }
+        Self { start: since_boot(), start_unix_ns: nanoseconds(since_epoch) }
     }
 
     /// Time since the start.
-    #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
     pub fn now(&self) -> Duration {
-        Instant::now().saturating_duration_since(self.start)
+        since_boot().saturating_sub(self.start)
     }
 
     /// When it started, nanoseconds since the Unix epoch.
@@ -41,10 +41,19 @@ impl Clock {
     /// Waits until a time; forever without one.
     pub async fn sleep_until(&self, at: Option<Duration>) {
         match at {
-            Some(at) => tokio::time::sleep_until((self.start + at).into()).await,
+            Some(at) => tokio::time::sleep(at.saturating_sub(self.now())).await,
             None => std::future::pending().await,
         }
     }
+}
+
+/// A clock that goes on while the computer sleeps, as the vehicle's does.
+fn since_boot() -> Duration {
+    #[cfg(target_os = "linux")]
+    const CLOCK: ClockId = ClockId::Boottime;
+    #[cfg(not(target_os = "linux"))]
+    const CLOCK: ClockId = ClockId::Monotonic;
+    Duration::try_from(clock_gettime(CLOCK)).unwrap_or_default()
 }
 
 /// The clock for the time stamps of records; every record of one log uses the same.

@@ -139,9 +139,10 @@ impl Station {
                 received = wire.receive() => wire.take(received),
             };
             let mut next = Next::Go;
+            let woken = wire.note_awake();
             let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
             let fetched = self.go_on_fetching(&msgs, boot_of(model), wire);
-            for msg in report.into_iter().chain(msgs).chain(fetched) {
+            for msg in woken.into_iter().chain(report).chain(msgs).chain(fetched) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
                         self.lose_screen(Lines::closed(), model).await;

@@ -19,6 +19,10 @@ use crate::model::{GONE_AFTER, LinkReport};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
+/// A run loop that has not come round for so long stood still: stopped, swapped out, or asleep with its computer.
+const STOOD_STILL: Duration = Duration::from_secs(1);
+/// What arrives for so long after it has waited.
+const WAITED_FOR: Duration = Duration::from_millis(500);
 /// How many boots a link remembers.
 const BOOTS_MAX: usize = 8;
 
@@ -30,6 +34,10 @@ pub struct Wire {
     vehicle: Address,
     lockouts: Lockouts,
     places: Places,
+    /// When the run loop last came round.
+    awake_at: Duration,
+    /// Until then what arrives is old: it is recorded and not shown.
+    old_until: Duration,
     /// Whether a failure to save timestamps was reported.
     save_failure_reported: bool,
     encoder: Encoder,
@@ -94,6 +102,8 @@ impl Wire {
             vehicle,
             lockouts: Lockouts::default(),
             places: Places::default(),
+            awake_at: clock.now(),
+            old_until: Duration::ZERO,
             save_failure_reported: false,
             encoder: Encoder::new(us),
             clock,
@@ -130,9 +140,21 @@ impl Wire {
         }
     }
 
+    /// Notes that the run loop comes round. Returns what to say if it stood still.
+    pub(super) fn note_awake(&mut self) -> Option<Msg> {
+        let now = self.clock.now();
+        let stood = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
+        (stood >= STOOD_STILL).then(|| {
+            self.old_until = now + WAITED_FOR;
+            let seconds = stood.as_secs_f64();
+            Msg::LinkSays(format!("this station stood still for {seconds:.1} s: what waited is in the log only"))
+        })
+    }
+
     /// Turns received data, and everything else that waits on the links, into messages.
     pub fn take(&mut self, (number, first): (usize, Received)) -> Vec<Msg> {
         let mut taken = Taken::default();
+        taken.msgs.extend(self.note_awake());
         self.take_one(number, first, &mut taken);
         for number in 0..self.links.count() {
             for _ in 0..MAX_AT_ONCE {
@@ -162,6 +184,9 @@ impl Wire {
                 LinkEvent::Frame(frame) => {
                     self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
+                    if now.time < self.old_until {
+                        continue;
+                    }
                     self.note_boot(number, &frame, from);
                     if self.links.count() > 1 {
                         msgs.push(Msg::HeardOver(number));
