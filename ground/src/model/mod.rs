@@ -240,9 +240,6 @@ pub struct Model {
     pub pages: Pages,
     pub history: History,
     pub parameters: Parameters,
-    pub recall: Recall,
-    /// The moment of the past that the crew looks at; `None` while the screen is live.
-    pub look_back: Option<LookBack>,
     /// The checklist of the mission, as the station keeps it; `None` without one.
     pub checklist: Option<Checklist>,
     /// Why a step was not signed or voided, and when.
@@ -309,24 +306,6 @@ impl Model {
     /// The page to show.
     pub fn page(&self) -> Page {
         self.pages.shown(self.vehicle.phase_now())
-    }
-
-    /// The model as the pages show it while the crew looks back, and its time; `None` while the screen is live. It has
-    /// the vehicle and the events of the past, and no link; the page is the present one.
-    pub fn past(&self) -> Option<(Self, Duration)> {
-        let (at, vehicle) = self.recall.at(self.look_back?.at, &self.vehicle)?;
-        let mut past = Self {
-            vehicle,
-            events: self.events.until(at),
-            history: self.history.clone(),
-            parameters: self.parameters.clone(),
-            pages: self.pages.clone(),
-            look_back: self.look_back,
-            log: self.log,
-            ..Self::new(self.settings.clone())
-        };
-        past.pages.held = Some(self.page());
-        Some((past, at))
     }
 
     /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the foremost.

@@ -42,10 +42,10 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             let phase = vehicle.phase_now();
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
-                vehicle.flown.extend(&motion, now);
+                vehicle.flown.extend(&motion);
             }
             if phase.is_some_and(is_burning) {
-                vehicle.burn.extend(&motion, now);
+                vehicle.burn.extend(&motion);
             }
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {

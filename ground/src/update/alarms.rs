@@ -32,9 +32,6 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     if model.alarms.rings(now, !raised.is_empty()) {
         model.outbox.push(Action::Bell);
     }
-    if !raised.is_empty() {
-        model.look_back = None;
-    }
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
         if matches!(

@@ -15,7 +15,7 @@ use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
 use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
-    KeyOrigin, LOOKS_FOR, LogStanding, LookBack, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
+    KeyOrigin, LogStanding, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
     Standing, TextEntry, overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check,
     why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves,
     why_untested,
@@ -24,8 +24,6 @@ use crate::update;
 
 /// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
-/// How far Left and Right move the look at the past.
-const LOOK_STEP: Duration = Duration::from_secs(1);
 /// The furthest scroll position; no list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
@@ -228,7 +226,6 @@ fn expire(model: &mut Model, now: Duration) {
 /// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
-    model.look_back = model.look_back.filter(|looks| now < looks.until);
     pass_abort_chord(model, now);
     pass_quit(model, now);
 }
@@ -257,7 +254,6 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
             choose_step(model, key == Key::Up, now);
         }
         Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
-        Key::Left | Key::Right if model.playing.is_none() => look_back(model, key == Key::Left, now),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
@@ -346,7 +342,6 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => {
-            model.look_back = None;
             model.pages.filter.clear();
             model.pages.hold(None);
         }
@@ -400,14 +395,6 @@ fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     climb(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
     true
-}
-
-/// Moves the look at the past of this flight; at its end the screen is live again.
-fn look_back(model: &mut Model, earlier: bool, now: Duration) {
-    let at = model.look_back.map_or(now, |looks| looks.at);
-    let at = if earlier { at.saturating_sub(LOOK_STEP) } else { at + LOOK_STEP };
-    let begin = model.recall.begin().filter(|_| at < now);
-    model.look_back = begin.map(|begin| LookBack { at: at.max(begin), until: now + LOOKS_FOR });
 }
 
 /// Whether the Pad page lists the checklist.

@@ -57,9 +57,6 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
     model.history.note_values(&model.vehicle, silence, now);
     note_trace(model, now);
-    if model.vehicle.in_flight() || model.vehicle.countdown_s().is_some() {
-        model.recall.note(&model.vehicle, now);
-    }
     alarms::ring_bells(model);
     commands::step_auto(model, now);
     commands::poll(model, now);

@@ -15,12 +15,7 @@ use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_on_p
 
 /// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its time, or the newest event. While an
 /// alarm rings, a message has a row of its own.
-pub fn message_rows(
-    model: &Model,
-    theme: Theme,
-    (now, shown_at): (Duration, Duration),
-    columns: u16,
-) -> Vec<Line<'static>> {
+pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) -> Vec<Line<'static>> {
     let columns = usize::from(columns);
     let message = top_lines::message(model, theme, now);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
@@ -29,7 +24,7 @@ pub fn message_rows(
         let message = message.filter(|_| !model.vehicle.in_flight());
         return message.into_iter().chain([alarm]).collect();
     }
-    let flight = || shows_flight(model).then(|| timeline(model, theme, (now, shown_at), columns));
+    let flight = || shows_flight(model).then(|| timeline(model, theme, now, columns));
     let row = message.or_else(flight).or_else(|| newest_event(model, theme));
     vec![row.unwrap_or_default()]
 }
@@ -86,12 +81,7 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     known.map(|(name, left_s)| (name, now + Duration::from_secs_f64(left_s))).collect()
 }
 
-fn timeline(
-    model: &Model,
-    theme: Theme,
-    (now, shown_at): (Duration, Duration),
-    columns: usize,
-) -> Line<'static> {
+fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     let columns = columns.saturating_sub(2).max(1);
     let to_come = expected(model, now);
     let (phases, from, length_s): (&[(TdPhase, Duration)], Duration, f64) =
@@ -145,7 +135,7 @@ fn timeline(
             *cell = (letter, *ink);
         }
     }
-    let here = column(shown_at);
+    let here = column(now);
     if !cells[here].0.is_alphabetic() {
         cells[here] = (NOW, Ink::Body);
     }

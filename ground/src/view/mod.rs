@@ -27,7 +27,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::{Act, CommandKind, LookBack, Model, TextEntry};
+use crate::model::{Act, CommandKind, Model, TextEntry};
 pub use theme::{Ink, TextRole, Theme};
 use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
 
@@ -98,19 +98,15 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
 // approaching; pinned numbers; the page; the flight along its time, or an alarm; the keys.
 
 pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
-    // Everything but the page always shows the present.
-    let past = model.past();
-    let (shown, shown_at) = past.as_ref().map_or((model, now), |(past, at)| (past, *at));
     let banner = headline::banner(model, now);
-    let messages = footer::message_rows(model, theme, (now, shown_at), area.width);
+    let messages = footer::message_rows(model, theme, now, area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
-    let [identity, state, words, past_mark, pinned, body, message, keys] = stacked(
+    let [identity, state, words, pinned, body, message, keys] = stacked(
         area,
         [
             Length(1),
             Length(state_rows),
             Length(banner.is_some().into()),
-            Length(past.is_some().into()),
             Length((!model.pages.pinned.is_empty()).into()),
             Fill(1),
             Length(messages.len() as u16),
@@ -126,30 +122,16 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         frame.buffer_mut().set_style(words, theme.level(top_lines::level(model, now)));
         draw_line(frame, words, Line::from(banner.reason()));
     }
-    if let Some(looks) = model.look_back.filter(|_| past.is_some()) {
-        draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
-    }
-    draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
-    // Also over the past: whether people may approach is a matter of the present.
+    draw_line(frame, pinned, status_lines::pinned_line(model, theme, now));
     let large = banner.filter(|banner| banner.is_large_on(model.page()));
     let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
-    let pictures = pages::draw(shown, theme, shown_at, frame, body);
+    let pictures = pages::draw(model, theme, now, frame, body);
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);
     dialog::draw_palette(model, theme, now, frame, body);
     dialog::draw_dialog(model, theme, now, frame, body);
     let is_covered = model.pages.entry.is_some() || dialog::dialog_lines(model, theme, now).is_some();
-    pictures.filter(|_| past.is_none() && !is_covered)
-}
-
-/// Says that the page shows the past, and for how long.
-fn past_line(looks: LookBack, shown_at: Duration, theme: Theme, now: Duration) -> Line<'static> {
-    let ago_s = now.saturating_sub(shown_at).as_secs_f64();
-    let left_s = looks.until.saturating_sub(now).as_secs();
-    let words = format!(
-        " PAST: {ago_s:.1} s ago. Live again in {left_s} s, on any alarm, or with 0. Left Right move"
-    );
-    theme.line(words, TextRole::Alarm)
+    pictures.filter(|_| !is_covered)
 }
 
 // The layout for terminals smaller than 80x22: plain lines, the most important first.

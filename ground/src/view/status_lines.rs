@@ -113,9 +113,6 @@ fn within(left_s: Option<f64>) -> String {
 
 /// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
 pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    if model.look_back.is_some() {
-        return theme.line(" link: only live", TextRole::Label);
-    }
     if let Some(why) = &model.link.trouble {
         return theme.line(format!(" LINK DOWN {why}"), TextRole::Alarm);
     }

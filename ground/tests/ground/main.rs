@@ -19,7 +19,6 @@ mod in_space;
 mod keys;
 mod ladder;
 mod links;
-mod looking_back;
 mod lossy_link;
 mod pad_check;
 mod phases;
