@@ -19,6 +19,8 @@ pub(super) struct Announced {
     phase: Option<TdPhase>,
     armed: Option<bool>,
     counting: bool,
+    /// The phase by the flight status, which names its run, and whether it counted down. A heartbeat may be of another run.
+    status: Option<(TdPhase, bool)>,
     aborted: bool,
     hold: Option<TdHold>,
     verdict: Option<Verdict>,
@@ -31,6 +33,10 @@ impl Announced {
             phase: vehicle.phase_now(),
             armed: vehicle.armed().map(|armed| armed.value),
             counting: on_pad && vehicle.countdown_s().is_some(),
+            status: vehicle.status.as_ref().map(|status| {
+                let counts = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+                (status.value.phase, counts)
+            }),
             aborted: vehicle.interlocks().is_some_and(is_aborted)
                 || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),
@@ -47,10 +53,10 @@ const ONE_RESET: Duration = Duration::from_secs(5);
 impl Announced {
     /// What a vehicle did when it was reset.
     fn words_of_reset(&self) -> &'static str {
-        match self.phase {
-            _ if self.counting => " in the countdown",
-            Some(TdPhase::TD_PHASE_PAD_ARMED) => " while it was armed",
-            Some(phase) if is_flight(phase) => " in flight",
+        match self.status {
+            Some((TdPhase::TD_PHASE_PAD_ARMED, true)) => " in the countdown",
+            Some((TdPhase::TD_PHASE_PAD_ARMED, false)) => " while it was armed",
+            Some((phase, _)) if is_flight(phase) => " in flight",
             _ => "",
         }
     }
@@ -66,7 +72,7 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
     model.vehicle.before = away.map(|away| Sample::new(away, now)).or(model.vehicle.before);
     model.vehicle.foreign = before.foreign.take();
     let is_reset = model.runs.follows(shown, former);
-    let did = is_reset.then(|| reset_words(&before));
+    let did = is_reset.then(|| Announced::of(&before).words_of_reset());
     model.others.insert(former, before);
     let Model { runs, others, .. } = model;
     others.retain(|id, _| runs.knows(*id));
@@ -89,14 +95,6 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     }
 }
 
-/// The same by its last status: a heartbeat may be the first one after the reset.
-fn reset_words(vehicle: &Vehicle) -> &'static str {
-    let phase = vehicle.status.as_ref().map(|status| status.value.phase);
-    let counting = vehicle.countdown_s().is_some_and(|left| left.value > 0.0)
-        && phase == Some(TdPhase::TD_PHASE_PAD_ARMED);
-    Announced { phase, counting, ..Announced::default() }.words_of_reset()
-}
-
 /// The flight computer has restarted within one power-up, as it says, or as a return to its self-test shows. Both tell of one reset.
 fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     if model.rebooted.as_ref().is_some_and(|(_, at)| now.saturating_sub(*at) < ONE_RESET) {
@@ -111,7 +109,7 @@ fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
 /// The vehicle says that its flight computer has restarted.
 pub(super) fn hear_of_reset(model: &mut Model, text: &str, now: Duration) {
     if text.starts_with(RESTARTED) {
-        note_reset(model, reset_words(&model.vehicle), now);
+        note_reset(model, Announced::of(&model.vehicle).words_of_reset(), now);
     }
 }
 
@@ -158,13 +156,14 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
     {
         model.info(now, if armed { "armed (HEARTBEAT)" } else { "disarmed (HEARTBEAT)" });
     }
+    // Nothing but a restart leads there.
+    let is_in_its_test = |status: Option<(TdPhase, bool)>| status.map(|(phase, _)| phase == TdPhase::TD_PHASE_SAFE);
+    if (is_in_its_test(before.status), is_in_its_test(after.status)) == (Some(false), Some(true)) {
+        note_reset(model, before.words_of_reset(), now);
+    }
     if let Some(phase) = after.phase
         && after.phase != before.phase
     {
-        // Nothing but a restart leads there.
-        if phase == TdPhase::TD_PHASE_SAFE && before.phase.is_some() {
-            note_reset(model, before.words_of_reset(), now);
-        }
         on_phase(model, before.phase, phase, now);
     }
     if after.counting && !before.counting {
