@@ -1,14 +1,13 @@
 //! Fetches the vehicle's own log (MAVLink FTP) and keeps it on disk.
 //!
-//! `protocol::ftp::download` decides what to ask for. What arrives is written by a thread of its own, so that neither
-//! the link nor the crew waits for the disk.
+//! `protocol::ftp::download` decides what to ask for. The whole log is read again by a thread of its own, so that neither the
+//! link nor the crew waits for it.
 
 use std::fs::File;
 use std::io;
 use std::io::{IsTerminal as _, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -22,6 +21,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
 use super::output::print;
+use super::programs::in_a_thread;
 use super::wire::Wire;
 use crate::cli::DownloadArgs;
 use crate::exit::Exit;
@@ -33,9 +33,10 @@ pub(super) struct Downloading {
     us: Address,
     vehicle: Address,
     folder: PathBuf,
-    keeper: Option<Keeper>,
-    /// The thread was asked to finish the file.
-    finishing: bool,
+    /// What has arrived, until it is whole.
+    kept: Option<Kept>,
+    /// The thread that gives it its name.
+    finishing: Option<Receiver<anyhow::Result<PathBuf>>>,
     /// Tenths of the file that were reported.
     tenths: u32,
 }
@@ -66,8 +67,8 @@ impl Downloading {
             us,
             vehicle,
             folder,
-            keeper: None,
-            finishing: false,
+            kept: None,
+            finishing: None,
             tenths: 0,
         }
     }
@@ -88,8 +89,8 @@ impl Downloading {
         match self.download.take(&packet, now) {
             Some(DownloadEvent::Opened { crc }) => self.open(crc)?,
             Some(DownloadEvent::Data(data)) => {
-                if let Some(keeper) = &self.keeper {
-                    keeper.order(Order::Write(data))?;
+                if let Some(kept) = &mut self.kept {
+                    kept.file.write_all(&data)?;
                 }
             }
             None => {}
@@ -105,21 +106,20 @@ impl Downloading {
         (messages, report)
     }
 
-    /// Stops, for a program that ends: waits until what has arrived is written.
-    pub(super) fn stop(mut self) {
-        if let Some(keeper) = self.keeper.take() {
-            keeper.close();
-        }
+    /// Stops, for a program that ends: what is whole gets its name.
+    pub(super) fn stop(self) {
+        let _ = self.finishing.map(|finishing| finishing.recv());
     }
 
     fn go_on(&mut self) -> anyhow::Result<Option<DownloadReport>> {
         let ended = self.download.ended().transpose()?;
-        let Some(keeper) = &self.keeper else { return Ok(None) };
-        if let Some(finished) = keeper.finished() {
+        if let Some(Ok(finished)) = self.finishing.as_ref().map(Receiver::try_recv) {
             return finished.map(|path| Some(DownloadReport::Done(path)));
         }
-        if ended.is_some() && !std::mem::replace(&mut self.finishing, true) {
-            keeper.order(Order::Finish)?;
+        if ended.is_some()
+            && let Some(kept) = self.kept.take()
+        {
+            self.finishing = Some(in_a_thread("download", || kept.finish())?);
         }
         Ok(self.next_tenth().map(DownloadReport::Progress))
     }
@@ -128,7 +128,7 @@ impl Downloading {
     fn open(&mut self, crc: u32) -> anyhow::Result<()> {
         let name = self.download.name().unwrap_or_default();
         let (kept, bytes) = Kept::open(&self.folder, self.vehicle.system_id, name, crc)?;
-        self.keeper = Some(Keeper::start(kept)?);
+        self.kept = Some(kept);
         self.download.resume(bytes);
         Ok(())
     }
@@ -253,81 +253,6 @@ impl Shown {
     }
 }
 
-// The thread that has the files of a download. Nothing else waits for the disk: a disk that hangs must not hold up an abort.
-
-/// Most orders that may wait: about a minute of pieces of a radio.
-const MAX_WAITING: usize = 1024;
-
-enum Order {
-    /// The next bytes of the file.
-    Write(Vec<u8>),
-    /// The file is whole.
-    Finish,
-}
-
-/// The disk does not keep up: what has arrived is lost.
-#[derive(Debug, thiserror::Error)]
-#[error("the disk does not keep up with the link; the next download goes on with what is there")]
-struct Behind;
-
-/// A handle to the thread. Without it the thread carries out its orders, and ends.
-#[derive(Debug)]
-struct Keeper {
-    orders: SyncSender<Order>,
-    finished: Receiver<anyhow::Result<PathBuf>>,
-    thread: JoinHandle<()>,
-}
-
-impl Keeper {
-    /// Gives the files to a thread of their own.
-    ///
-    /// # Errors
-    /// No thread can be started.
-    fn start(kept: Kept) -> io::Result<Self> {
-        let (orders, inbox) = sync_channel(MAX_WAITING);
-        let (finish, finished) = sync_channel(1);
-        let thread = std::thread::Builder::new().name("download".to_owned()).spawn(move || {
-            if let Some(ended) = serve(kept, &inbox).transpose() {
-                // The download may have been stopped.
-                let _ = finish.send(ended);
-            }
-        })?;
-        Ok(Self { orders, finished, thread })
-    }
-
-    /// How the thread has ended: where the log is, or why it failed.
-    fn finished(&self) -> Option<anyhow::Result<PathBuf>> {
-        self.finished.try_recv().ok()
-    }
-
-    /// Waits until everything is written.
-    fn close(self) {
-        drop(self.orders);
-        // A panic was printed already.
-        let _ = self.thread.join();
-    }
-
-    /// Gives an order; it never waits.
-    fn order(&self, order: Order) -> Result<(), Behind> {
-        match self.orders.try_send(order) {
-            // A thread that has ended has said why.
-            Ok(()) | Err(TrySendError::Disconnected(_)) => Ok(()),
-            Err(TrySendError::Full(_)) => Err(Behind),
-        }
-    }
-}
-
-/// Carries out orders until the log has its name, or nobody gives any more.
-fn serve(mut kept: Kept, inbox: &Receiver<Order>) -> anyhow::Result<Option<PathBuf>> {
-    while let Ok(order) = inbox.recv() {
-        match order {
-            Order::Write(data) => kept.file.write_all(&data)?,
-            Order::Finish => return kept.finish().map(Some),
-        }
-    }
-    Ok(None)
-}
-
 // The files of a download: the beginning of the log that has arrived, with the checksum of the whole in its name
 // (`.1A2B3C4D.part`), and the log once it is whole. An existing log is never overwritten.
 
@@ -402,23 +327,6 @@ fn checksum(file: &mut File) -> io::Result<u32> {
             return Ok(sum);
         }
         sum = crc::continued(sum, &piece[..read]);
-    }
-}
-
-#[cfg(test)]
-mod keeper_tests {
-    use super::*;
-
-    /// The thread is not there to take anything: as with a disk that hangs.
-    #[test]
-    fn a_disk_that_hangs_fails_the_download_and_holds_nothing_up() {
-        let (orders, _inbox) = sync_channel(2);
-        let (_finish, finished) = sync_channel(1);
-        let thread = std::thread::Builder::new().name("idle".to_owned()).spawn(|| {}).unwrap();
-        let keeper = Keeper { orders, finished, thread };
-        let write = || keeper.order(Order::Write(vec![1]));
-        assert!(write().is_ok() && write().is_ok());
-        assert!(write().is_err());
     }
 }
 

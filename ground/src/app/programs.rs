@@ -87,14 +87,25 @@ pub fn run_alarm_command(command: &str, alarm: &str) -> std::io::Result<()> {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()?;
-    std::thread::Builder::new()
-        .name("alarm command".to_owned())
-        // Waiting only prevents a zombie process; the result is ignored.
-        .spawn(move || drop(child.wait()))
-        .map(drop)
+    // Waiting only prevents a zombie process; the result is ignored.
+    in_a_thread("alarm command", move || child.wait()).map(drop)
 }
 
 // Writes the report of the flight: runs `replay report` on the station's log.
+
+/// Does what takes a while in a thread of its own; the result comes when it is there.
+///
+/// # Errors
+/// No thread can be started.
+pub(super) fn in_a_thread<T: Send + 'static>(
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<Receiver<T>> {
+    let (tell, told) = sync_channel(1);
+    // Nobody may be waiting any more.
+    let work = move || drop(tell.send(work()));
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).map(|_| told)
+}
 
 /// Reports of one log.
 const REPORTS_MAX: u32 = 100;
@@ -108,16 +119,8 @@ pub(super) type Writing = Receiver<Result<String, String>>;
 /// There is no free name, or no thread can be started.
 pub(super) fn begin_report(log: &Path) -> Result<Writing, String> {
     let page = free_name(log).ok_or("there are a hundred reports of this log already")?;
-    let (tell, told) = sync_channel(1);
     let log = log.to_owned();
-    std::thread::Builder::new()
-        .name("report".to_owned())
-        .spawn(move || {
-            // The station may have ended.
-            let _ = tell.send(write_report(&log, &page));
-        })
-        .map_err(|error| error.to_string())?;
-    Ok(told)
+    in_a_thread("report", move || write_report(&log, &page)).map_err(|error| error.to_string())
 }
 
 /// `flight.html`, then `flight-2.html`: nothing is overwritten.

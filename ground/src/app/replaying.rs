@@ -2,7 +2,7 @@
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -12,6 +12,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
 use super::output::{self, Lines, Output};
+use super::programs::in_a_thread;
 use crate::cli::ReplayFrom;
 use crate::config::Config;
 use crate::exit;
@@ -182,15 +183,11 @@ impl Again {
     /// Reads the log in a thread of its own: a long one must not delay the link.
     pub(super) fn begin(&mut self, model: &mut Model, now: Duration) {
         let Some(path) = model.settings.log_path.clone() else { return };
-        let (tell, told) = sync_channel(1);
         let log = path.clone();
-        let started = std::thread::Builder::new().name("replay".to_owned()).spawn(move || {
-            let loaded = Recording::load(log.as_ref(), None, &mut |_| {}).map_err(|error| error.to_string());
-            // The screen may have ended.
-            let _ = tell.send(loaded);
-        });
-        match started {
-            Ok(_) => self.loading = Some((path, told)),
+        let load =
+            move || Recording::load(log.as_ref(), None, &mut |_| {}).map_err(|error| error.to_string());
+        match in_a_thread("replay", load) {
+            Ok(told) => self.loading = Some((path, told)),
             Err(error) => model.warn(now, format!("no replay: {error}")),
         }
     }
