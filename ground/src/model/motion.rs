@@ -1,7 +1,6 @@
 //! The trend of the vehicle's motion, and the path flown.
 
 use std::collections::VecDeque;
-use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 pub use protocol::motion::{Attitude, BodySpeed, Deflection, Motion, NorthEastUp};

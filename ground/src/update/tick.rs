@@ -10,7 +10,8 @@ use protocol::log::v1::Telemetry;
 
 use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
 use crate::model::{
-    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace, unheard_hints,
+    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_extremes, note_trace,
+    unheard_hints,
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
@@ -54,8 +55,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         model.link.unheard_reported = true;
         model.warn(now, hints.join(" "));
     }
-    let silence = model.link.heard_at.map(|at| now.saturating_sub(at));
-    model.history.note_values(&model.vehicle, silence, now);
+    note_extremes(model, now);
     note_trace(model, now);
     alarms::ring_bells(model);
     commands::step_auto(model, now);

@@ -8,7 +8,7 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, commands, pad};
 use crate::model::{
-    Approach, Danger, Ending, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Maxima, Model,
+    Approach, Danger, Ending, Extremes, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Model,
     Parameters, RestOfWord, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted,
     is_flight, is_on_pad, latch_words, words,
 };
@@ -157,7 +157,8 @@ pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
         model.info(now, if armed { "armed (HEARTBEAT)" } else { "disarmed (HEARTBEAT)" });
     }
     // Nothing but a restart leads there.
-    let is_in_its_test = |status: Option<(TdPhase, bool)>| status.map(|(phase, _)| phase == TdPhase::TD_PHASE_SAFE);
+    let is_in_its_test =
+        |status: Option<(TdPhase, bool)>| status.map(|(phase, _)| phase == TdPhase::TD_PHASE_SAFE);
     if (is_in_its_test(before.status), is_in_its_test(after.status)) == (Some(false), Some(true)) {
         note_reset(model, before.words_of_reset(), now);
     }
@@ -210,7 +211,7 @@ pub(super) fn watch_approach(model: &mut Model, now: Duration) {
 fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
     let from = before.map_or_else(String::new, |before| format!("{} -> ", words::phase(before)));
     if is_flight(phase) && !before.is_some_and(is_flight) && !model.outcome.started {
-        model.history.maxima = Maxima::default();
+        model.history.extremes = Extremes::default();
     }
     model.history.note_phase(phase, now);
     model.info(now, format!("phase {from}{}", words::phase(phase)));

@@ -253,7 +253,7 @@ fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
 /// For how long nothing was heard of a flight, if it was long enough to count.
 fn unheard(model: &Model, now: Duration) -> Option<String> {
     let silence_s =
-        model.history.maxima.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64())?;
+        model.history.extremes.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64())?;
     if model.vehicle.in_flight() && !model.link.state(now).carries() {
         return Some("link LOST before touchdown".to_owned());
     }
@@ -262,7 +262,7 @@ fn unheard(model: &Model, now: Duration) -> Option<String> {
 
 /// The title and the greatest values: what happened in a silence is not known.
 fn maxima(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    let most = &model.history.maxima;
+    let extremes = &model.history.extremes;
     let title =
         if unheard(model, now).is_some() { "greatest values heard" } else { "greatest values in flight" };
     let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
@@ -273,17 +273,18 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line
             theme.label(format!(" {unit}")),
         ])
     };
-    let milliseconds = |seconds: Option<f64>| seconds.map(|s| 1_000.0 * s);
+    let [least, greatest] = [0, 1].map(|end| move |name: &str| extremes.of(name).map(|ends| ends[end]));
+    let gimbal = ["gimbal pitch", "gimbal yaw"].into_iter().filter_map(|name| extremes.of(name)).flatten();
     let lines = vec![
-        row("altitude", most.altitude_m, 2, "m"),
-        row("descent speed", most.descent_m_s, 2, "m/s"),
-        row("distance", most.distance_m, 1, "m"),
-        row("tilt", most.tilt_rad.map(f64::to_degrees), 2, "deg"),
-        row("turn rate", most.turn_rate_rad_s.map(f64::to_degrees), 2, "deg/s"),
-        row("gimbal", most.gimbal_rad.map(f64::to_degrees), 2, "deg"),
-        row("solve time", milliseconds(most.solve_time_s), 2, "ms"),
-        row("least margin", milliseconds(most.margin_min_s), 2, "ms"),
-        row("silence", most.silence_s, 1, "s"),
+        row("altitude", greatest("height"), 2, "m"),
+        row("descent speed", least("vertical speed").map(|up| -up), 2, "m/s"),
+        row("distance", greatest("distance"), 1, "m"),
+        row("tilt", greatest("tilt"), 2, "deg"),
+        row("turn rate", greatest("turn rate"), 2, "deg/s"),
+        row("gimbal", gimbal.map(f64::abs).reduce(f64::max), 2, "deg"),
+        row("solve time", greatest("solve time"), 2, "ms"),
+        row("least margin", least("solver margin"), 2, "ms"),
+        row("silence", extremes.silence_s, 1, "s"),
     ];
     (title, lines)
 }
