@@ -11,6 +11,7 @@ mod escape_sequences;
 mod hung_screens;
 mod pasted_keys;
 mod reboot;
+mod removed_logs;
 mod resize;
 mod rig;
 mod standstill;

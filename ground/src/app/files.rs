@@ -2,7 +2,8 @@
 
 use std::fs;
 use std::fs::File;
-use std::io::{ErrorKind, Read as _, Write as _};
+use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -107,8 +108,61 @@ impl SpaceWatch {
     }
 }
 
+/// A log and its open files: what is in them can be read although somebody has removed them.
+pub(super) struct Log {
+    pub(super) recorder: Recorder,
+    files: Vec<(PathBuf, File)>,
+}
+
+impl Log {
+    pub(super) fn of(recorder: Recorder) -> Self {
+        let paths = [Some(recorder.path()), recorder.tlog_path()].into_iter().flatten();
+        let files = paths.filter_map(|path| Some((path.to_owned(), File::open(path).ok()?))).collect();
+        Self { recorder, files }
+    }
+
+    fn removed(&self) -> impl Iterator<Item = &(PathBuf, File)> {
+        let is_there = |path: &Path, file: &File| {
+            let [there, ours] = [fs::metadata(path).ok()?, file.metadata().ok()?];
+            Some((there.dev(), there.ino()) == (ours.dev(), ours.ino()))
+        };
+        self.files.iter().filter(move |(path, file)| is_there(path, file) != Some(true))
+    }
+
+    pub(super) fn is_removed(&self) -> bool {
+        self.removed().next().is_some()
+    }
+
+    /// Takes the names again, for what is in the removed files.
+    pub(super) fn take_names(&self) {
+        for (path, _) in self.removed() {
+            // Somebody else may have the name by now, or the folder is gone: then it is said at the end.
+            let _ = File::create_new(path);
+        }
+    }
+
+    /// Finishes the log, and writes removed files anew under their names.
+    pub(super) fn finish(&self) -> Result<PathBuf, RecorderError> {
+        let path = self.recorder.finish()?;
+        for (path, file) in self.removed() {
+            write_anew(path, file).map_err(|source| RecorderError::Create { path: path.clone(), source })?;
+        }
+        Ok(path)
+    }
+}
+
+fn write_anew(path: &Path, mut file: &File) -> std::io::Result<()> {
+    let mut anew = File::options().append(true).create(true).open(path)?;
+    if anew.metadata()?.len() > 0 {
+        return Err(ErrorKind::AlreadyExists.into());
+    }
+    file.rewind()?;
+    std::io::copy(&mut file, &mut anew)?;
+    anew.sync_data()
+}
+
 /// The log that a guard finishes; a station that begins another log puts it here.
-pub(super) type GuardedLog = Arc<Mutex<Option<Recorder>>>;
+pub(super) type GuardedLog = Arc<Mutex<Option<Log>>>;
 
 /// Finishes the log when it goes out of scope, also while a panic unwinds.
 pub struct LogGuard(GuardedLog);
@@ -116,22 +170,22 @@ pub struct LogGuard(GuardedLog);
 impl LogGuard {
     /// Guards a log, if there is one.
     pub fn new(recorder: Option<Recorder>) -> Self {
-        Self(Arc::new(Mutex::new(recorder)))
+        Self(Arc::new(Mutex::new(recorder.map(Log::of))))
     }
 
     pub(super) fn log(&self) -> GuardedLog {
         Arc::clone(&self.0)
     }
 
-    fn take(&self) -> Option<Recorder> {
+    fn take(&self) -> Option<Log> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Deletes the log again, because the run has failed before it began.
     pub fn discard(self) {
-        if let Some(recorder) = self.take() {
+        if let Some(log) = self.take() {
             // Why the run has failed is being reported.
-            let _ = recorder.discard();
+            let _ = log.recorder.discard();
         }
     }
 
@@ -140,15 +194,15 @@ impl LogGuard {
     /// # Errors
     /// A record could not be written.
     pub fn finish(self) -> Result<Option<PathBuf>, RecorderError> {
-        self.take().map(|recorder| recorder.finish()).transpose()
+        self.take().map(|log| log.finish()).transpose()
     }
 }
 
 impl Drop for LogGuard {
     fn drop(&mut self) {
-        if let Some(recorder) = self.take() {
+        if let Some(log) = self.take() {
             // Another error is already being reported.
-            let _ = recorder.finish();
+            let _ = log.finish();
         }
     }
 }

@@ -1,20 +1,22 @@
-//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody flies.
+//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody flies; also one whose files
+//! somebody has removed.
 //!
 //! Everything that records does so in the run loop, so no frame comes between the two logs: the one before has all until then, the
 //! next one all after it. The book is closed in the one and opened in the other, whose first entry names the log before and the
 //! end of its book.
 
 use std::path::Path;
-use std::sync::PoisonError;
-use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::{MutexGuard, PoisonError};
 use std::time::Duration;
 
 use protocol::book::BookKey;
 use protocol::log::recorder::{Recorder, RecorderError};
 use protocol::log::writer::LogHeader;
 
-use super::files::{GuardedLog, SpaceWatch, open_log};
+use super::files::{GuardedLog, Log, SpaceWatch, open_log};
 use super::output::absolute;
+use super::programs::in_a_thread;
 use super::server::hello;
 use super::station::Station;
 use super::wire::Wire;
@@ -53,19 +55,23 @@ impl NextLog {
 
     /// The log that is written; `None` if none is wanted.
     pub(super) fn present(&self) -> Option<Recorder> {
-        self.guarded.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.guarded().as_ref().map(|log| log.recorder.clone())
+    }
+
+    /// Whether somebody has removed its files.
+    pub(super) fn is_removed(&self) -> bool {
+        self.guarded().as_ref().is_some_and(Log::is_removed)
+    }
+
+    fn guarded(&self) -> MutexGuard<'_, Option<Log>> {
+        self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Writes the end of a log in a thread of its own, because the disk may be slow.
-fn end(log: Recorder) -> Option<Receiver<Result<(), RecorderError>>> {
-    let (tell, told) = sync_channel(1);
-    let ends = move || {
-        // The station may have ended.
-        let _ = tell.send(log.finish().map(drop));
-    };
+fn end(log: Log) -> Option<Receiver<Result<(), RecorderError>>> {
     // Without the thread the last handle is gone, and the recorder ends the log by itself.
-    std::thread::Builder::new().name("log end".to_owned()).spawn(ends).ok().map(|_| told)
+    in_a_thread("log end", move || log.finish().map(drop)).ok()
 }
 
 fn file_name(path: &Path) -> String {
@@ -73,7 +79,7 @@ fn file_name(path: &Path) -> String {
 }
 
 impl Station {
-    /// Begins the next log if the present one is long and nobody flies.
+    /// Begins the next log if the present one is long and nobody flies, or at once if it was removed.
     pub(super) fn keep_logs_short(&mut self, model: &mut Model, wire: &mut Wire) {
         let now = self.clock.now();
         let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
@@ -85,7 +91,14 @@ impl Station {
         }
         let is_long = self.log_space.bytes() >= LONG_BYTES;
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
-        if is_long && !waits && model.may_change_log(now) {
+        // A demonstration has one log, in which its vehicle writes, too: that is written anew at the end.
+        let is_removed = model.log.removed && self.next_log.is_removed();
+        if is_removed && !waits && !model.settings.demonstration {
+            if let Some(log) = &*self.next_log.guarded() {
+                log.take_names();
+            }
+            self.change_log(model, wire);
+        } else if is_long && !waits && model.may_change_log(now) {
             self.change_log(model, wire);
         }
     }
@@ -93,7 +106,7 @@ impl Station {
     fn change_log(&mut self, model: &mut Model, wire: &mut Wire) {
         let now = self.clock.now();
         // What has failed is told to the crew, and not hidden by a new log.
-        let Some(before) = self.recorder.clone().filter(Recorder::is_whole) else { return };
+        let Some(before) = self.recorder.as_ref().filter(|log| log.is_whole()) else { return };
         let before_name = file_name(before.path());
         let NextLog { names: (log, tlog), header, .. } = &self.next_log;
         let mut header = header.clone();
@@ -108,10 +121,10 @@ impl Station {
         };
         self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
         let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
-        *self.next_log.guarded.lock().unwrap_or_else(PoisonError::into_inner) = Some(next.clone());
+        let before = self.next_log.guarded().replace(Log::of(next.clone()));
         wire.record_into(next.clone());
         (self.recorder, self.log_space) = (Some(next.clone()), SpaceWatch::default());
-        self.next_log.ending = end(before);
+        self.next_log.ending = before.and_then(end);
         self.open_book(model, &format!(", after {before_name}{end_of_book}"));
         let path = |path: &Path| absolute(&path.display().to_string());
         let (log, tlog) = (path(next.path()), next.tlog_path().map(path));

@@ -170,6 +170,9 @@ pub fn closing(
     if let Some(words) = headline::banner(model, now) {
         let _ = writeln!(text, "{}", words.sentence());
     }
+    if model.vehicle.log_has_stopped() {
+        text.push_str("the vehicle's own log has stopped: it does not have the whole flight\n");
+    }
     if model.log.dropped > 0 {
         let _ = writeln!(text, "log: {} records dropped", model.log.dropped);
     }

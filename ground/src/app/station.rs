@@ -185,7 +185,7 @@ impl Station {
 
     /// Reports who can command, if that has changed.
     fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
-        let own = self.output.screen.is_some().then(|| (&model.settings.seat, &self.own));
+        let own = self.output.screen.is_some().then_some((&model.settings.seat, &self.own));
         let attached = self.screens.iter().filter(|screen| !screen.watch);
         let all = own.into_iter().chain(attached.map(|screen| (&screen.seat, &screen.answers)));
         let (mut seats, mut silent) = (Vec::new(), Vec::new());
@@ -244,8 +244,7 @@ impl Station {
             }
             ServerEvent::FromScreen(by, ToStation::Request(request)) => vec![Msg::Asked { request, by }],
             ServerEvent::FromScreen(by, ToStation::Here) => {
-                let heard = self.screens.iter_mut().filter(|screen| screen.seat == by);
-                heard.for_each(|screen| screen.answers.hear());
+                self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.hear());
                 Vec::new()
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
@@ -290,6 +289,7 @@ impl Station {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
             failed: !recorder.is_whole(),
+            removed: self.next_log.is_removed(),
             space: self.log_space.look(recorder, self.clock.now()),
         });
         let health = (health != model.log).then_some(Msg::Log(health));

@@ -245,7 +245,11 @@ mod tests {
     /// No memory is taken for what is not there.
     #[test]
     fn a_wrong_count_ends_with_the_bytes() {
-        let mut bytes = encode_to_screen(&ToScreen::Msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() }), Duration::ZERO).unwrap();
+        let mut bytes = encode_to_screen(
+            &ToScreen::Msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() }),
+            Duration::ZERO,
+        )
+        .unwrap();
         bytes.pop();
         bytes.extend([0xFF; 9]);
         bytes.push(1);
@@ -364,11 +368,11 @@ mod tests {
             any::<u16>().prop_map(Msg::HeardFrom),
             (vec(link(), 0..4), option::of(signing()))
                 .prop_map(|(links, signing)| Msg::Links { links, signing }),
-            (any::<u64>(), any::<bool>(), any::<Option<(u64, u32)>>()).prop_map(
-                |(dropped, failed, space)| {
+            (any::<u64>(), any::<[bool; 2]>(), any::<Option<(u64, u32)>>()).prop_map(
+                |(dropped, [failed, removed], space)| {
                     let space =
                         space.map(|(free_bytes, grows_bytes_s)| LogSpace { free_bytes, grows_bytes_s });
-                    Msg::Log(LogHealth { dropped, failed, space })
+                    Msg::Log(LogHealth { dropped, failed, removed, space })
                 }
             ),
             (kind, seat()).prop_map(|(kind, by)| Msg::command(kind, by)),

@@ -28,6 +28,8 @@ pub struct LogHealth {
     /// Records dropped because the queue was full.
     pub dropped: u64,
     pub failed: bool,
+    /// Somebody has removed its files.
+    pub removed: bool,
     /// `None` if it is not known.
     pub space: Option<LogSpace>,
 }
@@ -83,11 +85,12 @@ impl Model {
         if self.settings.log_path.is_none() || self.playing.is_some() {
             return LogStanding::None;
         }
-        let LogHealth { dropped, failed, space } = self.log;
+        let LogHealth { dropped, failed, removed, space } = self.log;
         let loses = self.log_loses_at.is_some_and(|at| now.saturating_sub(at) < LOSES_FOR);
         match space {
             _ if failed => LogStanding::Unfit(LogFault::Failed, "FAILED: nothing is recorded".to_owned()),
             _ if loses => LogStanding::Unfit(LogFault::Loses, format!("loses records, {dropped} so far")),
+            _ if removed => LogStanding::Warned("was REMOVED: it goes on in new files".to_owned()),
             Some(space) if space.is_less_than(1) => LogStanding::Unfit(LogFault::Full, space.words()),
             Some(space) if space.is_less_than(WARNED_TIMES) => LogStanding::Warned(space.words()),
             _ if dropped > 0 => LogStanding::Warned(format!("has lost {dropped} records")),
@@ -199,12 +202,6 @@ impl Events {
         }
         self.kept.push_back(Event { at, speaker, level, text });
         self.total += 1;
-    }
-
-    /// The events up to a time.
-    pub(crate) fn until(&self, at: Duration) -> Self {
-        let kept = self.kept.iter().filter(|event| event.at <= at).cloned().collect();
-        Self { kept, total: self.total }
     }
 
     /// How many events there were since the start, including dropped ones.

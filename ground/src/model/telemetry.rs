@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
-    TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_PREDICTED_PATH_DATA, TdLimit,
-    TdStart,
+    HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
+    SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
+    TD_PREDICTED_PATH_DATA, TdLimit, TdStart,
 };
 use protocol::mission::MissionHash;
 pub use protocol::told::{phase_from_number, phase_of};
@@ -105,6 +105,15 @@ impl Vehicle {
             volts: f64::from(data.voltage_battery) / 1e3,
             percent: u8::try_from(data.battery_remaining).ok(),
         }))
+    }
+
+    /// Whether it says that its own log does not run.
+    pub fn log_has_stopped(&self) -> bool {
+        const LOG: MavSysStatusSensor = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
+        self.last::<SYS_STATUS_DATA>().is_some_and(|Sample { value, .. }| {
+            value.onboard_control_sensors_present.contains(LOG)
+                && !value.onboard_control_sensors_health.contains(LOG)
+        })
     }
 
     /// Free space for the vehicle's log, MiB.

@@ -219,9 +219,10 @@ fn failed_check(model: &Model) -> Option<String> {
 
 /// Before the self-test is over a log may still be about to begin.
 fn vehicle_log(model: &Model) -> Option<String> {
-    let phase = model.vehicle.phase_now();
-    if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
-        return None;
+    let phase = model.vehicle.phase_now().filter(|phase| *phase != TdPhase::TD_PHASE_SAFE)?;
+    if !is_on_pad(phase) {
+        let words = "VEHICLE LOG has stopped: this flight is not recorded whole";
+        return model.vehicle.log_has_stopped().then(|| words.to_owned());
     }
     if fails(model, TdCheck::TD_CHECK_LOG) {
         return Some("VEHICLE LOG not running".to_owned());

@@ -286,6 +286,10 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     if health.failed && !model.log.failed {
         model.say(now, Speaker::Ground, EventLevel::Error, "the log has failed: nothing more is recorded");
     }
+    if health.removed && !model.log.removed {
+        let text = "somebody has removed the log: what is recorded in it is written anew under its name";
+        model.say(now, Speaker::Ground, EventLevel::Error, text);
+    }
     if health.dropped > 0 && model.log.dropped == 0 {
         model.warn(now, "the log cannot keep up: records are dropped");
     }

@@ -7,7 +7,10 @@ use ground::model::{AlarmKind, CommandKind, RING_EVERY, Role, Settings};
 use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
 use ground::view::headline::pad;
-use protocol::dialect::{MavCmd, TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdPhase};
+use protocol::dialect::{
+    MavCmd, MavMessage, MavSysStatusSensor, SYS_STATUS_DATA, TdAbortEffect, TdCheck, TdControlLevel,
+    TdInterlock, TdPhase,
+};
 use protocol::signing::SigningCounters;
 
 use crate::keys::ladder;
@@ -50,6 +53,29 @@ fn an_alarm_that_has_ended_stays_until_it_is_acknowledged() {
     assert!(screen.contains(" ended alarm: LINK LOST") && screen.contains(" ended 1 s ago"), "{screen}");
     rig.key(Key::Char(' '));
     assert!(!rig.screen(80, 24).contains("ALARM"));
+}
+
+/// Its card is full soon after the lift-off.
+#[test]
+fn a_log_of_the_vehicle_that_stops_in_flight_is_an_alarm_that_stays() {
+    let mut rig = Rig::crewed();
+    (rig.phase, rig.armed) = (TdPhase::TD_PHASE_BOOST, true);
+    let log = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
+    let status = |health| {
+        MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+            onboard_control_sensors_present: log,
+            onboard_control_sensors_health: health,
+            ..SYS_STATUS_DATA::default()
+        })
+    };
+    rig.hear(&status(log));
+    rig.run(1.0);
+    let is_told = |rig: &Rig| rig.model.alarms.is_unseen(AlarmKind::VehicleLog);
+    assert!(!is_told(&rig));
+    rig.hear(&status(MavSysStatusSensor::empty()));
+    rig.run(30.0);
+    assert!(is_told(&rig) && rig.model.vehicle.log_has_stopped());
+    assert!(rig.screen(100, 30).contains("ALARM VEHICLE LOG has stopped: this flight is not recorded whole"));
 }
 
 /// Boot number and clock go on: the vehicle was not switched off.

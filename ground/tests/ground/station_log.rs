@@ -16,7 +16,7 @@ fn health(free_mib: u64, grows_bytes_s: u32) -> LogHealth {
     LogHealth { space, ..LogHealth::default() }
 }
 
-const FAILED: LogHealth = LogHealth { dropped: 0, failed: true, space: None };
+const FAILED: LogHealth = LogHealth { dropped: 0, failed: true, removed: false, space: None };
 
 fn enter(word: &str) -> Vec<Key> {
     [typed(word), vec![Key::Enter]].concat()
