@@ -28,8 +28,6 @@ const MAX_AHEAD: u64 = 24 * 3600 * STAMPS_PER_S;
 /// 2026-01-01 00:00 UTC, 4,018 days after 2015-01-01. This program is newer, so a clock that shows an earlier time
 /// was never set.
 const PROGRAM_WRITTEN: u64 = 4_018 * 24 * 3600 * STAMPS_PER_S;
-/// RADIO_STATUS, a radio's report about itself; it is the only message that is accepted unsigned.
-const RADIO_STATUS_ID: u32 = 109;
 
 /// A secret signing key.
 #[derive(Clone, PartialEq, Eq)]
@@ -241,9 +239,6 @@ impl Signing {
     /// # Errors
     /// The frame must not be acted on; the error says why.
     pub fn check(&mut self, frame: &Frame, clock: u64) -> Result<(), Rejection> {
-        if frame.message_id() == RADIO_STATUS_ID && !frame.is_signed() {
-            return Ok(());
-        }
         let outcome = self.judge(frame, clock);
         self.counters.count(outcome);
         outcome

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
-use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA};
+use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
 use protocol::frame::{Encoder, Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::signing::{Anchor, Key, Lockouts, Memory, MemoryError, Rejection, Signing, stamp_of};
@@ -74,14 +74,6 @@ fn unsigned_wrong_and_old_frames_are_rejected_and_counted() {
     assert_eq!(vehicle.check(&side(7).sign(&beat(), 0, NOW - 59 * SECOND), NOW), Ok(()));
     let counters = vehicle.counters();
     assert_eq!((counters.unsigned, counters.wrong, counters.too_old), (1, 1, 1));
-}
-
-#[test]
-fn a_radio_s_own_report_needs_no_signature() {
-    let radio = MavMessage::RADIO_STATUS(RADIO_STATUS_DATA::default());
-    let mut vehicle = side(7);
-    assert_eq!(vehicle.check(&Encoder::new(GROUND).encode(&radio), NOW), Ok(()));
-    assert_eq!(vehicle.counters().accepted, 0);
 }
 
 #[test]

@@ -137,10 +137,31 @@ fn a_sender_is_accepted_only_for_a_valid_frame() {
     let radio = MavMessage::RADIO_STATUS(crate::dialect::RADIO_STATUS_DATA::default());
     assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), []);
     assert_eq!(believed(&mut hub, signed_by(8)), []);
-    let report = Encoder::new(VEHICLE).encode(&radio).as_bytes().to_vec();
-    assert_eq!(believed(&mut hub, report), [], "the message that may be unsigned does not prove its sender");
+    let report = Encoder::new(RADIO).encode(&radio).as_bytes().to_vec();
+    let mut serial = Hub::new(1, key(7)).over(&[Some(5_760)]);
+    assert_eq!(
+        believed(&mut serial, report),
+        [],
+        "the message that may be unsigned does not prove its sender"
+    );
     assert_eq!(believed(&mut hub, signed_by(7)), sender);
     assert_eq!(believed(&mut hub, signed_by(7)), [], "replayed");
+}
+
+/// Over a network anybody could thin a signed line with it.
+#[test]
+fn a_radio_reports_without_a_signature_on_its_serial_line_alone() {
+    let radio = MavMessage::RADIO_STATUS(crate::dialect::RADIO_STATUS_DATA::default());
+    let report = Encoder::new(RADIO).encode(&radio);
+    for (key, carried, is_taken) in
+        [(true, Some(5_760), true), (true, None, false), (false, Some(5_760), true), (false, None, true)]
+    {
+        let signing = key.then(|| Signing::new(Key::new([7; Key::LEN]), Memory::default()));
+        let mut hub = Hub::new(1, signing).over(&[carried]);
+        let report = Received::Stream(0, report.as_bytes().to_vec());
+        let news = of_frames(hub.take(0, report, ms(0), CLOCK));
+        assert_eq!(matches!(news[..], [LinkEvent::Frame(_)]), is_taken, "{key} {carried:?}: {news:?}");
+    }
 }
 
 /// An observer who repeats an operator's frame over another link, with the key that all share, hides nothing.
