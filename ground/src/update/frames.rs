@@ -16,6 +16,8 @@ const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
 /// A station that the vehicle heard this recently, ms, still counts as one that uses our address.
 const SAME_ID_WITHIN_MS: u16 = 5_000;
+/// The vehicle tells of a station for 5 s after it has ended. The rest is for the report and its way.
+const OUR_PAST_FOR: Duration = Duration::from_secs(7);
 /// How many other systems are remembered, so that each is reported once.
 const STRANGERS_MAX: usize = 8;
 
@@ -193,7 +195,9 @@ fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     }
     let is_ours = to_all || data.session == settings.session || settings.role == Role::Replaying;
     let another = data.session != 0 && data.accepted_age_ms <= SAME_ID_WITHIN_MS;
-    if settings.role != Role::Replaying && (data.same_id > 0 || (!is_ours && another)) {
+    // Until then it may be this station before it was started again; the vehicle arms for nobody meanwhile.
+    let is_told = now >= OUR_PAST_FOR && settings.role != Role::Replaying;
+    if is_told && (data.same_id > 0 || (!is_ours && another)) {
         let age = if is_ours { 0 } else { data.accepted_age_ms };
         let at = now.saturating_sub(Duration::from_millis(age.into()));
         link.same_id_at = link.same_id_at.max(Some(at));

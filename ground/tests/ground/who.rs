@@ -269,6 +269,7 @@ fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_is_gon
     let signs: [fn(&mut Rig); 3] = [frame, of_another, counted];
     for sign in signs {
         let mut rig = Rig::crewed();
+        rig.run(7.0);
         sign(&mut rig);
         rig.run(0.2);
         let screen = rig.screen(100, 30);
@@ -280,6 +281,22 @@ fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_is_gon
         rig.keys(&ladder());
         assert!(rig.take_commands().iter().any(is_arm));
     }
+}
+
+/// Started again with the same ids: the vehicle tells of the station before for 5 s.
+#[test]
+fn a_station_that_is_started_again_does_not_take_its_past_for_another_station() {
+    let mut rig = Rig::crewed();
+    for tenth in 0..50 {
+        report(&mut rig, 5, 0, false, 100 * tenth);
+        report(&mut rig, SESSION, 1, false, 100);
+        rig.run(0.1);
+        assert!(!rig.screen(100, 30).contains("another station uses our id"), "{tenth}");
+    }
+    rig.run(5.0);
+    report(&mut rig, SESSION, 1, false, 100);
+    rig.run(0.2);
+    assert!(rig.screen(100, 30).contains("ALARM another station uses our id"), "it is another one");
 }
 
 #[test]
