@@ -327,6 +327,41 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     assert!(!output.contains("ABORT"), "{output}");
 }
 
+/// The vehicle accepts both: it is so. A station that has heard before its Enter that it is armed sends nothing, and says so.
+#[test]
+fn two_stations_that_arm_at_once_are_both_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut vehicle = Running::start(vehicle(folder.path(), &["udpin:127.0.0.1:0"]).arg("--stay"));
+    let link = vehicle.udp_link();
+    let station = |system: &str| {
+        let command = ground(folder.path(), &["--connect", &link, "--log", "none", "--sysid", system]);
+        Terminal::start(&command, SIZE, false)
+    };
+    let mut both = [station("255"), station("254")];
+    for screen in &both {
+        screen.wait_for("every arming check passes");
+    }
+    for screen in &mut both {
+        screen.type_by_hand(b"0AARM");
+    }
+    for screen in &mut both {
+        screen.type_bytes(b"\r");
+    }
+    for screen in &mut both {
+        // On a busy machine keys arrive together.
+        screen.confirm_if_asked(" ARMED ");
+    }
+    for screen in &both {
+        screen.wait_until("an answer to ARM", |window| {
+            let facts = window.facts_about("ARM");
+            let accepted = facts.is_some_and(|facts| facts.contains("acknowledged accepted  observed yes"));
+            (accepted || window.shows("cannot arm: armed already")).then_some(())
+        });
+    }
+    vehicle.signal(Signal::SIGTERM);
+    vehicle.wait();
+}
+
 /// The one that armed and started is killed in the countdown; the other one's heartbeats, under the same id, do not stand in
 /// for it.
 #[test]

@@ -333,7 +333,10 @@ pub fn why_not_here(model: &Model) -> Option<String> {
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     let uplink = &model.link.uplink;
     why_not_reached(model, now)
-        .or_else(|| model.vehicle.is_armed().then(|| "armed already".to_owned()))
+        .or_else(|| {
+            let by = uplink.armed_by_other.map(|by| format!(", by {}/{}", by.system_id, by.component_id));
+            model.vehicle.is_armed().then(|| format!("armed already{}", by.unwrap_or_default()))
+        })
         .or_else(|| model.vehicle.wait_before(now).map(|away| format!("do not approach{}", away.reason())))
         .or_else(|| {
             (!uplink.is_proven(now)).then(|| format!("the uplink is not proven: {}", uplink.why_unheard()))
