@@ -179,7 +179,7 @@ pub enum Command {
         station: Box<StationArgs>,
     },
     /// A screen for a station in another process on this machine. Quitting does not affect the station.
-    #[command(after_help = "Examples:\n  ground attach\n  ssh station.local -t ground attach --watch")]
+    #[command(after_help = "Examples:\n  ground attach\n  ground attach --watch")]
     Attach(AttachArgs),
     /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
     ///

@@ -314,7 +314,8 @@ fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
         drop(shown.reading.lock());
         shown.lock().take(&buffer[..length]);
         shown.changed.notify_all();
-        let asked = |query: &[u8]| buffer[..length].windows(query.len()).filter(|bytes| *bytes == query).count();
+        let asked =
+            |query: &[u8]| buffer[..length].windows(query.len()).filter(|bytes| *bytes == query).count();
         let mut answers = STATUS_ANSWER.repeat(asked(STATUS_QUERY));
         if asked(REPEATS_QUERY) > 0 {
             answers.extend(if tells_repeats { REPEATS_ANSWER } else { &[] });

@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use e2e::{
-    Impairment, Program, Running, Signal, Terminal, UdpProxy, program, raw_frames_of,
-};
+use e2e::{Impairment, Program, Running, Signal, Terminal, UdpProxy, program, raw_frames_of};
 use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA};
 use protocol::frame::Framer;
 
@@ -63,11 +61,8 @@ impl Field {
         let attach = |options: &[&str], size| {
             Terminal::start(crate::ground(&folder).arg("attach").args(options), size, false)
         };
-        let screens = [
-            attach(&[], (80, 24)),
-            attach(&["--watch"], (140, 45)),
-            attach(&["--watch"], (200, 60)),
-        ];
+        let screens =
+            [attach(&[], (80, 24)), attach(&["--watch"], (140, 45)), attach(&["--watch"], (200, 60))];
         Ok(Self { folder, proxy, station, screens, flights: 0 })
     }
 

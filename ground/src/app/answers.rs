@@ -50,10 +50,7 @@ pub(super) fn has_answered() -> bool {
 /// The system gives no pseudo-terminal.
 pub(super) fn begin() -> io::Result<()> {
     let stdin = io::stdin().as_fd().try_clone_to_owned()?;
-    let typed = match isatty(&stdin) {
-        true => File::from(stdin.try_clone()?),
-        false => File::open("/dev/tty")?,
-    };
+    let typed = if isatty(&stdin) { File::from(stdin.try_clone()?) } else { File::open("/dev/tty")? };
     let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
     rustix::io::fcntl_setfd(&ours, rustix::io::FdFlags::CLOEXEC)?;
     grantpt(&ours)?;

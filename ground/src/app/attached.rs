@@ -67,10 +67,7 @@ pub async fn session(
         check_version(&told)?;
         take(&mut model, told, at, viewer);
     }
-    if !interactive {
-        print(LINES_ONLY)?;
-    }
-    let mut output = Output::open(interactive, config)?;
+    let mut output = open_output(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -161,6 +158,13 @@ pub async fn session(
     Ok(exit::decide(&model.outcome, true))
 }
 
+fn open_output(interactive: bool, config: &Config) -> anyhow::Result<Output> {
+    if !interactive {
+        print(LINES_ONLY)?;
+    }
+    Output::open(interactive, config)
+}
+
 fn check_version(told: &ToScreen) -> anyhow::Result<()> {
     if let ToScreen::Hello(hello) = told {
         let (ours, theirs) = (VERSION, hello.version);
@@ -191,10 +195,8 @@ async fn act(
     let mut quit = false;
     for action in actions {
         match action {
-            Action::Request(request) => {
-                if !link.ask(&ToStation::Request(request)).await {
-                    report_unsent(model, request, now);
-                }
+            Action::Request(request) if !link.ask(&ToStation::Request(request)).await => {
+                report_unsent(model, request, now);
             }
             Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
                 link.ask(&ToStation::Key(action.detail)).await;
@@ -206,19 +208,7 @@ async fn act(
             }
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
-            Action::Send(_)
-            | Action::Record(_)
-            | Action::KeepChecklist(_)
-            | Action::RefuseSignature(_)
-            | Action::Enter(_)
-            | Action::KeepPlace(_)
-            | Action::WriteReport
-            | Action::FetchLog
-            | Action::ReplayFlight
-            | Action::SyncLog
-            | Action::Alarm(_)
-            | Action::Tell(_)
-            | Action::LeaveScreen => {}
+            _ => {}
         }
     }
     quit
@@ -236,27 +226,25 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
 
 /// Tells the crew that a request has not reached any station.
 fn report_unsent(model: &mut Model, request: Request, now: Duration) {
-    let text = match request {
-        Request::Command(CommandKind::Abort) => {
-            // Stays in the alarm line of every page until there is a station again.
-            model.link.abort_unsent = true;
-            "ABORT NOT SENT: this screen has no station; asked again as soon as there is one".to_owned()
-        }
-        Request::Command(kind) => format!("{} NOT SENT: this screen has no station", kind.name()),
+    let what = match request {
+        Request::Command(kind) => &format!("{} NOT SENT", kind.name()),
         Request::Acknowledge(kind) => {
             model.alarms.acknowledge(kind);
             return;
         }
-        Request::Sign { step, .. } => {
-            format!("step {} NOT SIGNED: this screen has no station", u32::from(step) + 1)
-        }
-        Request::Report => "no report: this screen has no station".to_owned(),
-        Request::Choose(_) => "no vehicle is chosen: this screen has no station".to_owned(),
-        Request::RangeTest => "no range test: this screen has no station".to_owned(),
-        Request::WithoutLog | Request::Untested => "nothing goes on: this screen has no station".to_owned(),
-        Request::Download => "no download: this screen has no station".to_owned(),
+        Request::Sign { step, .. } => &format!("step {} NOT SIGNED", u32::from(step) + 1),
+        Request::Report => "no report",
+        Request::Choose(_) => "no vehicle is chosen",
+        Request::RangeTest => "no range test",
+        Request::WithoutLog | Request::Untested => "nothing goes on",
+        Request::Download => "no download",
         Request::Parameters => return,
     };
+    let is_abort = request == Request::Command(CommandKind::Abort);
+    // Stays in the alarm line of every page until there is a station again.
+    model.link.abort_unsent |= is_abort;
+    let later = if is_abort { "; asked again as soon as there is one" } else { "" };
+    let text = format!("{what}: this screen has no station{later}");
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 

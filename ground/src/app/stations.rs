@@ -40,7 +40,8 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
     let armed = vehicle.is_armed();
     let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
-    let watching = screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
+    let watching =
+        screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
     let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
     let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
     StationStatus {

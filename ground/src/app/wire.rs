@@ -146,8 +146,8 @@ impl Wire {
         let stood = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
         (stood >= STOOD_STILL).then(|| {
             self.old_until = now + WAITED_FOR;
-            let seconds = stood.as_secs_f64();
-            Msg::LinkSays(format!("this station stood still for {seconds:.1} s: what waited is in the log only"))
+            let stood_s = stood.as_secs();
+            Msg::LinkSays(format!("this station stood still for {stood_s} s: what waited is in the log only"))
         })
     }
 

@@ -334,7 +334,7 @@ pub fn unheard_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
     hints.extend(refused_frames(model, now));
     let others: Vec<String> = model.link.strangers.iter().map(|other| other.system_id.to_string()).collect();
     if !others.is_empty() {
-        hints.push(format!("Heard instead: system {}. Choose it with --vehicle.", others.join(", ")));
+        hints.push(format!("Heard instead: system {}. Choose it with --vehicle-sysid.", others.join(", ")));
     } else if framing.frames == 0 && framing.garbage_bytes > 0 {
         hints.push("Bytes come, but no MAVLink: is the baud rate right?".to_owned());
     }

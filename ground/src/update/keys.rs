@@ -15,10 +15,9 @@ use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
 use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
-    KeyOrigin, LogStanding, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
-    Standing, TextEntry, overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check,
-    why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves,
-    why_untested,
+    KeyOrigin, LogStanding, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry,
+    overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check, why_not_confirm,
+    why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 use crate::update;
 
