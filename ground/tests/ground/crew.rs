@@ -155,6 +155,25 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     assert!(rig.screen(80, 24).contains("; TOO LATE to hold"), "{}", rig.screen(80, 24));
 }
 
+/// The station has waited for its answer already.
+#[test]
+fn a_countdown_whose_only_screen_does_not_answer_is_held_at_once() {
+    let mut rig = counting();
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: vec![anna()] });
+    rig.run(0.1);
+    assert!(holds(&mut rig) > 0);
+    assert!(
+        rig.events().contains("does not answer, so it does not count: screen 1, anna"),
+        "{}",
+        rig.events()
+    );
+    // Somebody else who answers is enough.
+    let mut rig = counting();
+    rig.msg(Msg::Crew { seats: vec![ben()], silent: vec![anna()] });
+    rig.run(5.0);
+    assert_eq!(holds(&mut rig), 0);
+}
+
 #[test]
 fn a_crew_that_returns_in_time_prevents_the_hold() {
     let mut rig = counting();
