@@ -59,6 +59,8 @@ pub enum AlarmKind {
     VehicleLog,
     /// The last check on the pad found something outside its limit.
     CheckFailed,
+    /// It is armed, and an arming check fails.
+    Unfit,
     /// The countdown has reached zero while the vehicle was not heard.
     MayBeFlying,
 }
@@ -78,6 +80,7 @@ impl AlarmKind {
             | Self::LinkDown
             | Self::LiveMotor
             | Self::Held
+            | Self::Unfit
             | Self::Aborted
             | Self::NoLight
             | Self::Rebooted => 1,

@@ -379,6 +379,7 @@ pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| (!model.vehicle.is_armed()).then(|| "not armed".to_owned()))
         .or_else(|| why_no_key(model))
         .or_else(|| why_not_in(model, |phase| phase == TdPhase::TD_PHASE_PAD_ARMED))
+        .or_else(|| model.vehicle.unfit().map(|(_, words)| format!("NO-GO: {words}")))
         .or_else(|| model.why_no_log(now))
 }
 

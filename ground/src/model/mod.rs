@@ -6,6 +6,7 @@
 mod act;
 mod alarm;
 mod checklist;
+mod checks;
 mod command;
 mod crew;
 pub mod dead_reckoning;
@@ -40,6 +41,7 @@ use serde::{Deserialize, Serialize};
 pub use act::*;
 pub use alarm::*;
 pub use checklist::*;
+pub use checks::*;
 pub use command::*;
 pub use crew::*;
 pub use dialog::*;

@@ -233,7 +233,9 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
         TdHold::TD_HOLD_NONE => return None,
         TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 1 s"),
         TdHold::TD_HOLD_STATION_DEAF => format!("{whom} did not hear the vehicle for 1 s"),
-        TdHold::TD_HOLD_CHECK_FAILED => "a check of the vehicle fails".to_owned(),
+        TdHold::TD_HOLD_CHECK_FAILED => {
+            vehicle.held_for().map_or_else(|| "a check of the vehicle fails".to_owned(), |(_, words)| words)
+        }
         TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
             Some(who) => format!("{who} asked for it"),
             None => "a station asked for it".to_owned(),

@@ -30,6 +30,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         MavMessage::TD_FLIGHT_STATUS(_) => {
             vehicle.status = vehicle.told.status().map(|status| Sample::new(status.clone(), now));
+            vehicle.note_checks();
         }
         MavMessage::ATTITUDE_QUATERNION(data) => {
             if let Some(attitude) = Attitude::of(data) {

@@ -12,7 +12,8 @@ use protocol::mission::MissionHash;
 use protocol::told::Told;
 
 use super::{
-    Attitude, BodySpeed, Boot, Deflection, FlownPath, Foreign, KeepAway, Motion, PadCheck, Touchdown, Trend,
+    Attitude, BodySpeed, Boot, Deflection, FlownPath, Foreign, KeepAway, Motion, PadCheck, ToldChecks,
+    Touchdown, Trend,
 };
 
 /// A value older than this is marked as stale.
@@ -115,6 +116,8 @@ pub struct Vehicle {
     pub(super) payloads: BTreeMap<u32, Sample<Vec<u8>>>,
     pub heartbeat: Option<Sample<Heartbeat>>,
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
+    /// What it has told of its arming checks in words.
+    pub(super) checks: ToldChecks,
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
     /// What goes into the log's record of it.

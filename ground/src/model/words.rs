@@ -99,13 +99,18 @@ fn impact(speed_m_s: u8) -> String {
 
 /// The name of an arming check. The vehicle's log is named as such, because the station has one of its own.
 pub fn check(name: &str) -> String {
-    let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+    let words = lower_case_name(name);
     if words.starts_with("log") { format!("vehicle {words}") } else { words }
 }
 
-/// The names of the failing checks.
-pub fn failed_checks(checks: TdCheck) -> Vec<String> {
-    checks.iter_names().map(|(name, _)| check(name)).collect()
+/// The name of a check in the words of the vehicle.
+pub fn lower_case_name(name: &str) -> String {
+    name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ")
+}
+
+/// Whether a check is of the vehicle's log.
+pub fn is_of_the_log(check: TdCheck) -> bool {
+    (TdCheck::TD_CHECK_LOG | TdCheck::TD_CHECK_LOG_SPACE).contains(check)
 }
 
 /// A number with fixed decimals; `--` for NaN and infinity.
@@ -169,10 +174,8 @@ mod tests {
     }
 
     #[test]
-    fn failing_checks_are_named() {
-        let failing = TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_LOG_SPACE;
-        assert_eq!(failed_checks(failing), ["pin", "vehicle log space"]);
-        assert!(failed_checks(TdCheck::empty()).is_empty());
+    fn checks_are_named() {
+        assert_eq!(["TD_CHECK_PIN", "TD_CHECK_LOG_SPACE"].map(check), ["pin", "vehicle log space"]);
     }
 }
 

@@ -167,6 +167,8 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
         found.push((AlarmKind::Held, words));
     }
+    let unfit = vehicle.unfit_while_armed();
+    found.extend(unfit.map(|(_, words)| (AlarmKind::Unfit, format!("ARMED, and NO-GO: {words}"))));
     found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
     found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
     found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
@@ -352,21 +354,22 @@ fn call_height(model: &mut Model, now: Duration) {
 /// GO and NO-GO on the pad, once the vehicle has reported its checks.
 fn call_readiness(model: &mut Model, now: Duration) {
     let status = model.vehicle.status.as_ref().filter(|status| !status.is_stale(now));
-    let Some(status) = status.filter(|status| is_on_pad(status.value.phase)) else { return };
-    let failing = words::failed_checks(status.value.checks_failed);
+    if !status.is_some_and(|status| is_on_pad(status.value.phase)) {
+        return;
+    }
+    let failing = model.vehicle.why_no_go();
     let no_log = model.why_no_log(now);
     let link = why_not_reached(model, now).is_none() && model.link.uplink.is_proven(now);
     let untested = why_untested(model).is_some();
-    let go = failing.is_empty() && no_log.is_none() && !untested && link;
+    let go = failing.is_none() && no_log.is_none() && !untested && link;
     let Some(before) = model.called.go.replace(go).filter(|before| *before != go) else { return };
     if before {
         let why = match no_log {
-            _ if !failing.is_empty() => failing.join(", "),
             Some(_) => "station log".to_owned(),
             None if untested => "motor untested".to_owned(),
             None => "link".to_owned(),
         };
-        call(model, Amount::Few, format!("no go: {why}"), WRONG);
+        call(model, Amount::Few, format!("no go: {}", failing.unwrap_or(why)), WRONG);
     } else {
         call(model, Amount::Normal, "go", 0);
     }

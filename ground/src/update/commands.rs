@@ -294,7 +294,8 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
             _ => arm_if_ready(model, not_before, now),
         },
         AutoStep::WaitForArmed => {
-            if armed && model.vehicle.is_simulated() && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
+            let ready = model.vehicle.is_simulated() && model.vehicle.unfit().is_none();
+            if armed && ready && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
                 start_auto(model, now);
             }
         }
@@ -359,11 +360,10 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
     if !model.vehicle.is_simulated() {
         return Some("the vehicle has not reported that it is simulated".to_owned());
     }
-    let failing = words::failed_checks(status.value.checks_failed);
     if status.is_stale(now) {
         Some("the vehicle no longer reports its checks".to_owned())
-    } else if !failing.is_empty() {
-        Some(format!("failing checks: {}", failing.join(", ")))
+    } else if let Some(failing) = model.vehicle.why_no_go() {
+        Some(format!("failing checks: {failing}"))
     } else if !model.link.uplink.is_proven(now) {
         Some(format!("the uplink is not proven: {}", model.link.uplink.why_unheard()))
     } else if status.value.phase != TdPhase::TD_PHASE_PAD_IDLE {

@@ -177,6 +177,7 @@ fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
     vehicle_changes::hear_of_reset(model, &text.text, now);
+    model.vehicle.hear_of_check(&text.text);
     let level = EventLevel::of_severity(text.severity);
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }

@@ -11,7 +11,7 @@ use ratatui::widgets::{Block, Clear};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
     AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
-    role_name, why_not_here, why_untested, words,
+    role_name, why_not_here, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -176,10 +176,10 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, V
 }
 
 fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
-    let Some(status) = model.vehicle.status.as_ref() else {
+    if model.vehicle.status.is_none() {
         return vec![theme.line("The vehicle has not reported its checks.", TextRole::Caution)];
-    };
-    let failing = words::failed_checks(status.value.checks_failed);
+    }
+    let failing = model.vehicle.failing();
     if failing.is_empty() {
         let mut lines = vec![theme.line("Every arming check passes.", TextRole::Good)];
         let failure = model.vehicle.pad_check.as_ref().and_then(PadCheck::failure);
@@ -187,7 +187,8 @@ fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         return lines;
     }
     let mut lines = vec![theme.line("Failing checks; the vehicle will refuse:", TextRole::Alarm)];
-    lines.extend(failing.into_iter().map(|name| theme.line(format!("  NO {name}"), TextRole::Caution)));
+    lines
+        .extend(failing.into_iter().map(|(_, words)| theme.line(format!("  NO {words}"), TextRole::Caution)));
     lines
 }
 

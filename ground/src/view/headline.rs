@@ -126,11 +126,22 @@ pub fn draw_banner(
 
 /// The most letters of a word on the pad, as in `NO DATA`.
 const PAD_LETTERS: u16 = 8;
+/// The most letters of a check beside it, as in `ACCELEROMETER`.
+const CHECK_LETTERS: u16 = 13;
 
 /// Whether the vehicle may be armed; on the way to the start, how far it is.
 pub fn pad(model: &Model, now: Duration) -> Item {
     let (text, role) = pad_word(model, now);
-    word("", &text, PAD_LETTERS, role)
+    let letters = if pad_check(model).is_some() { text.len() as u16 } else { PAD_LETTERS };
+    word("", &text, letters, role)
+}
+
+/// The name of the check for which the countdown is held, or the armed vehicle is NO-GO: it stands beside the word, if it is
+/// short enough for 80 columns.
+pub fn pad_check(model: &Model) -> Option<Item> {
+    let (name, _) = model.vehicle.held_for().or_else(|| model.vehicle.unfit_while_armed())?;
+    let letters = name.len() as u16;
+    (letters <= CHECK_LETTERS).then(|| word("", &name.to_uppercase(), letters, TextRole::Alarm))
 }
 
 fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
@@ -155,6 +166,9 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     }
     if let Some(left) = vehicle.countdown_s().filter(|left| left.value > 0.0) {
         return (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title);
+    }
+    if vehicle.unfit_while_armed().is_some() {
+        return word("NO-GO", TextRole::Alarm);
     }
     if vehicle.is_armed() {
         return word("ARMED", TextRole::Caution);

@@ -541,10 +541,9 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     if status.is_stale(now) {
         return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
     }
-    let failing = words::failed_checks(status.value.checks_failed);
     let uplink = || "uplink not proven, every other check passes".to_owned();
     let why = why_not_reached(model, now)
-        .or_else(|| (!failing.is_empty()).then(|| failing.join(", ")))
+        .or_else(|| model.vehicle.why_no_go())
         .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
         .or_else(|| why_other_mission(model))
         .or_else(|| model.why_checklist(now))

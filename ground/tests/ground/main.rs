@@ -6,6 +6,7 @@ mod auto;
 mod book;
 mod bytes;
 mod checklist;
+mod checks;
 mod countdown;
 mod crew;
 mod daemon;

@@ -1,7 +1,7 @@
 //! Snapshots of the screen in each phase of a flight.
 
 use ground::key::Key;
-use protocol::dialect::{TdAbortEffect, TdBooster, TdChute, TdInterlock, TdLimit, TdPhase};
+use protocol::dialect::{TdAbortEffect, TdBooster, TdCheck, TdChute, TdInterlock, TdLimit, TdPhase};
 
 use crate::rig::{Rig, settings, typed};
 use crate::screens::{armed, coasting, counting, descending, on_the_pad, powered, snapshot};
@@ -14,7 +14,7 @@ fn regress_pad() {
 #[test]
 fn regress_pad_no_go() {
     let mut rig = on_the_pad();
-    rig.checks_failed = 0b1010;
+    rig.checks_failed = (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_TILT).bits();
     rig.run(0.1);
     rig.key(Key::Char('A'));
     rig.keys(&typed("AR"));

@@ -16,7 +16,7 @@ use ground::update::{Msg, Request};
 use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
 use protocol::dialect::{
-    MavMessage, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdBooster, TdCheck, TdChute, TdLimit, TdPhase,
+    MavMessage, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdBooster, TdCheck, TdChute, TdHold, TdLimit, TdPhase,
 };
 use ratatui::buffer::Buffer;
 use ratatui::style::Modifier;
@@ -123,6 +123,25 @@ fn flying(until: TdPhase) -> Rig {
     rig
 }
 
+/// Armed, and a sensor dies.
+fn unfit() -> Rig {
+    let mut rig = armed();
+    rig.checks_failed = TdCheck::TD_CHECK_ACCELEROMETER.bits();
+    rig.text("armed, and accelerometer repeats one value for 1 s");
+    rig.run(1.0);
+    rig
+}
+
+/// The countdown is held for it.
+fn held() -> Rig {
+    let mut rig = counting();
+    rig.checks_failed = TdCheck::TD_CHECK_ACCELEROMETER.bits();
+    rig.text("accelerometer repeats one value for 1 s");
+    (rig.countdown_ms, rig.hold) = (i32::MAX, TdHold::TD_HOLD_CHECK_FAILED);
+    rig.run(1.0);
+    rig
+}
+
 /// A state of each kind that a crew sees, with its name.
 fn states() -> Vec<(&'static str, Rig)> {
     let mut lost = flying(TdPhase::TD_PHASE_AERO_DESCENT);
@@ -134,6 +153,8 @@ fn states() -> Vec<(&'static str, Rig)> {
         ("checklist", with_checklist()),
         ("armed", armed()),
         ("counting", counting()),
+        ("unfit", unfit()),
+        ("held", held()),
         ("coast", flying(TdPhase::TD_PHASE_COAST)),
         ("descent", flying(TdPhase::TD_PHASE_AERO_DESCENT)),
         ("burn", flying(TdPhase::TD_PHASE_POWERED)),

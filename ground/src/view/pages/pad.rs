@@ -10,8 +10,8 @@ use ratatui::text::Line;
 
 use super::{Room, Side, attitude, columns, events, framed, rows, table};
 use crate::model::{
-    Act, Deflection, Foreign, LogStanding, Model, Vehicle, is_on_pad, unheard_hints, why_not_here,
-    why_untested, words,
+    Act, Deflection, Foreign, LogStanding, Model, Vehicle, hold_words, is_on_pad, unheard_hints,
+    why_not_here, why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::map::draw_map;
@@ -92,6 +92,7 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
             word("next: press, then type, Enter", &text, text.len() as u16, TextRole::Title)
         })
         .into_iter()
+        .chain(headline::pad_check(model))
         .collect();
     let (words, role) = match summary(model, now) {
         (_, TextRole::Good) => (format!(" every arming check passes{}", counted(model)), TextRole::Good),
@@ -116,10 +117,8 @@ fn hold(model: &Model, now: Duration) -> String {
 
 /// How many checks pass.
 fn counted(model: &Model) -> String {
-    let failed = model.vehicle.status.as_ref().map_or(TdCheck::empty(), |status| status.value.checks_failed);
-    let all = TdCheck::all();
-    let pass = all.iter().filter(|bit| !failed.contains(*bit)).count();
-    format!(", {pass} of {}", all.iter().count())
+    let all = model.vehicle.checks_made().iter().count();
+    format!(", {} of {all}", all - model.vehicle.failing().len())
 }
 
 fn place(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -200,7 +199,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         ])
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
-    let all = TdCheck::all();
+    let all = model.vehicle.checks_made();
     let (station_log_fails, station_log) = station_log(model, theme, now);
     let several = model.vehicle_rows(now).into_iter();
     let several = several.map(|words| theme.line(format!(" {words}"), TextRole::Alarm));
@@ -210,10 +209,17 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     }
     let motor = motor(model, theme);
     lines.extend(motor.clone().filter(|_| why_untested(model).is_some()));
-    let failing = all.iter_names().filter(|(_, bit)| fails(*bit));
-    lines.extend(failing.map(|check| row(" NO ", check, failure(check.1))));
-    let (pass, of) = (all.iter().filter(|bit| !fails(*bit)).count(), all.iter().count());
-    let count = format!(" GO {mark}{pass} of {of} checks");
+    let failed = status.value.checks_failed;
+    lines.extend(failed.iter_names().map(|check| match model.vehicle.told_of(check.1) {
+        // A value that is measured now is better than the vehicle's words for an earlier one.
+        Some(words) if !found(&model.vehicle, check.1).contains(' ') => Line::from(vec![
+            theme.span(" NO ", TextRole::Alarm),
+            theme.span(format!("{mark}{words}"), TextRole::Caution),
+        ]),
+        _ => row(" NO ", check, failure(check.1)),
+    }));
+    let of = all.iter().count();
+    let count = format!(" GO {mark}{} of {of} checks", of - failed.iter().count());
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
@@ -245,7 +251,10 @@ fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
 /// Whether the checks pass, in words.
 fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
+    let held = hold_words(&model.vehicle, model.link.uplink.armed_by_us);
+    let unfit = model.vehicle.unfit_while_armed().map(|(_, words)| format!("ARMED, and NO-GO: {words}"));
     match model.vehicle.status.as_ref() {
+        Some(_) if held.is_some() || unfit.is_some() => (held.or(unfit).unwrap_or_default(), TextRole::Alarm),
         _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
         None if unheard_hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
@@ -253,8 +262,8 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
             top_lines::readiness(model, now).unwrap_or_default()
         }
         Some(status) => {
-            let failing = status.value.checks_failed.iter_names().count();
-            let all = TdCheck::all().iter_names().count();
+            let failing = status.value.checks_failed.iter().count();
+            let all = model.vehicle.checks_made().iter().count();
             (format!("NO-GO: {failing} of {all} checks fail"), TextRole::Alarm)
         }
     }

@@ -1,0 +1,161 @@
+//! The vehicle's arming checks: which fail, in its own words, and for which it has held the countdown.
+
+use protocol::dialect::{TdCheck, TdHold, TdPhase};
+
+use super::{Vehicle, words};
+
+/// Sensors name themselves in what is wrong with them; of other checks the vehicle says what it found.
+const SENSORS: TdCheck = TdCheck::TD_CHECK_ACCELEROMETER
+    .union(TdCheck::TD_CHECK_GYRO)
+    .union(TdCheck::TD_CHECK_BAROMETER)
+    .union(TdCheck::TD_CHECK_GNSS)
+    .union(TdCheck::TD_CHECK_LIDAR);
+
+/// What the vehicle has told of its checks, beside which of them fail.
+#[derive(Debug, Clone, Default)]
+pub struct ToldChecks {
+    /// Its words for a check, the newest last.
+    told: Vec<(TdCheck, String)>,
+    /// The check for which it holds the countdown: it is named on when it passes again.
+    held: Option<TdCheck>,
+}
+
+impl Vehicle {
+    /// The failing checks, each in the vehicle's words if it has told them, otherwise by its name.
+    pub fn failing(&self) -> Vec<(TdCheck, String)> {
+        let failed = self.status.as_ref().map_or(TdCheck::empty(), |status| status.value.checks_failed);
+        failed.iter().map(|check| (check, self.words_of(check))).collect()
+    }
+
+    /// The failing checks in one line; `None` if all pass.
+    pub fn why_no_go(&self) -> Option<String> {
+        let failing: Vec<String> = self.failing().into_iter().map(|(_, words)| words).collect();
+        (!failing.is_empty()).then(|| failing.join(", "))
+    }
+
+    /// The first check that forbids the start, by its name and in words. The uplink of the station that asks is the vehicle's
+    /// to judge, and has an alarm of its own.
+    pub fn unfit(&self) -> Option<(String, String)> {
+        let fails = |(check, _): &(TdCheck, String)| *check != TdCheck::TD_CHECK_UPLINK;
+        self.failing().into_iter().find(fails).map(|(check, words)| (name(check), words))
+    }
+
+    /// The check for which it holds the countdown, likewise.
+    pub fn held_for(&self) -> Option<(String, String)> {
+        self.checks.held.map(|check| (name(check), self.words_of(check)))
+    }
+
+    /// Why it is armed and not ready: the first failing check, likewise. A hold has its own words.
+    pub fn unfit_while_armed(&self) -> Option<(String, String)> {
+        let status = &self.status.as_ref()?.value;
+        let waits = status.phase == TdPhase::TD_PHASE_PAD_ARMED && status.hold == TdHold::TD_HOLD_NONE;
+        self.unfit().filter(|_| waits)
+    }
+
+    /// The checks that this vehicle makes: only one that hangs below a drone has a height.
+    pub fn checks_made(&self) -> TdCheck {
+        let hangs = self.mission().is_some_and(|mission| mission.start == Some("drone"));
+        let height = if hangs { TdCheck::empty() } else { TdCheck::TD_CHECK_HEIGHT };
+        TdCheck::all().difference(height)
+    }
+
+    /// Its own words for a check, if it has told them.
+    pub fn told_of(&self, check: TdCheck) -> Option<&str> {
+        self.checks.told.iter().find(|(told, _)| *told == check).map(|(_, words)| words.as_str())
+    }
+
+    fn words_of(&self, check: TdCheck) -> String {
+        self.told_of(check).map_or_else(|| name(check), str::to_owned)
+    }
+
+    /// Takes what it says of a check. Its flight status says whether that still fails.
+    pub(crate) fn hear_of_check(&mut self, text: &str) {
+        let text =
+            text.strip_prefix("not ready: ").or_else(|| text.strip_prefix("armed, and ")).unwrap_or(text);
+        let text = text.split_once(" refused: ").map_or(text, |(_, reason)| reason);
+        let Some(check) = check_of(text) else { return };
+        self.checks.told.retain(|(told, _)| *told != check);
+        self.checks.told.push((check, in_short(text, check)));
+        let holds =
+            self.status.as_ref().is_some_and(|status| status.value.hold == TdHold::TD_HOLD_CHECK_FAILED);
+        self.checks.held = self.checks.held.or_else(|| holds.then_some(check));
+    }
+
+    /// Notes for which check it holds, and forgets its words for what passes again.
+    pub(crate) fn note_checks(&mut self) {
+        let Some(status) = self.status.as_ref().map(|status| &status.value) else { return };
+        let Self { checks: ToldChecks { told, held }, .. } = self;
+        let failed = status.checks_failed;
+        if status.hold == TdHold::TD_HOLD_CHECK_FAILED {
+            // It says the check just before the hold.
+            let first = || failed.iter().find(|check| *check != TdCheck::TD_CHECK_UPLINK);
+            *held = held.or_else(|| told.last().map(|(check, _)| *check)).or_else(first);
+        } else {
+            *held = None;
+        }
+        told.retain(|(check, _)| failed.contains(*check) || *held == Some(*check));
+    }
+}
+
+/// The check that a text of the vehicle is about.
+fn check_of(text: &str) -> Option<TdCheck> {
+    let has_found = text.contains(": found ");
+    let text = text.to_lowercase().replace('-', " ");
+    let is_about = |(name, check): &(String, TdCheck)| {
+        if has_found { text.starts_with(name) } else { SENSORS.contains(*check) && text.contains(name) }
+    };
+    let named = TdCheck::all().iter_names().map(|(name, check)| (words::lower_case_name(name), check));
+    // `log space` begins with `log`.
+    named.filter(is_about).max_by_key(|(name, _)| name.len()).map(|(_, check)| check)
+}
+
+/// Without what was required, and without a time, which grows on: `no GNSS fix for 9 s` becomes `no GNSS fix`.
+fn in_short(text: &str, check: TdCheck) -> String {
+    let text = text.split_once(", required ").map_or(text, |(found, _)| found);
+    let text = match text.rsplit_once(" for ") {
+        Some((what, time)) if time.ends_with(" s") => what,
+        _ => text,
+    };
+    let whose = if words::is_of_the_log(check) { "vehicle " } else { "" };
+    format!("{whose}{}", text.replacen(": found ", " ", 1))
+}
+
+/// The name of a check.
+fn name(check: TdCheck) -> String {
+    check.iter_names().next().map_or_else(String::new, |(name, _)| words::check(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_of_the_vehicle_names_its_check_in_short() {
+        let cases = [
+            ("no GNSS fix for 9 s", Some((TdCheck::TD_CHECK_GNSS, "no GNSS fix"))),
+            ("gyro repeats one value for 2 s", Some((TdCheck::TD_CHECK_GYRO, "gyro repeats one value"))),
+            (
+                "log space: found 1 MiB, required at least 9 MiB",
+                Some((TdCheck::TD_CHECK_LOG_SPACE, "vehicle log space 1 MiB")),
+            ),
+            (
+                "log: found not running, required running",
+                Some((TdCheck::TD_CHECK_LOG, "vehicle log not running")),
+            ),
+            (
+                "self-test: found not passed, required passed",
+                Some((TdCheck::TD_CHECK_SELF_TEST, "self-test not passed")),
+            ),
+            (
+                "tilt from vertical: found 6.00 deg, required at most 5 deg",
+                Some((TdCheck::TD_CHECK_TILT, "tilt from vertical 6.00 deg")),
+            ),
+            ("pin out: landing motor live", None),
+            ("HOLD: no countdown; start anew or it disarms in 60 s", None),
+        ];
+        for (text, expected) in cases {
+            let found = check_of(text).map(|check| (check, in_short(text, check)));
+            assert_eq!(found, expected.map(|(check, words)| (check, words.to_owned())), "{text}");
+        }
+    }
+}
