@@ -177,7 +177,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         line.extend(styled(link));
         lines.push(Line::from(line));
     }
-    lines.push(compact_abort(model, theme, now));
+    lines.push(compact_abort(model, theme, now, area.width));
     if let Some((_, text)) = open {
         draw_lines(frame, area, &lines);
         let fixed = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(area.height);
@@ -213,13 +213,11 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     }
 }
 
-fn compact_abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let line = top_lines::abort(model, theme, now);
-    if model.abort_chord.is_begun(now) || model.link.abort_unsent {
+fn compact_abort(model: &Model, theme: Theme, now: Duration, columns: u16) -> Line<'static> {
+    let line = top_lines::abort(model, theme, now, usize::from(columns));
+    let acts = model.abort_chord.is_begun(now) || model.link.abort_unsent;
+    if acts || model.commands.of(CommandKind::Abort).is_some() {
         return line;
-    }
-    if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return top_lines::command_facts_short(track, theme, now);
     }
     let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
     let mut spans = vec![theme.key(key)];

@@ -48,18 +48,28 @@ pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Lin
     ]))
 }
 
+/// In how long it is at apogee, by its climb.
+fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
+    let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
+    within(climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64()))
+}
+
 /// The event, in how long, and what else is known about it.
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
+        // The time stands in the row of the abort, on every page.
+        TdPhase::TD_PHASE_COAST if is_inhibited(vehicle) => {
+            words("parachute", &format!("{}, at apogee", apogee_in(vehicle, now)))
+        }
+        TdPhase::TD_PHASE_BOOST if is_inhibited(vehicle) => words("parachute", ", at apogee"),
+        TdPhase::TD_PHASE_DEPLOY if is_inhibited(vehicle) => words("parachute", ""),
         TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
         TdPhase::TD_PHASE_COAST => {
-            let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
-            let left_s = climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64());
             let attached =
                 vehicle.descent().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
             let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
-            Some((format!("{before}apogee"), within(left_s), after.to_owned()))
+            Some((format!("{before}apogee"), apogee_in(vehicle, now), after.to_owned()))
         }
         TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
@@ -75,8 +85,13 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
     }
 }
 
+/// Whether the vehicle says that its landing motor will not light.
+fn is_inhibited(vehicle: &Vehicle) -> bool {
+    vehicle.interlocks().is_some() && !vehicle.may_light()
+}
+
 fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String, String) {
-    if vehicle.interlocks().is_some() && !vehicle.may_light() {
+    if is_inhibited(vehicle) {
         let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
         return ("the ground".to_owned(), String::new(), format!(", NO BURN{why}"));
     }

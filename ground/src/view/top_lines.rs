@@ -13,9 +13,10 @@ use ratatui::text::{Line, Span};
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role, Standing,
-    TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself,
-    is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, why_untested, words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
+    Standing, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
+    is_liftoff_by_itself, is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission,
+    why_untested, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -116,22 +117,25 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         let event = model.events.newest(1).next().filter(fresh)?;
         Some(format!(" {}{}", event.mark().trim_start(), event.text))
     };
-    let words = seen.or_else(next).or_else(ready).or_else(said)?;
+    // Of an abort that was seen, what comes after it counts.
+    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.kind == AlarmKind::Aborted);
+    let after = if aborted { next() } else { None };
+    let words = after.or(seen).or_else(next).or_else(ready).or_else(said)?;
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, and its key at the right end. A begun or sent abort in their place needs most of the row: then the key
-/// stands where it fits.
+/// What an abort would do, or how far it is, and its key at the right end. What a begun or unsent abort says has its keys in
+/// it, and the whole row if it needs it.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let line = abort(model, theme, now);
-    let sent = model.link.abort_unsent || model.commands.of(CommandKind::Abort).is_some();
-    let acts = sent || model.abort_chord.is_begun(now);
     let key = format!(" {} ", abort_key(model));
-    if acts && line.width() + key.len() > usize::from(area.width) {
+    let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
+    let line = abort(model, theme, now, usize::from(words.width));
+    let has_keys = model.link.abort_unsent || model.abort_chord.is_begun(now);
+    if has_keys && line.width() > usize::from(words.width) {
         return draw_line(frame, area, line);
     }
-    let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
-    draw_line(frame, words, if acts { line } else { Line::from(line.to_string()) });
+    // In the colours of the row: those of a page vanish on it.
+    draw_line(frame, words, if has_keys { line } else { Line::from(line.to_string()) });
     draw_line(frame, key_area, Line::from(key));
 }
 
@@ -349,8 +353,8 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up, Span::raw(" ")])
 }
 
-/// What an abort would do now, or the progress of the commanded abort.
-pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+/// What an abort would do now, or the progress of the commanded abort, in as many columns.
+pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     if model.link.abort_unsent {
         let words = " ABORT NOT SENT: no station. The next one sends it; Esc cancels it";
         return theme.line(words, TextRole::Alarm);
@@ -360,7 +364,7 @@ pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         return theme.line(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), TextRole::Alarm);
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return command_facts(track, theme, now);
+        return command_facts_within(track, columns, theme, now);
     }
     let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
@@ -421,54 +425,49 @@ fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
     Some(theme.line(words, TextRole::Alarm))
 }
 
-/// The three facts of a command, for narrow screens.
-pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    let (acknowledged, acknowledged_role) = match track.acknowledged {
-        Acknowledgement::Waiting | Acknowledgement::InProgress => ("-", TextRole::Caution),
-        Acknowledgement::Asked => ("asked", TextRole::Caution),
-        Acknowledgement::GivenUp => ("NEVER", TextRole::Alarm),
-        Acknowledgement::Answered(_) if track.accepted() => ("ok", TextRole::Good),
-        Acknowledgement::Answered(_) => ("REFUSED", TextRole::Alarm),
-    };
-    let (observed, observed_role) = match track.observed_at {
-        Some(_) => ("ok", TextRole::Good),
-        None if track.is_withdrawn => ("ended", TextRole::Plain),
-        None if track.disagrees(now) => ("NO", TextRole::Alarm),
-        None => ("-", TextRole::Plain),
-    };
-    Line::from(vec![
-        theme.span(format!("{} x{}", track.kind.name(), track.attempts), TextRole::Title),
-        theme.label(" ack "),
-        theme.span(acknowledged, acknowledged_role),
-        theme.label(" obs "),
-        theme.span(observed, observed_role),
-    ])
-}
-
 /// The three facts of a command: commanded, acknowledged, observed.
 pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    let label = |text: &str| theme.label(text.to_owned());
+    command_facts_within(track, usize::MAX, theme, now)
+}
+
+/// The same in as many columns: first its time is left out.
+pub fn command_facts_within(
+    track: &TrackedCommand,
+    columns: usize,
+    theme: Theme,
+    now: Duration,
+) -> Line<'static> {
+    let name = track.kind.name();
+    let commanded = format!(" {name:<6} commanded {:.1} s x", track.commanded_at.as_secs_f64());
+    let whole = facts(track, [&commanded, "  acknowledged ", "  observed "], theme, now);
+    let without_time = [&*format!(" {name} x"), "  acknowledged ", "  observed "];
+    let narrow = [without_time[0], " ack ", " obs "];
+    let lines = [whole, facts(track, without_time, theme, now)];
+    let fits = lines.into_iter().find(|line| line.width() <= columns);
+    fits.unwrap_or_else(|| facts(track, narrow, theme, now))
+}
+
+fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) -> Line<'static> {
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
-        Acknowledgement::Asked => ("asked, awaits another role".to_owned(), TextRole::Caution),
+        Acknowledgement::Asked => ("asked, not confirmed".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),
     };
     let (observed, observed_role) = match track.observed_at {
-        Some(_) => ("yes".to_owned(), TextRole::Good),
-        None if track.is_withdrawn => ("no longer so".to_owned(), TextRole::Plain),
-        None if track.disagrees(now) => ("NOT OBSERVED".to_owned(), TextRole::Alarm),
-        None => ("not yet".to_owned(), TextRole::Plain),
+        Some(_) => ("yes", TextRole::Good),
+        None if track.is_withdrawn => ("no longer so", TextRole::Plain),
+        None if track.disagrees(now) => ("NOT OBSERVED", TextRole::Alarm),
+        None => ("not yet", TextRole::Plain),
     };
+    let [commanded, ack, obs] = names;
     Line::from(vec![
-        theme.span(format!(" {:<6} ", track.kind.name()), TextRole::Title),
-        label("commanded "),
-        theme.plain(format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts)),
-        label("  acknowledged "),
+        theme.span(format!("{commanded}{}", track.attempts), TextRole::Title),
+        theme.label(ack.to_owned()),
         theme.span(acknowledged, acknowledged_role),
-        label("  observed "),
+        theme.label(obs.to_owned()),
         theme.span(observed, observed_role),
     ])
 }

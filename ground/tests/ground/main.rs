@@ -26,6 +26,7 @@ mod phases;
 mod pictures;
 mod program;
 mod radio;
+mod readable;
 mod replay;
 mod rig;
 mod screens;

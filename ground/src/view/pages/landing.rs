@@ -76,7 +76,7 @@ pub fn landing_lines(
     lines.extend(newest_event(model, theme));
     // An abort is shown in the top lines.
     if let Some(track) = top_lines::open_command(model, now) {
-        lines.push(top_lines::command_facts_short(track, theme, now));
+        lines.push(top_lines::command_facts_within(track, 1, theme, now));
     }
     lines.push(lean(model, theme, now));
     let (title, touchdown) = panels::touchdown_panel(model, theme, now);
