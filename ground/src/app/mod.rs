@@ -43,7 +43,7 @@ use crate::model::{KeyOwner, Model, Role, Seat, Settings};
 use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
-use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name};
+use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Output, print};
 use replaying::Again;
@@ -248,7 +248,11 @@ async fn start(
         }
         file
     });
-    model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
+    let folder = recorder.as_ref().and_then(|log| log.path().parent());
+    model.place = newest_place(folder, start_unix_s);
+    if let Some(kept) = read_unfinished(folder, start_unix_s).filter(|_| demo.is_none()) {
+        model.take_unfinished(kept, clock.now());
+    }
     announce_what_is_there(&mut model, is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
     let watchers = feed(args.watchers.as_deref(), server.as_ref()).await?;

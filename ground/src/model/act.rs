@@ -120,7 +120,7 @@ pub const DEFINITIONS: [Definition; 40] = [
     define(Act::Download, "download", 'L', "fetch the vehicle's own log; disarmed on the ground"),
     define(Act::AskParameters, "ask", 'r', "ask the vehicle for its parameters again"),
     Definition { act: Act::Redraw, name: "redraw", usual: Key::CtrlL, words: "draw the screen again" },
-    define(Act::Quit, "quit", 'q', "quit; armed or in flight: then type QUIT and Enter"),
+    define(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
 /// Whether a flight has been flown that this screen's log holds, and nothing is at risk.

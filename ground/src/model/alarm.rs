@@ -61,6 +61,8 @@ pub enum AlarmKind {
     CheckFailed,
     /// The countdown has reached zero while the vehicle was not heard.
     MayBeFlying,
+    /// An earlier run of the station was asked for an abort that was not confirmed.
+    AbortBefore,
 }
 
 impl AlarmKind {
@@ -70,6 +72,7 @@ impl AlarmKind {
         match self {
             Self::Unanswered(CommandKind::Abort)
             | Self::Disagreement(CommandKind::Abort)
+            | Self::AbortBefore
             | Self::Refused(CommandKind::Abort) => 3,
             Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign | Self::MayBeFlying => 2,
             Self::LinkLost

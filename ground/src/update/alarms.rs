@@ -61,6 +61,9 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let text = "STATION SILENT: it does not answer this screen, which shows the past".to_owned();
         found.push((AlarmKind::StationSilent, text));
     }
+    if let Some(why) = model.link.why_abort_not_sent(now) {
+        found.push((AlarmKind::Unanswered(CommandKind::Abort), format!("ABORT NOT SENT: {why}")));
+    }
     found.extend(identity_conditions(model, now));
     // A silent station says nothing about the link.
     let now = model.link.known_until(now);
@@ -81,9 +84,9 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
-    if model.link.abort_unsent {
-        let text = "ABORT NOT SENT: no station; the next one sends it, Esc cancels it".to_owned();
-        found.push((AlarmKind::Unanswered(CommandKind::Abort), text));
+    if let Some(why) = &model.abort_before {
+        let text = format!("ABORT asked at {why} NOT CONFIRMED: ask again?");
+        found.push((AlarmKind::AbortBefore, text));
     }
     if let LogStanding::Unfit(_, words) | LogStanding::Warned(words) = model.station_log(now) {
         found.push((AlarmKind::Log, format!("STATION LOG {words}")));

@@ -17,8 +17,8 @@ use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
     KeyOrigin, LOOKS_FOR, LogStanding, LookBack, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker,
     Standing, TextEntry, overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check,
-    why_not_confirm, why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves,
-    why_untested,
+    why_not_confirm, why_not_here, why_not_quit, why_not_seat, why_not_start, why_not_take,
+    why_nothing_moves, why_untested,
 };
 use crate::update;
 
@@ -202,7 +202,8 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Prompt::Quit => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
-            let leave = if stays && model.is_at_risk() { Action::LeaveScreen } else { Action::Quit };
+            let leave =
+                if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
             model.outbox.push(leave);
         }
     }
@@ -556,6 +557,9 @@ fn see_alarm(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
+    if kind == AlarmKind::AbortBefore {
+        model.abort_before = None;
+    }
     if let Some(text) = model.alarms.acknowledge(kind) {
         model.info(now, format!("alarm acknowledged: {text}"));
     }
@@ -591,8 +595,7 @@ fn abort(model: &mut Model, now: Duration) {
 }
 
 fn quit(model: &mut Model, now: Duration) {
-    let commands = model.settings.role.why_not_command().is_none();
-    if commands && model.is_at_risk() {
+    if why_not_quit(model, now).is_some() {
         open(model, Prompt::Quit, now);
     } else {
         model.quit_at = Some(now + FINGERS_APART);

@@ -131,8 +131,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     }
     draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
     // Also over the past: whether people may approach is a matter of the present.
-    let large = banner.filter(|banner| banner.is_large_on(model.page()));
-    let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
+    let body = banner.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     let pictures = pages::draw(shown, theme, shown_at, frame, body);
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);
@@ -215,7 +214,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
 
 fn compact_abort(model: &Model, theme: Theme, now: Duration, columns: u16) -> Line<'static> {
     let line = top_lines::abort(model, theme, now, usize::from(columns));
-    let acts = model.abort_chord.is_begun(now) || model.link.abort_unsent;
+    let acts = model.abort_chord.is_begun(now) || model.link.why_abort_not_sent(now).is_some();
     if acts || model.commands.of(CommandKind::Abort).is_some() {
         return line;
     }

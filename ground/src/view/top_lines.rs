@@ -130,7 +130,7 @@ fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, are
     let key = format!(" {} ", abort_key(model));
     let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
     let line = abort(model, theme, now, usize::from(words.width));
-    let has_keys = model.link.abort_unsent || model.abort_chord.is_begun(now);
+    let has_keys = model.link.why_abort_not_sent(now).is_some() || model.abort_chord.is_begun(now);
     if has_keys && line.width() > usize::from(words.width) {
         return draw_line(frame, area, line);
     }
@@ -355,9 +355,11 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 /// What an abort would do now, or the progress of the commanded abort, in as many columns.
 pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    if model.link.abort_unsent {
-        let words = " ABORT NOT SENT: no station. The next one sends it; Esc cancels it";
-        return theme.line(words, TextRole::Alarm);
+    if let Some(why) = model.link.why_abort_not_sent(now) {
+        return theme.line(format!(" ABORT NOT SENT: {why}"), TextRole::Alarm);
+    }
+    if model.link.abort_asked_at.is_some() {
+        return theme.line(" ABORT asked, not yet taken by the station", TextRole::Alarm);
     }
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
@@ -387,6 +389,9 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
 fn abort_effect(model: &Model, now: Duration) -> String {
     if model.link.is_station_gone() {
         return "NOT SENT: no station; kept for the next one".to_owned();
+    }
+    if model.link.station_silence(now).is_some() {
+        return "NOT SENT while the station hangs; kept".to_owned();
     }
     if let Some(foreign) = model.vehicle.as_foreign() {
         return foreign.termination().to_owned();
@@ -437,14 +442,16 @@ pub fn command_facts_within(
     theme: Theme,
     now: Duration,
 ) -> Line<'static> {
-    let name = track.kind.name();
-    let commanded = format!(" {name:<6} commanded {:.1} s x", track.commanded_at.as_secs_f64());
-    let whole = facts(track, [&commanded, "  acknowledged ", "  observed "], theme, now);
-    let without_time = [&*format!(" {name} x"), "  acknowledged ", "  observed "];
-    let narrow = [without_time[0], " ack ", " obs "];
-    let lines = [whole, facts(track, without_time, theme, now)];
+    // Other names are longer.
+    let room = "DISARM".len().saturating_sub(track.kind.name().len());
+    let at_s = track.commanded_at.as_secs_f64();
+    let commanded = format!("{:room$} commanded {at_s:.1} s x", "");
+    let lines = [
+        facts(track, [&commanded, "  acknowledged ", "  observed "], theme, now),
+        facts(track, [" x", "  acknowledged ", "  observed "], theme, now),
+    ];
     let fits = lines.into_iter().find(|line| line.width() <= columns);
-    fits.unwrap_or_else(|| facts(track, narrow, theme, now))
+    fits.unwrap_or_else(|| facts(track, [" x", " ack ", " obs "], theme, now))
 }
 
 fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) -> Line<'static> {
@@ -464,7 +471,8 @@ fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) 
     };
     let [commanded, ack, obs] = names;
     Line::from(vec![
-        theme.span(format!("{commanded}{}", track.attempts), TextRole::Title),
+        theme.span(format!(" {}", track.kind.name()), TextRole::Title),
+        theme.plain(format!("{commanded}{}", track.attempts)),
         theme.label(ack.to_owned()),
         theme.span(acknowledged, acknowledged_role),
         theme.label(obs.to_owned()),

@@ -33,6 +33,7 @@ mod screens;
 mod station_log;
 mod terminal;
 mod two_person;
+mod unfinished;
 mod untested;
 mod uplink;
 mod voice;
