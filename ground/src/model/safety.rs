@@ -10,7 +10,8 @@ use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Acknowledgement, CommandKind, Model, Role, Sample, Seat, Speaker, TrackedCommand, Vehicle, Verdict,
+    Acknowledgement, CommandKind, Event, Model, Role, Sample, Seat, Speaker, TrackedCommand, Vehicle,
+    Verdict,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     is_on_pad, role_name,
 };
@@ -535,8 +536,22 @@ pub fn latch_words(model: &Model) -> Option<String> {
         (false, _) => return None,
     };
     let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here");
-    let cause = cause.or(ours).map(str::to_owned).or_else(|| text_of_the_latch(model));
+    let told = cause.or(ours).map(str::to_owned);
+    let cause = why_gate_stayed_shut(model).or(told).or_else(|| text_of_the_latch(model));
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
+}
+
+/// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave the gate up.
+fn why_gate_stayed_shut(model: &Model) -> Option<String> {
+    let vehicle = &model.vehicle;
+    vehicle.status.as_ref().filter(|status| status.value.latch == TdLatch::TD_LATCH_GATE)?;
+    let found = vehicle.findings.in_time();
+    let found = found.iter().find_map(|(_, words)| words.strip_prefix("ignition gate stayed shut: "));
+    let since = vehicle.left_pad_at.unwrap_or_default();
+    let of_this_flight = |event: &&Event| event.at >= since && event.speaker == Speaker::Vehicle;
+    let mut said = model.events.newest(TEXTS_SEARCHED).filter(of_this_flight);
+    let said = || said.find_map(|event| event.text.strip_prefix("ignition gate closed: "));
+    found.or_else(said).map(|why| format!("gate stayed shut: {why}"))
 }
 
 /// The first grave text of the vehicle about the time of its latch, for a cause that only a text tells: what follows is about the

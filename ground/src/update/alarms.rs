@@ -260,6 +260,7 @@ const WRONG: u8 = 3;
 /// Compares the present state with what was called out.
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
+    call_liftoff(model);
     call_height(model, now);
     call_readiness(model, now);
     call_link(model, now);
@@ -314,7 +315,7 @@ fn call_phase(model: &mut Model) {
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
     let climbed = matches!(before, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
     match phase {
-        TdPhase::TD_PHASE_BOOST => call(model, Amount::Few, "liftoff", WATCH),
+        TdPhase::TD_PHASE_BOOST => call(model, Amount::Normal, "commanded to light", 0),
         TdPhase::TD_PHASE_CHUTE => call(model, Amount::Few, "parachute", WRONG),
         TdPhase::TD_PHASE_IGNITION => call(model, Amount::Few, "ignition", WATCH),
         TdPhase::TD_PHASE_TOUCHDOWN => call(model, Amount::Few, "touchdown", WATCH),
@@ -325,6 +326,13 @@ fn call_phase(model: &mut Model) {
     }
     if is_on_pad(phase) {
         model.called.height_m = None;
+    }
+}
+
+fn call_liftoff(model: &mut Model) {
+    let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+    if !std::mem::replace(&mut model.called.has_lifted, model.vehicle.has_lifted) && lifts {
+        call(model, Amount::Few, "liftoff", WATCH);
     }
 }
 

@@ -95,7 +95,7 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
 }
 
 // The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
-// approaching; pinned numbers; the page; the flight along its time, or an alarm; the keys.
+// approaching; the page; the flight along its time, or an alarm; the keys.
 
 pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     // Everything but the page always shows the present.
@@ -104,14 +104,13 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let banner = headline::banner(model, now);
     let messages = footer::message_rows(model, theme, (now, shown_at), area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
-    let [identity, state, words, past_mark, pinned, body, message, keys] = stacked(
+    let [identity, state, words, past_mark, body, message, keys] = stacked(
         area,
         [
             Length(1),
             Length(state_rows),
             Length(banner.is_some().into()),
             Length(past.is_some().into()),
-            Length((!model.pages.pinned.is_empty()).into()),
             Fill(1),
             Length(messages.len() as u16),
             Length(1),
@@ -129,7 +128,6 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     if let Some(looks) = model.look_back.filter(|_| past.is_some()) {
         draw_line(frame, past_mark, past_line(looks, shown_at, theme, now));
     }
-    draw_line(frame, pinned, status_lines::pinned_line(shown, theme, shown_at));
     // Also over the past: whether people may approach is a matter of the present.
     let body = banner.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     let pictures = pages::draw(shown, theme, shown_at, frame, body);

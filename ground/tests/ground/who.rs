@@ -435,7 +435,7 @@ fn answer_timesync(rig: &mut Rig) {
     rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
 }
 
-/// A copter in a mode whose number is a phase of ours: ACRO is PAD_IDLE, LAND is POWERED.
+/// A copter in a mode whose number is a phase of ours: ACRO (1) is PAD_IDLE, LAND (9) is POWERED.
 fn beside_a_copter() -> Rig {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
@@ -481,7 +481,7 @@ fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
         assert!(line.contains("NOT A TOUCHDOWN VEHICLE: Ardu"), "{line}");
     }
     let screen = rig.screen(80, 24);
-    for words in ["ACRO", "ARMED", "12.5 m above home", "roll 6 deg", "CUTS ITS MOTORS"] {
+    for words in ["mode 1", "ARMED", "12.5 m above home", "roll 6 deg", "CUTS ITS MOTORS"] {
         assert!(screen.contains(words), "{words}: {screen}");
     }
     assert!(!screen.contains("PAD_IDLE") && !screen.contains(" GO"), "{screen}");

@@ -156,7 +156,11 @@ pub fn pad_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
     // In flight the next event is already shown above.
     let mut lines: Vec<Line> = match status_lines::next_event_line(model, theme, now) {
         Some(_) => Vec::new(),
-        None => vec![top_lines::command(model, theme, now)],
+        None => {
+            let ready = || top_lines::readiness(model, now);
+            let ready = || ready().map(|(words, role)| theme.line(format!(" {words}"), role));
+            top_lines::message(model, theme, now).or_else(ready).into_iter().collect()
+        }
     };
     let (words, role) = summary(model, now);
     lines.push(theme.line(format!(" {words}"), role));
