@@ -64,17 +64,7 @@ pub async fn session(
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
     let mut times = Times::default();
-    // Takes the history first, so that the first drawn frame is complete.
-    let mut live = false;
-    let silent = || "the station does not answer: it hangs or is stopped (`ground status`); nothing reaches its vehicle";
-    while !live
-        && let Some((told, at)) = timeout(ANSWERS_WITHIN, link.told.recv()).await.with_context(silent)?
-    {
-        times.heard(at, clock.now());
-        live = told == ToScreen::Live;
-        check_version(&told)?;
-        take(&mut model, told, at, viewer);
-    }
+    take_history(&mut link, &mut model, (&mut times, &clock), viewer).await?;
     let mut output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
@@ -165,6 +155,27 @@ pub async fn session(
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
+}
+
+/// Takes the history first, so that the first drawn frame is complete.
+async fn take_history(
+    link: &mut StationConnection,
+    model: &mut Model,
+    (times, clock): (&mut Times, &Clock),
+    viewer: &Viewer,
+) -> anyhow::Result<()> {
+    let silent = "the station does not answer: it hangs or is stopped; nothing is shown of its vehicle";
+    loop {
+        let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.context(silent)?;
+        let Some((told, at)) = told else { return Ok(()) };
+        times.heard(at, clock.now());
+        let live = told == ToScreen::Live;
+        check_version(&told)?;
+        take(model, told, at, viewer);
+        if live {
+            return Ok(());
+        }
+    }
 }
 
 fn check_version(told: &ToScreen) -> anyhow::Result<()> {

@@ -248,11 +248,7 @@ async fn start(
         }
         file
     });
-    let folder = recorder.as_ref().and_then(|log| log.path().parent());
-    model.place = newest_place(folder, start_unix_s);
-    if let Some(kept) = read_unfinished(folder, start_unix_s).filter(|_| demo.is_none()) {
-        model.take_unfinished(kept, clock.now());
-    }
+    take_what_is_kept(&mut model, recorder.as_ref(), clock.now());
     announce_what_is_there(&mut model, is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
     let watchers = feed(args.watchers.as_deref(), server.as_ref()).await?;
@@ -299,6 +295,15 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
     }
     if let Some(words) = renamed {
         model.warn(now, words);
+    }
+}
+
+/// Takes what an earlier run has kept beside its log. A demonstration has another vehicle.
+fn take_what_is_kept(model: &mut Model, recorder: Option<&Recorder>, now: Duration) {
+    let (folder, unix_s) = (recorder.and_then(|log| log.path().parent()), model.settings.start_unix_s);
+    model.place = newest_place(folder, unix_s);
+    if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
+        model.take_unfinished(kept, now);
     }
 }
 

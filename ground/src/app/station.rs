@@ -270,7 +270,7 @@ impl Station {
                     self.record(record);
                 }
                 Action::KeepPlace(place) => {
-                    self.keep(model, now, |folder, _| files::write_place(folder, &place))
+                    self.keep(model, now, |folder, _| files::write_place(folder, &place));
                 }
                 Action::KeepUnfinished(kept) => {
                     self.keep(model, now, |folder, unix_s| files::write_unfinished(folder, &kept, unix_s));

@@ -70,7 +70,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     // The flight may have passed unheard: what comes after it shows that it was.
     match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
         Some(true) if vehicle.verdict().is_none() => {
-            (vehicle.left_pad_at, vehicle.has_lifted) = (None, false)
+            (vehicle.left_pad_at, vehicle.has_lifted) = (None, false);
         }
         Some(_) => {
             let since = *vehicle.left_pad_at.get_or_insert(now);

@@ -160,7 +160,7 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
     let (word, role) = match model.settings.role {
         Role::Station if model.settings.demonstration => {
             let style = theme.style(TextRole::Caution).add_modifier(Modifier::REVERSED);
-            return Span::styled(" DEMO: no real vehicle ", style);
+            return Span::styled(" DEMO, NOT REAL ", style);
         }
         Role::Watching if simulated => ("WATCH SIM", TextRole::Title),
         Role::Watching => ("WATCH LIVE", TextRole::Caution),

@@ -18,7 +18,7 @@ fn choose(rig: &mut Rig, text: &str) {
 /// Keys of the crew's choice.
 fn chosen(pairs: &[(&str, &str)]) -> Bindings {
     let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
-    Bindings::try_from(pairs.collect::<BTreeMap<_, _>>()).unwrap()
+    Bindings::try_from(pairs.collect::<BTreeMap<_, _>>()).expect("a valid choice")
 }
 
 #[test]

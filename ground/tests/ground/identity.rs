@@ -22,7 +22,7 @@ fn the_first_line_of_every_page_is_the_identity() {
     let demo =
         Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
     let cases = [
-        (demo, true, " DEMO: no real vehicle  mk2 boot 1A2B3C4D "),
+        (demo, true, " DEMO, NOT REAL  mk2 boot 1A2B3C4D "),
         (settings(false, true), true, " SIM boot 1A2B3C4D"),
         (settings(false, true), false, " LIVE boot 1A2B3C4D"),
         (Settings { role: Role::Watching, ..settings(false, true) }, false, " WATCH LIVE boot 1"),

@@ -50,7 +50,9 @@ fn in_every_state(rig: &mut Rig, kind: CommandKind, mut see: impl FnMut(&str, &R
     use Acknowledgement as A;
     rig.msg(Msg::Commanded(kind));
     let now = rig.now;
-    let is_ours = |rig: &Rig| rig.model.commands.tracks.iter().position(|track| track.kind == kind).unwrap();
+    let is_ours = |rig: &Rig| {
+        rig.model.commands.tracks.iter().position(|track| track.kind == kind).expect("it was commanded")
+    };
     for state in
         [A::Waiting, A::InProgress, A::Asked, A::GivenUp].into_iter().chain([0, 1, 3, 5, 9].map(A::Answered))
     {

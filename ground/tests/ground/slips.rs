@@ -111,6 +111,7 @@ fn nothing_says_lift_off_before_the_vehicle_has_moved() {
     rig.run(10.0);
     rig.state(0.0, 2.0, 0.0, 12.0, 90.0);
     rig.run(0.1);
+    rig.key(Key::Char(' '));
     let screen = rig.screen(120, 36);
     assert!(screen.contains("Rising") && screen.contains("●lift-off"), "{screen}");
 }
@@ -139,7 +140,7 @@ fn a_demonstration_says_on_every_page_that_no_vehicle_is_real() {
     for digit in "123456789".chars() {
         rig.key(Key::Char(digit));
         let screen = rig.screen(80, 24);
-        assert!(screen.lines().next().is_some_and(|row| row.contains(" DEMO: no real vehicle ")), "{screen}");
+        assert!(screen.lines().next().is_some_and(|row| row.contains(" DEMO, NOT REAL ")), "{screen}");
     }
     rig.keys(&ladder());
     assert!(rig.screen(20, 5).contains("DEMO"));

@@ -17,11 +17,10 @@ const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
 
 /// What was kept last.
 fn kept(rig: &Rig) -> Option<Unfinished> {
-    let kept = rig.actions.iter().rev().find_map(|action| match action {
+    rig.actions.iter().rev().find_map(|action| match action {
         Action::KeepUnfinished(kept) => Some(kept.clone()),
         _ => None,
-    });
-    kept
+    })
 }
 
 /// The vehicle has aborted on its pad.
