@@ -1,13 +1,17 @@
 //! Whether a command was accepted can be read on every screen: in every state, at every danger, in every theme and width.
 
+use std::fs;
+use std::path::Path;
+
 use ground::key::Key;
 use ground::model::{Acknowledgement, CommandKind};
 use ground::update::Msg;
-use ground::view::theme::{Palette, Theme};
+use ground::view::theme::{Level, Palette, Theme};
+use ground::view::top_lines::level;
 use protocol::dialect::{TdAbortEffect, TdBooster, TdInterlock, TdLatch, TdMotor, TdPhase};
 
 use crate::pictures::{contrast, flying};
-use crate::rig::svg::colours;
+use crate::rig::svg::{colours, picture};
 use crate::rig::{MONO, Rig};
 use crate::screens::{armed, coasting, on_the_pad, powered};
 
@@ -24,10 +28,10 @@ fn dangers() -> Vec<(&'static str, Rig)> {
     (down.motor, down.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 52);
     down.run(0.5);
     let mut pinned = flying(TdPhase::TD_PHASE_TOUCHDOWN);
-    pinned.motor = TdMotor::TD_MOTOR_PIN_IN;
+    (pinned.motor, pinned.approach_wait_s) = (TdMotor::TD_MOTOR_PIN_IN, 0);
     pinned.run(0.5);
     let mut waited = flying(TdPhase::TD_PHASE_TOUCHDOWN);
-    waited.motor = TdMotor::TD_MOTOR_LIVE;
+    (waited.motor, waited.approach_wait_s) = (TdMotor::TD_MOTOR_LIVE, 0);
     waited.run(0.5);
     let mut lost = coasting();
     lost.speaks = false;
@@ -89,6 +93,12 @@ fn unreadable(rig: &Rig, (columns, rows): (u16, u16), theme: Theme) -> Vec<Strin
 }
 
 #[test]
+fn the_dangers_have_every_colour_of_a_row() {
+    let levels: Vec<Level> = dangers().iter().map(|(_, rig)| level(&rig.model, rig.now)).collect();
+    assert!(Level::ALL.iter().all(|level| levels.contains(level)), "{levels:?}");
+}
+
+#[test]
 fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
     for (danger, mut rig) in dangers() {
         // The others stand in the last rows, whose ground is that of the page.
@@ -105,6 +115,23 @@ fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
                 }
             });
         }
+    }
+}
+
+/// For a look at it: an accepted abort at each danger in each theme, in `target/tmp/pictures`.
+#[test]
+fn an_accepted_abort_is_drawn_at_every_danger_in_every_theme() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
+    fs::create_dir_all(&folder).unwrap();
+    for (danger, mut rig) in dangers() {
+        in_every_state(&mut rig, CommandKind::Abort, |state, rig| {
+            for palette in Palette::ALL.into_iter().filter(|_| state.contains("Answered(0) Some")) {
+                let drawn = rig.draw(80, 24, Theme { palette, ascii: false });
+                let name = format!("abort-{danger}-{palette:?}.svg").replace(' ', "_");
+                fs::write(folder.join(name), picture(drawn.backend().buffer())).unwrap();
+                assert!(rig.screen(80, 24).contains("acknowledged accepted  observed yes"), "{danger}");
+            }
+        });
     }
 }
 
