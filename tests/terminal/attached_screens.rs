@@ -49,9 +49,9 @@ fn an_abort_asked_of_a_station_that_hangs_is_said_at_once_and_sent_when_it_goes_
     screen.type_bytes(b"\x18\r");
     screen.wait_for(" ABORT NOT SENT: the station hangs; it sends it when it goes on");
     assert_eq!(aborts_sent(&pad), 0);
-    // A new screen shows nothing of it, and says why.
+    // A new screen shows nothing of it, and says why, and what was asked.
     let mut late = pad.attach(&[], &[]);
-    late.wait_for("the station does not answer: it hangs or is stopped");
+    late.wait_for("the station does not answer: it hangs or is stopped; ABORT asked at ");
     late.wait_for_end();
     daemon.signal(Signal::SIGCONT);
     screen.wait_for_fact("ABORT", "acknowledged accepted  observed yes");

@@ -12,7 +12,7 @@ use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::clock::{Clock, Signals};
-use super::files::write_unfinished;
+use super::files::{read_unfinished, write_unfinished};
 use super::output::{Lines, Output};
 use super::replaying::Again;
 use super::server::read_one;
@@ -164,9 +164,12 @@ async fn take_history(
     (times, clock): (&mut Times, &Clock),
     viewer: &Viewer,
 ) -> anyhow::Result<()> {
-    let silent = "the station does not answer: it hangs or is stopped; nothing is shown of its vehicle";
+    // What another screen of this folder has kept for it.
+    let kept = read_unfinished(Some(Path::new("")), clock.unix_ns() / 1_000_000_000);
+    let asked = kept.and_then(|kept| kept.abort).map(|at| format!("; ABORT asked at {at} NOT CONFIRMED"));
+    let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
     loop {
-        let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.context(silent)?;
+        let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.with_context(|| silent.clone())?;
         let Some((told, at)) = told else { return Ok(()) };
         times.heard(at, clock.now());
         let live = told == ToScreen::Live;

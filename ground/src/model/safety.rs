@@ -156,8 +156,10 @@ impl Unfinished {
 impl Model {
     /// What is unfinished now.
     pub fn unfinished(&self, now: Duration) -> Unfinished {
+        // A final refusal is an answer, too.
         let confirmed = |track: &TrackedCommand| {
-            track.observed_at.is_some() && matches!(track.acknowledged, Acknowledgement::Answered(_))
+            let answered = matches!(track.acknowledged, Acknowledgement::Answered(_));
+            answered && (track.observed_at.is_some() || !track.accepted())
         };
         let abort = match self.commands.of(CommandKind::Abort) {
             Some(track) if confirmed(track) => None,

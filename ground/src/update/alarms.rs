@@ -84,10 +84,8 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
-    if let Some(why) = &model.abort_before {
-        let text = format!("ABORT asked at {why} NOT CONFIRMED: ask again?");
-        found.push((AlarmKind::AbortBefore, text));
-    }
+    let open = |at| (AlarmKind::AbortBefore, format!("ABORT asked at {at} NOT CONFIRMED: ask again?"));
+    found.extend(model.abort_before.as_ref().map(open));
     if let LogStanding::Unfit(_, words) | LogStanding::Warned(words) = model.station_log(now) {
         found.push((AlarmKind::Log, format!("STATION LOG {words}")));
     }

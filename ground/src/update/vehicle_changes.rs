@@ -72,11 +72,11 @@ pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
     }
     let present = model.unfinished(now);
     let (kept, at) = model.kept.clone().unwrap_or_default();
-    let wait_s = |unfinished: &Unfinished| unfinished.away.and_then(|away| away.wait_s);
+    let wait_s = |unfinished: &Unfinished| unfinished.away.and_then(|away| away.wait_s).unwrap_or(0);
     let about = |unfinished: &Unfinished| (unfinished.abort.clone(), unfinished.away.map(|away| away.danger));
-    let expected = kept.clone().after(now.saturating_sub(at).as_secs());
-    let differs_s = wait_s(&present).unwrap_or(0).abs_diff(wait_s(&expected).unwrap_or(0));
-    if about(&present) != about(&kept) || differs_s > KEPT_WITHIN_S {
+    let differs = about(&present) != about(&kept);
+    let expected = kept.after(now.saturating_sub(at).as_secs());
+    if differs || wait_s(&present).abs_diff(wait_s(&expected)) > KEPT_WITHIN_S {
         model.kept = Some((present.clone(), now));
         model.outbox.push(Action::KeepUnfinished(present));
     }

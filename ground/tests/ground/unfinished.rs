@@ -62,6 +62,17 @@ fn an_abort_and_its_wait_are_kept_until_it_is_confirmed_and_people_may_approach(
 }
 
 #[test]
+fn an_abort_that_was_refused_for_good_is_not_kept() {
+    let mut rig = counting();
+    rig.abort();
+    rig.run(0.2);
+    assert!(kept(&rig).is_some_and(|kept| kept.abort.is_some()));
+    rig.answer(ABORT, 4);
+    rig.run(0.2);
+    assert_eq!(kept(&rig), Some(Unfinished::default()));
+}
+
+#[test]
 fn a_demonstration_and_an_attached_screen_keep_nothing() {
     for change in [
         |settings: &mut Settings| settings.demonstration = true,
