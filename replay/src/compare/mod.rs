@@ -26,7 +26,7 @@ use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission, print_missions};
-pub use print::{compare_cases, print_compare};
+pub use print::print_compare;
 use serde::Serialize;
 pub use series::{Align, Anchors, Flown, Samples, Series};
 pub use tolerance::SignalDifference;
@@ -35,7 +35,7 @@ pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
 use crate::log::RecordingError;
 use crate::log::VerdictFacts;
-use crate::print::{print_json, print_junit};
+use crate::print::print_json;
 
 /// Why flights cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -259,11 +259,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.
-    #[arg(long, conflicts_with = "junit")]
-    json: bool,
-    /// Answer in JUnit XML.
     #[arg(long)]
-    junit: bool,
+    json: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -295,13 +292,7 @@ impl Args {
             comparisons.push(compare(&baseline, &other, align, &tolerances)?);
         }
         answer(|output| {
-            if self.json {
-                print_json(&comparisons, output)
-            } else if self.junit {
-                print_junit("compare", compare_cases(&comparisons), output)
-            } else {
-                print_compare(&comparisons, output)
-            }
+            if self.json { print_json(&comparisons, output) } else { print_compare(&comparisons, output) }
         })?;
         let within = |comparison: &Comparison| comparison.failures.is_empty();
         Ok(Outcome::Decided { yes: comparisons.iter().all(within) })
@@ -310,10 +301,7 @@ impl Args {
 
 impl Args {
     fn missions(&self) -> Result<Outcome> {
-        ensure!(
-            !self.junit && self.tolerances.is_none(),
-            "missions are compared without tolerances and JUnit"
-        );
+        ensure!(self.tolerances.is_none(), "missions are compared without tolerances");
         let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
         let compared = compare_missions(&self.baseline, &others)?;
         answer(

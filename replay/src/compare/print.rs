@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::{Align, Comparison, OverTheAir, Stream, WordsOfOne};
-use crate::print::{JunitCase, JunitOutcome, LimitRow, counted, shown, verdict_rows, verdict_words};
+use crate::print::{LimitRow, counted, shown, verdict_rows, verdict_words};
 
 /// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
@@ -179,37 +179,4 @@ fn print_signals(comparison: &Comparison, output: &mut impl Write) -> io::Result
 /// Escapes text for a table cell.
 fn cell(text: &str) -> String {
     shown(text).replace('|', "\\|")
-}
-
-/// Comparisons as test cases: one for the verdict and the counts, and one for each signal with a tolerance.
-pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
-    let mut cases = Vec::new();
-    for comparison in comparisons {
-        let flights = format!("{} against {}", shown(&comparison.other), shown(&comparison.baseline));
-        let mut of_signals = Vec::new();
-        for signal in comparison.signals.iter().filter(|signal| signal.tolerance.is_some()) {
-            let message = comparison
-                .failures
-                .iter()
-                .find(|failure| failure.starts_with(&format!("{}: ", signal.signal)))
-                .cloned()
-                .unwrap_or_default();
-            of_signals.push(message.clone());
-            let outcome = if signal.passed {
-                JunitOutcome::Passed { said: String::new() }
-            } else {
-                JunitOutcome::Failed { details: message.clone(), message }
-            };
-            cases.push(JunitCase { name: format!("{flights}: {}", signal.signal), outcome });
-        }
-        let others: Vec<String> =
-            comparison.failures.iter().filter(|failure| !of_signals.contains(failure)).cloned().collect();
-        let outcome = if others.is_empty() {
-            JunitOutcome::Passed { said: String::new() }
-        } else {
-            JunitOutcome::Failed { message: others.join("; "), details: others.join("\n") }
-        };
-        cases.push(JunitCase { name: format!("{flights}: verdict and signals"), outcome });
-    }
-    cases
 }

@@ -73,8 +73,6 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} frames identical")), "{stdout}");
     assert!(stdout.contains("flight 2 of 2: nothing was compared"), "{stdout}");
     assert!(!stdout.contains("0 of 0"), "{stdout}");
-    let (_, stdout, _) = verify(&honest, &["--junit"]);
-    assert!(stdout.contains("tests=\"2\"") && stdout.contains("errors=\"1\""), "{stdout}");
 }
 
 /// The start record again in the middle: the frames after it do not begin a new flight.
@@ -185,12 +183,6 @@ fn a_log_without_its_last_frames_is_not_complete() {
             assert!(name == "verdict" || stdout.contains(" in POWERED"), "{name}: {stdout}");
             let (code, stdout, _) = verify(&path, &["--strict"]);
             assert_eq!(code, 1, "{name}: {stdout}");
-            let (code, stdout, _) = verify(&path, &["--junit"]);
-            assert_eq!(code, 1, "{name}: {stdout}");
-            assert!(
-                stdout.contains("failures=\"1\"") && stdout.contains("INCOMPLETE flight: ends at T+"),
-                "{name}: {stdout}"
-            );
             let (code, stdout, _) = verify(&path, &["--json"]);
             let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
             assert_eq!((code, report["outcome"].as_str()), (0, Some("identical-readable-part")), "{name}");
