@@ -111,10 +111,9 @@ enum Command {
     /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
     #[command(after_help = "Example: replay refly flight.mcap --plant truth.impulse_scale=0.99")]
     Refly(refly::Args),
-    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words, what the air lost.
+    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words.
     ///
-    /// Signals are named as in an export. Of the vehicle's and a station's log of one flight it counts the messages that one end
-    /// sent and the other did not hear. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
+    /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
     /// setting by setting; exit code 1 if one differs.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk2 day/mission.toml"

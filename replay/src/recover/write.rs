@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
+use protocol::log::record::TOPIC_COMPUTER_START;
 
 use super::scan::WriterReport;
 use crate::output::{Destination, NewFile, WriteError};
@@ -27,6 +28,16 @@ pub(crate) struct Rescue<'a> {
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     kept: Kept,
+    /// Messages wait until the end, and are then written in order of time.
+    pub(crate) sorts: bool,
+    waiting: Vec<Waiting>,
+}
+
+struct Waiting {
+    header: MessageHeader,
+    data: Vec<u8>,
+    /// It begins a flight: of records of one time it comes first.
+    begins: bool,
 }
 
 /// What was kept.
@@ -63,6 +74,8 @@ impl<'a> Rescue<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             kept: Kept::default(),
+            sorts: false,
+            waiting: Vec::new(),
         })
     }
 
@@ -134,7 +147,12 @@ impl<'a> Rescue<'a> {
             return Ok(());
         }
         let header = MessageHeader { channel_id: *channel_id, ..header };
-        self.writer("")?.write_to_known_channel(&header, data)?;
+        if self.sorts {
+            let begins = topic == TOPIC_COMPUTER_START;
+            self.waiting.push(Waiting { header, data: data.to_vec(), begins });
+        } else {
+            self.writer("")?.write_to_known_channel(&header, data)?;
+        }
         self.kept.messages += 1;
         let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
         self.kept.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
@@ -182,6 +200,11 @@ impl<'a> Rescue<'a> {
     }
 
     fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        waiting.sort_by_key(|message| (message.header.log_time, !message.begins));
+        for Waiting { header, data, .. } in waiting {
+            self.writer("")?.write_to_known_channel(&header, &data)?;
+        }
         let writer = self.writer("")?;
         writer.write_metadata(about)?;
         writer.finish()?;

@@ -150,7 +150,7 @@ struct Contents {
 /// The file cannot be read, or is no log.
 fn read(path: &Path) -> Result<Contents, ReadError> {
     let failed = |source| ReadError::Read { path: path.to_owned(), source };
-    let mut reader = LogReader::new(BufReader::new(open_log(path).map_err(failed)?));
+    let mut reader = LogReader::new(BufReader::new(open_log(path).map_err(failed)?.0));
     let mut contents = Contents { name: path.display().to_string(), ..Contents::default() };
     while let Some(item) = reader.next_item().map_err(failed)? {
         if let LogItem::Message { channel_id, data, .. } = item

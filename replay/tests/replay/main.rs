@@ -24,6 +24,7 @@ mod from_estimate;
 mod from_power_up;
 mod ground_log;
 mod help;
+mod in_order;
 mod layouts;
 mod limits;
 mod lost_frames;

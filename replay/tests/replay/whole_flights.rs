@@ -82,7 +82,7 @@ fn a_start_copied_into_the_middle_is_no_flight() {
     let mut held = Held::read(&LANDED.log);
     let place = held.messages.len() / 2;
     let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
-    held.messages.insert(place, start);
+    held.messages.insert(place, start.at(held.messages[place].log_time_ns));
     let (code, stdout, _) = verify(&written(&held, &directory, "middle.mcap"), &[]);
     assert_eq!(code, 2, "{stdout}");
     assert!(stdout.contains("flight 1 of 2") && stdout.contains("INCOMPLETE flight: ends at T+"), "{stdout}");
