@@ -36,8 +36,8 @@ pub(crate) struct Rescue<'a> {
 struct Waiting {
     header: MessageHeader,
     data: Vec<u8>,
-    /// It begins a flight: of records of one time it comes first.
-    begins: bool,
+    /// It says what the flight computer starts from.
+    is_start: bool,
 }
 
 /// What was kept.
@@ -148,8 +148,8 @@ impl<'a> Rescue<'a> {
         }
         let header = MessageHeader { channel_id: *channel_id, ..header };
         if self.sorts {
-            let begins = topic == TOPIC_COMPUTER_START;
-            self.waiting.push(Waiting { header, data: data.to_vec(), begins });
+            let is_start = topic == TOPIC_COMPUTER_START;
+            self.waiting.push(Waiting { header, data: data.to_vec(), is_start });
         } else {
             self.writer("")?.write_to_known_channel(&header, data)?;
         }
@@ -201,7 +201,19 @@ impl<'a> Rescue<'a> {
 
     fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
         let mut waiting = std::mem::take(&mut self.waiting);
-        waiting.sort_by_key(|message| (message.header.log_time, !message.begins));
+        let starts = waiting.iter().filter(|message| message.is_start);
+        let power_up_ns = starts.map(|message| message.header.log_time).min();
+        // Of one time, the power-up comes before the first frame, and what a frame started from after that frame.
+        waiting.sort_by_key(|Waiting { header, is_start, .. }| {
+            let place = if !is_start {
+                1
+            } else if power_up_ns == Some(header.log_time) {
+                0
+            } else {
+                2
+            };
+            (header.log_time, place)
+        });
         for Waiting { header, data, .. } in waiting {
             self.writer("")?.write_to_known_channel(&header, &data)?;
         }

@@ -12,13 +12,14 @@ use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
 use crate::tampered::Held;
 
-/// The orders that other programs write: one topic after the other, and a later part first.
-fn in_other_orders(held: &Held) -> [Held; 2] {
-    let (mut by_topic, mut second_half_first) = (held.clone(), held.clone());
+/// The orders that other programs write: one topic after the other, from either end, and a later part first.
+fn in_other_orders(held: &Held) -> [Held; 3] {
+    let (mut by_topic, mut from_z, mut second_half_first) = (held.clone(), held.clone(), held.clone());
     by_topic.messages.sort_by(|a, b| a.topic.cmp(&b.topic));
+    from_z.messages.sort_by(|a, b| b.topic.cmp(&a.topic));
     let half = held.messages.len() / 2;
     second_half_first.messages.rotate_left(half);
-    [by_topic, second_half_first]
+    [by_topic, from_z, second_half_first]
 }
 
 fn assert_refused_as_unordered(log: &Path, directory: &Path) {
