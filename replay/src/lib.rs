@@ -18,7 +18,7 @@
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log;
+//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
 //!   [`cut`](mod@cut): makes a shorter one.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
 //! * [`print`](mod@print): what answers have in common: text without control characters, JSON.
@@ -127,7 +127,8 @@ enum Command {
         after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
     )]
     Export(export::Args),
-    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
+    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost; sorts one that is not in order
+    /// of time.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
     /// Cuts a log by time and topic, and says what of it can still be verified.

@@ -17,6 +17,7 @@ use campaign::motors::table;
 use clap::Args;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
+use protocol::mission::MissionHash;
 use sim::dispersion;
 
 use super::hazard::check_winds;
@@ -74,8 +75,8 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The files of a card.
-const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
+/// The files of a card; the last one only if another mass or motor is proposed.
+const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "proposal.toml"];
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
 
@@ -87,11 +88,11 @@ pub(crate) const CARD_EXAMPLE: &str =
 pub(crate) struct CardArguments {
     #[command(flatten)]
     choices: Choices,
-    /// The landing motor: an .eng or .rse file, or the name of one of the motors of --from (built in if not given). By default
-    /// the mission's own.
+    /// The landing motor of the proposal at the card's end: an .eng or .rse file, or the name of one of the motors of --from (built
+    /// in if not given). By default the mission's own.
     #[arg(long, value_name = "FILE|NAME")]
     motor: Option<String>,
-    /// Mass with the motor full, kg. By default the best one within --ballast.
+    /// Mass of the proposal with the motor full, kg. By default the best one within --ballast.
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
@@ -147,6 +148,7 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let order = Order {
         team: &team,
+        hash: &MissionHash::of(&team.recipe.mission_toml).to_string(),
         motor: &motor,
         mass_kg: arguments.mass,
         winds: &days,
@@ -157,9 +159,10 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         wind_from_deg: arguments.wind_from,
     };
     let card = on_threads(choices.jobs, || Ok(Card::new(&order, &show_progress())?))?;
-    let [html, text, mission_file] = FILES;
+    let [html, text, mission_file, proposal] = FILES;
     let page = card.text();
-    let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
+    let mut files = vec![(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
+    files.extend(card.proposed.map(|proposed| (proposal, proposed.mission_toml)));
     write_folder(&arguments.out, &files, arguments.force)?;
     let mut stdout = std::io::stdout().lock();
     write!(stdout, "{page}")?;
