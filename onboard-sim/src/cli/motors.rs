@@ -82,7 +82,7 @@ const CARD_FLIGHTS_MAX: u64 = 10_000;
 
 /// For the help.
 pub(crate) const CARD_EXAMPLE: &str =
-    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --out card";
+    "Example: onboard-sim card --mission mini-f10 --wind-from 270 --out card";
 
 #[derive(Args)]
 pub(crate) struct CardArguments {
@@ -119,12 +119,11 @@ pub(crate) struct CardArguments {
 pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let choices = &arguments.choices;
     check_winds(&arguments.winds)?;
-    if let Some(mass_kg) = arguments.mass {
-        anyhow::ensure!(
-            mass_kg.is_finite() && mass_kg > 0.0,
-            "--mass {mass_kg}: a mass in kg above 0 is accepted"
-        );
-    }
+    anyhow::ensure!(
+        arguments.mass.is_none_or(|mass_kg| mass_kg.is_finite() && mass_kg > 0.0),
+        "--mass {}: a mass in kg above 0 is accepted",
+        arguments.mass.unwrap_or_default()
+    );
     for name in FILES {
         refuse_loss(&arguments.out.join(name), arguments.force)?;
     }
@@ -164,9 +163,7 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let mut files = vec![(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
     files.extend(card.proposed.map(|proposed| (proposal, proposed.mission_toml)));
     write_folder(&arguments.out, &files, arguments.force)?;
-    let mut stdout = std::io::stdout().lock();
-    write!(stdout, "{page}")?;
-    writeln!(stdout, "card {}", arguments.out.join(html).display())?;
+    writeln!(std::io::stdout().lock(), "{page}card {}", arguments.out.join(html).display())?;
     Ok(ExitCode::SUCCESS)
 }
 

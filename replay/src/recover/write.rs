@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
-use protocol::log::record::TOPIC_COMPUTER_START;
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
 use super::scan::WriterReport;
 use crate::output::{Destination, NewFile, WriteError};
@@ -33,11 +33,31 @@ pub(crate) struct Rescue<'a> {
     waiting: Vec<Waiting>,
 }
 
+/// Of one time, what the computer starts from at power-up comes before its first frame. What a frame led to comes behind it, and
+/// the start at a release last.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    PowerUp,
+    Frame,
+    Other,
+    Start,
+}
+
+impl Place {
+    fn of(topic: &str) -> Self {
+        match topic {
+            TOPIC_COMPUTER_START => Self::Start,
+            TOPIC_COMPUTER_FRAME => Self::Frame,
+            _ => Self::Other,
+        }
+    }
+}
+
 struct Waiting {
     header: MessageHeader,
     data: Vec<u8>,
-    /// It says what the flight computer starts from.
-    is_start: bool,
+    /// Among the messages of one time.
+    place: Place,
 }
 
 /// What was kept.
@@ -148,8 +168,7 @@ impl<'a> Rescue<'a> {
         }
         let header = MessageHeader { channel_id: *channel_id, ..header };
         if self.sorts {
-            let is_start = topic == TOPIC_COMPUTER_START;
-            self.waiting.push(Waiting { header, data: data.to_vec(), is_start });
+            self.waiting.push(Waiting { header, data: data.to_vec(), place: Place::of(topic) });
         } else {
             self.writer("")?.write_to_known_channel(&header, data)?;
         }
@@ -201,19 +220,11 @@ impl<'a> Rescue<'a> {
 
     fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
         let mut waiting = std::mem::take(&mut self.waiting);
-        let starts = waiting.iter().filter(|message| message.is_start);
-        let power_up_ns = starts.map(|message| message.header.log_time).min();
-        // Of one time, the power-up comes before the first frame, and what a frame started from after that frame.
-        waiting.sort_by_key(|Waiting { header, is_start, .. }| {
-            let place = if !is_start {
-                1
-            } else if power_up_ns == Some(header.log_time) {
-                0
-            } else {
-                2
-            };
-            (header.log_time, place)
-        });
+        let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
+        if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
+            first.place = Place::PowerUp;
+        }
+        waiting.sort_by_key(|message| (message.header.log_time, message.place));
         for Waiting { header, data, .. } in waiting {
             self.writer("")?.write_to_known_channel(&header, &data)?;
         }

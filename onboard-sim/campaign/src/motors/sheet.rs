@@ -59,8 +59,8 @@ fn rows(title: &'static str, rows: Vec<Vec<String>>) -> Section {
 }
 
 /// A value that people ask for, and whether it is its usual least.
-fn judged(value: f64, least: f64) -> Option<String> {
-    Some(format!("{value:.1}: {}", if value < least { "TOO LOW" } else { "good" }))
+fn judged(value: f64, least: f64) -> String {
+    format!("{value:.1}: {}", if value < least { "TOO LOW" } else { "good" })
 }
 
 fn span([low, high]: [f64; 2]) -> String {
@@ -161,12 +161,12 @@ impl Card {
             ("landing", Some(motor(&mission.motor_curve))),
             ("both_n_s", Some(whole(self.rule.impulse_n_s))),
             ("lift_kg", launch.map(|launch| format!("{:.2}", lift_off_kg(mission, Some(launch))))),
-            ("thrust_to_weight", launch.and_then(|launch| judged(thrust_to_weight(mission, launch), 5.0))),
+            ("thrust_to_weight", launch.map(|launch| judged(thrust_to_weight(mission, launch), 5.0))),
             (
                 "rail_m_s",
-                self.as_planned(winds, |impact| impact.course.rail_m_s).and_then(|[least, _]| judged(least, 15.0)),
+                self.as_planned(winds, |impact| impact.course.rail_m_s).map(|[least, _]| judged(least, 15.0)),
             ),
-            ("calibres", launch.and_then(|launch| judged(calibres(mission, launch), 1.0))),
+            ("calibres", launch.map(|launch| judged(calibres(mission, launch), 1.0))),
             ("highest_m", self.told(winds, highest_m).map(|[_, most]| whole(most))),
             ("apogee", self.as_planned(winds, highest_m).map(span)),
             ("canopy_s", self.told(winds, |impact| impact.course.canopy_s).map(|[_, most]| whole(most))),
@@ -264,7 +264,10 @@ impl Card {
         let people = PEOPLE.map(|who| [vec![who.to_owned()], vec![String::new(); 6]].concat());
         Side {
             title: format!("Landing card: {}", self.named()),
-            subtitle: format!("For whoever prepares the vehicle, and for what nobody wants. From {}.", self.begins()),
+            subtitle: format!(
+                "For whoever prepares the vehicle, and for what nobody wants. From {}.",
+                self.begins()
+            ),
             sections: vec![
                 rows("If it goes otherwise", words_of("otherwise", values)),
                 Section {
