@@ -133,10 +133,8 @@ fn fly(path: &Path) -> Option<Flight> {
                 return None;
             }
             let any = |outcome| reports.iter().any(|report| report.outcome == outcome);
-            let identical = match reports.iter().all(|report| report.outcome == Verification::Identical) {
-                true => Some(true),
-                false => any(Verification::Diverged).then_some(false),
-            };
+            let all = reports.iter().all(|report| report.outcome == Verification::Identical);
+            let identical = if all { Some(true) } else { any(Verification::Diverged).then_some(false) };
             (identical, reports.iter().find_map(why_not))
         }
     };
@@ -198,20 +196,17 @@ pub(super) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
         let is_log = path.extension().is_some_and(|ending| ending == "mcap");
         let failed = || format!("{}: cannot be read", path.display());
         match path.metadata() {
-            Ok(found) if found.is_dir() => {
-                if seen.insert(path.canonicalize().with_context(failed)?) {
-                    let entries: io::Result<Vec<_>> = std::fs::read_dir(&path).and_then(Iterator::collect);
-                    let mut entries = entries.with_context(failed)?;
-                    entries.sort_by_key(DirEntry::path);
+            Ok(found) if found.is_dir() && seen.insert(path.canonicalize().with_context(failed)?) => {
+                let entries: io::Result<Vec<_>> = std::fs::read_dir(&path).and_then(Iterator::collect);
+                let mut entries = entries.with_context(failed)?;
+                entries.sort_by_key(DirEntry::path);
+                for entry in entries {
                     // What is itself here comes before what only leads here, so that it keeps its name.
-                    let (links, itself) = entries
-                        .into_iter()
-                        .map(|entry| entry.path())
-                        .partition::<Vec<_>, _>(|path| path.is_symlink());
-                    left.extend(itself);
-                    links.into_iter().for_each(|link| left.push_front(link));
+                    let is_link = entry.path().is_symlink();
+                    if is_link { left.push_front(entry.path()) } else { left.push_back(entry.path()) }
                 }
             }
+            Ok(found) if found.is_dir() => {}
             Ok(found) if is_log && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
             Err(error) if path == directory => return Err(error).with_context(failed),
             _ if is_log => say(&format!("left out: {}: no file, or here already", path.display())),
@@ -278,7 +273,7 @@ fn print(judged: &[Judged], output: &mut impl Write) -> io::Result<()> {
     let width = judged.iter().map(|judged| judged.log.chars().count()).max().unwrap_or(0).clamp(6, 40);
     writeln!(output, "{:<width$}  {:<24} {:>8} {:>8}  ending", "log", "change", "before", "margin")?;
     for Judged { log, change, before, now } in judged {
-        let margin = |flight: &Option<&Flight>| {
+        let margin = |flight: Option<&Flight>| {
             flight
                 .and_then(|flight| flight.margin)
                 .map_or_else(|| "-".to_owned(), |margin| format!("{margin:.3}"))
@@ -289,7 +284,7 @@ fn print(judged: &[Judged], output: &mut impl Write) -> io::Result<()> {
             (_, None) => "no flight has its name",
         };
         let (log, word, words) = (shown(log), change.word(), shown(words));
-        writeln!(output, "{log:<width$}  {word:<24} {:>8} {:>8}  {words}", margin(before), margin(now))?;
+        writeln!(output, "{log:<width$}  {word:<24} {:>8} {:>8}  {words}", margin(*before), margin(*now))?;
     }
     writeln!(output, "{}", counted(judged.len() as u64, "flight"))
 }

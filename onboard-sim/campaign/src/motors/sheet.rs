@@ -63,6 +63,17 @@ fn judged(value: f64, least: f64) -> String {
     format!("{value:.1}: {}", if value < least { "TOO LOW" } else { "good" })
 }
 
+/// Least and greatest of what flights tell.
+fn told<'a>(
+    flights: impl Iterator<Item = &'a Impact>,
+    of: impl Fn(&Impact) -> Option<f64>,
+) -> Option<[f64; 2]> {
+    flights.filter_map(of).fold(None, |found, value| {
+        let [low, high] = found.unwrap_or([value; 2]);
+        Some([f64::min(low, value), f64::max(high, value)])
+    })
+}
+
 fn span([low, high]: [f64; 2]) -> String {
     format!("{low:.0} to {high:.0} m")
 }
@@ -121,16 +132,8 @@ impl Card {
         self.flown.iter().filter(move |(wind_m_s, _)| *wind_m_s <= most_m_s).flat_map(|(_, impacts)| impacts)
     }
 
-    /// Least and greatest of what flights tell.
-    fn told(&self, winds: &[InWind], of: impl Fn(&Impact) -> Option<f64>) -> Option<[f64; 2]> {
-        self.flights(winds).filter_map(of).fold(None, |found, value| {
-            let [low, high] = found.unwrap_or([value; 2]);
-            Some([f64::min(low, value), f64::max(high, value)])
-        })
-    }
-
     fn as_planned(&self, winds: &[InWind], of: impl Fn(&Impact) -> Option<f64>) -> Option<[f64; 2]> {
-        self.told(winds, |impact| of(impact).filter(|_| impact.way == Way::AsPlanned))
+        told(self.flights(winds).filter(|impact| impact.way == Way::AsPlanned), of)
     }
 
     fn launch(&self) -> Option<&Launch> {
@@ -150,6 +153,7 @@ impl Card {
         let burns = mission.lot.as_ref().filter(|lot| lot.burns > 0);
         let upwind_s = launch.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0);
         let highest_m = |impact: &Impact| Some(impact.course.highest_m);
+        let calm = self.flown.iter().take(1).flat_map(|(_, impacts)| impacts);
         let whole = |value: f64| format!("{value:.0}");
         let if_so = |is_so: bool| is_so.then(String::new);
         vec![
@@ -167,9 +171,12 @@ impl Card {
                 self.as_planned(winds, |impact| impact.course.rail_m_s).map(|[least, _]| judged(least, 15.0)),
             ),
             ("calibres", launch.map(|launch| judged(calibres(mission, launch), 1.0))),
-            ("highest_m", self.told(winds, highest_m).map(|[_, most]| whole(most))),
-            ("apogee", self.as_planned(winds, highest_m).map(span)),
-            ("canopy_s", self.told(winds, |impact| impact.course.canopy_s).map(|[_, most]| whole(most))),
+            ("highest_m", told(self.flights(winds), highest_m).map(|[_, most]| whole(most))),
+            ("apogee", told(calm.filter(|impact| impact.way == Way::AsPlanned), highest_m).map(span)),
+            (
+                "canopy_s",
+                told(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| whole(most)),
+            ),
             ("lying", Some(self.lying(winds))),
             ("lit", self.as_planned(winds, |impact| impact.course.lit_at_m).map(span)),
             ("hold_s", Some(whole(HOLD_LIMIT_S))),
