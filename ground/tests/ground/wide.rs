@@ -58,7 +58,9 @@ fn a_text_and_a_name_of_wide_letters_leave_nothing_of_the_page_before() {
     settings.seat = Seat::new(1, "山田太郎");
     let mut rig = Rig::new(settings);
     rig.run(1.0);
-    rig.msg(Msg::Crew { seats: vec![Seat::new(1, "山田太郎"), Seat::new(2, "김철수")], silent: Vec::new() });
+    rig.msg(Msg::Crew {
+        seats: vec![Seat::new(1, "山田太郎"), Seat::new(2, "김철수")], silent: Vec::new()
+    });
     for text in [
         "点火ゲートが閉じています: 傾き",
         "착륙 다리가 펴졌습니다 한국어 문장은 두 칸입니다",

@@ -332,6 +332,12 @@ mod tests {
     }
 
     #[test]
+    fn a_foot_s_switch_that_closes_high_up_ends_no_flight() {
+        let ended = fall(|height_m, _, input| input.contact = height_m > 100.0, NO_ABORT_M);
+        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
+    }
+
+    #[test]
     fn what_lasts_brings_the_parachute_above_the_commit_height() {
         assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
         assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);

@@ -30,6 +30,8 @@ use crate::vehicle::mission::StartPoint;
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// A fin farther than this from its command has not reached it, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
+/// Heights of a landing, m: a field's slope, the pressure's errors and the weather of a day.
+const NEAR_GROUND_M: f64 = 15.0;
 /// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -357,7 +359,11 @@ impl Pilot {
             }
             _ => {}
         }
-        if input.contact && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed) {
+        let under_parachute = table.mode().phase == Phase::Chute;
+        if input.contact
+            && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed)
+            && (under_parachute || self.is_near_the_ground(estimate, time_s, sensors))
+        {
             let (thrust_n, weight_n) = self.thrust_and_weight_n(time_s);
             let thrust_below_weight = thrust_n < weight_n;
             self.happen(table, Event::Contact { thrust_below_weight }, time_s);
@@ -365,6 +371,14 @@ impl Pilot {
         if table.mode().motor == Motor::Burning && self.model.burn_is_over(time_s) {
             self.happen(table, Event::Burnout, time_s);
         }
+    }
+
+    /// Whether any height is that of a landing: a foot's switch alone ends no flight.
+    fn is_near_the_ground(&self, estimate: &Estimate, time_s: f64, sensors: &SensorWatch) -> bool {
+        let below_cg_m = estimate.state.position_m.z - self.feet_height_m(estimate);
+        self.feet_height_m(estimate) <= NEAR_GROUND_M
+            || self.speeds.altitude_m(time_s).is_some_and(|height_m| height_m - below_cg_m <= NEAR_GROUND_M)
+            || sensors.lidar_range_m().is_some_and(|range_m| range_m <= NEAR_GROUND_M)
     }
 
     /// The motor's thrust as estimated, and the weight, N.
