@@ -78,7 +78,7 @@ const SAID: [(&str, &str); 16] = [
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk2 --flights", "GO"),
     ("replay verify logs --baseline baseline.json --accept", "new"),
-    ("replay verify logs --baseline baseline.json --junit", "same"),
+    ("replay verify logs --baseline baseline.json   ", "same"),
     ("onboard-sim motors --mission mini-f10 ", "scatter"),
 ];
 

@@ -211,7 +211,7 @@ fn a_copter_is_not_armed_and_an_abort_of_it_asks_first() {
     );
     screen.wait_until("whose it is", |window| {
         let rows = window.rows();
-        (rows[0].contains("NOT A TOUCHDOWN VEHICLE: ArduPilot quadrotor") && rows[1].contains("ACRO"))
+        (rows[0].contains("NOT A TOUCHDOWN VEHICLE: ArduPilot quadrotor") && rows[1].contains("mode 1"))
             .then_some(())
     });
     screen.wait_for("up 0s");

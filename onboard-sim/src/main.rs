@@ -52,8 +52,9 @@ enum Command {
     /// Write the sheet that a team takes to the field, and the mission to load; refused for what cannot land.
     ///
     /// The folder gets card.html and card.txt (the same sheet: its front is for the range safety officer, its back for whoever
-    /// prepares the vehicle) and mission.toml (for fly, campaign, hazard and the vehicle). In each wind every way in which a flight
-    /// can end is flown 100 times, and the farthest ones 400 times: some minutes.
+    /// prepares the vehicle), mission.toml (the mission that was given, byte for byte), and proposal.toml if another mass or motor
+    /// stands more scatter. In each wind every way in which a flight can end is flown 100 times, and the farthest ones 400 times: some
+    /// minutes.
     #[command(after_help = cli::motors::CARD_EXAMPLE)]
     Card(cli::motors::CardArguments),
     /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.

@@ -104,18 +104,20 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
     let progress = stderr(&written);
     assert!(progress.contains("12 of 12 flights\n"), "{progress}");
     let card = directory.path().join("card");
-    assert_eq!(names(&card), ["card.html", "card.txt", "mission.toml"]);
+    assert_eq!(names(&card), ["card.html", "card.txt", "mission.toml"], "no heavier mk2 stands more");
+    let mission = fs::read_to_string(card.join("mission.toml")).unwrap();
+    assert_eq!(mission, include_str!("../flight/vehicles/missions/mk2.toml"), "byte for byte");
     let text = fs::read_to_string(card.join("card.txt")).unwrap();
     for expected in [
-        "Range safety: mk2-h45w",
+        "Range safety: mk2, mission ",
         "no radius, no rate and no wind to fly in. Do not fly by this card.",
         "--dispersion real --wind 0,6 --seed 1 --flights 2 --hazard-flights 3",
         "landing motor lit ",
         "Book of station 1 ______ : ______ - ",
         "signature",
-        "Landing card: mk2-h45w",
+        "Landing card: mk2, mission ",
         "3.100 kg",
-        "Apogee or drop",
+        "Highest point above the pad",
         "[ ] Weigh the vehicle",
     ] {
         assert!(text.contains(expected), "{expected} in\n{text}");
@@ -128,6 +130,24 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
     let again = run(directory.path(), &arguments);
     assert_eq!(again.status.code(), Some(1));
     assert!(stderr(&again).contains("card.html exists already; --force"), "{}", stderr(&again));
+}
+
+/// The station refuses a vehicle whose mission has another hash.
+#[test]
+fn the_mission_of_a_card_is_the_one_that_flies_and_another_mass_is_a_proposal() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, mission) in flight::vehicles::mission::BUILTIN {
+        let few = ["--wind", "0", "--flights", "1", "--hazard-flights", "1", "--dispersion", "none"];
+        let card = [&["card", "--mission", name, "--out", name][..], &few].concat();
+        let written = run(directory.path(), &card);
+        assert_eq!(written.status.code(), Some(0), "{name}: {}", stderr(&written));
+        let file = |file: &str| fs::read_to_string(directory.path().join(name).join(file)).unwrap();
+        assert_eq!(file("mission.toml"), *mission, "{name}");
+        let hash = protocol::mission::MissionHash::of(mission).to_string();
+        assert!(file("card.txt").contains(&hash) && file("card.html").contains(&hash), "{name}");
+    }
+    let proposed = fs::read_to_string(directory.path().join("mk3/proposal.toml")).unwrap();
+    assert!(proposed.contains("name = \"mk3-h45w\"") && proposed.contains("loaded_kg = 3.377"), "{proposed}");
 }
 
 #[test]

@@ -3,8 +3,6 @@
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, ensure};
 use campaign::run::threads;
@@ -127,20 +125,6 @@ pub(crate) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> Resul
         let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
     })
-}
-
-/// A flag that the first Ctrl-C (or a request to terminate) sets, so that what was found is still printed. The second
-/// one ends the program.
-pub(crate) fn stop_on_interrupt() -> Result<Arc<AtomicBool>> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
-    use signal_hook::flag;
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        flag::register_conditional_shutdown(signal, i32::from(EXIT_NO_ANSWER), Arc::clone(&stop))
-            .and_then(|_| flag::register(signal, Arc::clone(&stop)))
-            .context("cannot wait for Ctrl-C")?;
-    }
-    Ok(stop)
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.

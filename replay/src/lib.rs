@@ -10,19 +10,18 @@
 //! * [`findings`]: what went wrong in a flight, first in time.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
-//!   holds a regression suite of flights against a baseline, and proves the books of ground stations.
+//!   holds a directory of logs against a baseline, and proves the books of ground stations.
 //! * [`settings`]: other settings for a recorded flight, named as in its mission.
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
-//! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop), with one setting
-//!   or many; finds the smallest change of a setting that changes the verdict.
+//! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
 //! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals; what all flights so far
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log;
+//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
 //!   [`cut`](mod@cut): makes a shorter one.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
-//! * [`print`](mod@print): what answers have in common: text without control characters, JSON, JUnit XML.
+//! * [`print`](mod@print): what answers have in common: text without control characters, JSON.
 
 pub mod cli;
 pub mod compare;
@@ -58,15 +57,15 @@ use crate::cli::{Outcome, answer};
 /// Exit codes:
 ///   0  success: the log is described, or every frame that could be read is identical
 ///   1  verify: something differs or cannot be, or with --strict not all that can be compared was; with --baseline some
-///      flight got worse, lands no longer, diverged, is missing or was not verified; with --book a book is broken, or its end is not proven;
+///      flight got worse, lands no longer, diverged or is lost; with --book a book is broken, or its end is not proven;
 ///      compare: more differs or is missing than is tolerated, or the verdicts differ;
 ///      fit: NO-GO
 ///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
 ///      some frame (no frames, no profile, frames missing) and all others are identical;
 ///      or a file would be overwritten
 ///
-/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict (implied by
-/// --junit) and by compare.
+/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict
+/// and by compare.
 #[derive(Debug, Parser)]
 #[command(
     name = "replay",
@@ -95,11 +94,11 @@ enum Command {
     /// frame that differs).
     ///
     /// With --explain one recorded frame is solved again: cost, residuals, active constraints, warm against cold start,
-    /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again,
+    /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again
     /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
     #[command(
-        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json --junit=suite.xml\n  replay verify --book ground.mcap vehicle.mcap"
+        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json\n  replay verify --book ground.mcap vehicle.mcap"
     )]
     Verify(verify::Args),
     /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
@@ -110,16 +109,11 @@ enum Command {
     /// The flight is flown again from its start with the recorded draw up to that moment, because a log does not hold the
     /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
     /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
-    ///
-    /// With --vary flights are flown with many settings, which are ranked by the worst flight's margin.
-    #[command(
-        after_help = "Examples:\n  replay refly flight.mcap --plant truth.impulse_scale=0.99\n  replay refly a.mcap b.mcap --vary powered.weights.theta=50:110:7"
-    )]
+    #[command(after_help = "Example: replay refly flight.mcap --plant truth.impulse_scale=0.99")]
     Refly(refly::Args),
-    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words, what the air lost.
+    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words.
     ///
-    /// Signals are named as in an export. Of the vehicle's and a station's log of one flight it counts the messages that one end
-    /// sent and the other did not hear. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
+    /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
     /// setting by setting; exit code 1 if one differs.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk2 day/mission.toml"
@@ -133,7 +127,8 @@ enum Command {
         after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
     )]
     Export(export::Args),
-    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost.
+    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost; sorts one that is not in order
+    /// of time.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
     /// Cuts a log by time and topic, and says what of it can still be verified.

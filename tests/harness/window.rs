@@ -95,7 +95,9 @@ impl Window {
 
     /// The row with the facts about a command.
     pub fn facts_about(&self, command: &str) -> Option<String> {
-        self.row_with(&format!(" {command:<6} commanded "))
+        // Beside the key of the abort there may be no room for its time.
+        let whole = self.row_with(&format!(" {command:<6} commanded "));
+        whole.or_else(|| self.row_with(&format!(" {command} x")))
     }
 
     /// Whether a row contains these words.

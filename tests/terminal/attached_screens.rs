@@ -39,6 +39,50 @@ fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_s
     assert_eq!(second.wait().code, Some(4), "the exit code of an aborted flight");
 }
 
+#[test]
+fn an_abort_asked_of_a_station_that_hangs_is_said_at_once_and_sent_when_it_goes_on() {
+    let pad = Pad::new();
+    let daemon = pad.daemon("flight.mcap");
+    let mut screen = pad.attach(&[], &[]);
+    screen.wait_for("every arming check passes");
+    daemon.signal(Signal::SIGSTOP);
+    screen.type_bytes(b"\x18\r");
+    screen.wait_for(" ABORT NOT SENT: the station hangs; it sends it when it goes on");
+    assert_eq!(aborts_sent(&pad), 0);
+    // A new screen shows nothing of it, and says why, and what was asked.
+    let mut late = pad.attach(&[], &[]);
+    late.wait_for("the station does not answer: it hangs or is stopped; ABORT asked at ");
+    late.wait_for_end();
+    daemon.signal(Signal::SIGCONT);
+    screen.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    daemon.signal(Signal::SIGTERM);
+    assert_eq!(daemon.wait().code, Some(4), "the exit code of an aborted flight");
+}
+
+#[test]
+fn the_station_after_one_that_hung_says_which_abort_was_asked_and_not_confirmed() {
+    let pad = Pad::new();
+    let first = pad.daemon("first.mcap");
+    let mut screen = pad.attach(&[], &[]);
+    screen.wait_for("every arming check passes");
+    first.signal(Signal::SIGSTOP);
+    screen.type_bytes(b"\x18\r");
+    screen.wait_for(" ABORT NOT SENT: the station hangs");
+    screen.signal(Signal::SIGKILL);
+    screen.wait_for_end();
+    first.signal(Signal::SIGKILL);
+    first.wait();
+    let second = pad.daemon("second.mcap");
+    let mut shown = pad.attach(&[], &[]);
+    shown.wait_for("ALARM ABORT asked at ");
+    assert_eq!(aborts_sent(&pad), 0, "nothing is sent by itself");
+    shown.type_bytes(b"\x18\r");
+    shown.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    shown.wait_until("no open abort", |window| (!window.shows("ABORT asked at ")).then_some(()));
+    second.signal(Signal::SIGTERM);
+    assert_eq!(second.wait().code, Some(4), "the exit code of an aborted flight");
+}
+
 /// Whether a sequence of ECMA-48's SGR sets a colour: 30 to 37 and 40 to 47, 38 and 48 with more behind them. A place of the
 /// cursor may have the same numbers.
 fn has_colour(bytes: &[u8]) -> bool {

@@ -96,7 +96,7 @@ fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_re
     let attempts = rig.wait_for_fact("ABORT", "acknowledged ");
     assert!(attempts >= 5, "{attempts}");
     rig.terminal.wait_until("an answer to the abort", |window| {
-        let facts = window.row_with("ABORT  commanded")?;
+        let facts = window.facts_about("ABORT")?;
         (facts.contains("accepted") || facts.contains("REFUSED")).then_some(())
     });
 }

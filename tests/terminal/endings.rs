@@ -32,12 +32,17 @@ fn whole_log(path: &Path, topic: &str) -> Vec<String> {
 #[test]
 fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     type Ending = fn(&mut Terminal);
-    let endings: [(Ending, bool); 4] = [
+    let endings: [(Ending, bool); 8] = [
         (|terminal| terminal.type_by_hand(b"q"), false),
         // Ctrl-C, as a terminal that distinguishes repeats sends it.
         (|terminal| terminal.type_bytes(b"\x1b[99;5u"), true),
         (|terminal| terminal.signal(Signal::SIGTERM), true),
         (|terminal| terminal.signal(Signal::SIGINT), false),
+        // What would otherwise end it with the terminal as the screen has it.
+        (|terminal| terminal.signal(Signal::SIGQUIT), false),
+        (|terminal| terminal.signal(Signal::SIGUSR1), false),
+        (|terminal| terminal.signal(Signal::SIGUSR2), false),
+        (|terminal| terminal.signal(Signal::SIGABRT), false),
     ];
     for (end, tells_repeats) in endings {
         let mut rig = Rig::on_terminal("mk2", tells_repeats, "xterm-256color");

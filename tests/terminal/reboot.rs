@@ -87,6 +87,33 @@ fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
     rig.terminal.wait_for_end();
 }
 
+/// Vehicle and station are both switched off during the wait, and started again by the same commands.
+#[test]
+fn the_wait_after_an_abort_goes_on_when_vehicle_and_station_are_started_again() {
+    let mut rig = Rig::new("mk2");
+    rig.arm();
+    rig.start();
+    rig.abort();
+    rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
+    rig.terminal.wait_for("do not approach for");
+    rig.terminal.type_by_hand(b"q");
+    rig.terminal.wait_for("people must keep away, DO NOT APPROACH");
+    rig.type_until(b"qquit\r", "the screen was quit; people must keep away, so the station");
+    rig.terminal.signal(Signal::SIGTERM);
+    assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
+    rig.reboot_vehicle();
+    let link = rig.proxy.ground_link();
+    let again = ground(rig.folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
+    rig.terminal = Terminal::start(&again, SIZE, false);
+    rig.terminal.wait_until("a vehicle that must not be approached", |window| {
+        let fresh = window.rows()[0].contains(" down 0s up 0s");
+        (fresh && window.shows("do not approach for")).then_some(())
+    });
+    rig.type_until(b"0AARM\r", "cannot arm: do not approach for");
+    rig.terminal.signal(Signal::SIGTERM);
+    rig.terminal.wait_for_end();
+}
+
 /// The vehicle listens. It is killed in its descent and started again at the same address.
 #[test]
 fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands() {

@@ -1,6 +1,6 @@
 //! A window whose size changes.
 
-use e2e::Window;
+use e2e::{Signal, Window};
 
 use super::rig::{Rig, SIZE};
 
@@ -78,6 +78,9 @@ fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
     });
     // The keys are typed with a pause after the previous key.
     rig.terminal.type_by_hand(b"0q");
+    // Its motor is hot.
+    rig.terminal.wait_for("people must keep away, DO NOT APPROACH");
+    rig.terminal.signal(Signal::SIGTERM);
     rig.terminal.wait_for_end();
     assert!(rig.terminal.is_restored());
 }

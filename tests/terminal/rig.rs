@@ -89,7 +89,7 @@ impl Rig {
 
     pub(crate) fn abort(&mut self) {
         self.terminal.type_bytes(b"\x18\r");
-        self.terminal.wait_for("ABORT  commanded");
+        self.wait_for_fact("ABORT", "acknowledged ");
     }
 
     /// Waits until the facts about a command contain these words; returns the number of attempts shown.

@@ -8,9 +8,10 @@ use protocol::log::record::{EventLevel, Record};
 use tokio::io::{AsyncRead, AsyncWriteExt as _};
 use tokio::net::unix::OwnedWriteHalf;
 use tokio::sync::mpsc;
-use tokio::time::{MissedTickBehavior, interval};
+use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::clock::{Clock, Signals};
+use super::files::{read_unfinished, write_unfinished};
 use super::output::{Lines, Output, print};
 use super::replaying::Again;
 use super::server::read_one;
@@ -20,11 +21,16 @@ use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::{Action, Bindings, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk};
+use crate::model::{
+    Action, Bindings, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished,
+    asked_words,
+};
 use crate::update::{Msg, update};
 
 /// The period of the screen's own ticks: dialogs and chords expire even while the station sends nothing.
 const TICK: Duration = Duration::from_millis(100);
+/// A station that says nothing for so long hangs: its next message of its past takes a moment.
+const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
 /// How often a lost station is looked for again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// How many messages from the station may wait.
@@ -59,20 +65,14 @@ pub async fn session(
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
     let mut times = Times::default();
-    // Takes the history first, so that the first drawn frame is complete.
-    let mut live = false;
-    while !live && let Some((told, at)) = link.told.recv().await {
-        times.heard(at, clock.now());
-        live = told == ToScreen::Live;
-        check_version(&told)?;
-        take(&mut model, told, at, viewer);
-    }
+    take_history(&mut link, &mut model, (&mut times, &clock), viewer).await?;
     let mut output = open_output(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
     let mut again = Again::default();
+    let mut unsent_is_kept = false;
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -105,7 +105,8 @@ pub async fn session(
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // If the lost station was repeating an abort, the next station must send it.
-                    model.link.abort_unsent |= !viewer.watch && model.commands.is_aborting();
+                    let asked = model.link.abort_asked_at.take().is_some() || model.commands.is_aborting();
+                    model.link.abort_unsent |= !viewer.watch && asked;
                     // If the station went away while sending the history, the history ends here.
                     model.history_ends();
                     model.link.station_gone = true;
@@ -147,6 +148,8 @@ pub async fn session(
             again.leave(&mut output);
         }
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
+        let unix_s = clock.unix_ns() / 1_000_000_000;
+        keep_unsent(&mut unsent_is_kept, &mut model, unix_s, times.theirs(clock.now()));
         let now = clock.now();
         let (shown, shown_now) = again.shown().unwrap_or((&model, times.theirs(now)));
         output.show(shown, now, shown_now)?;
@@ -163,6 +166,30 @@ fn open_output(interactive: bool, config: &Config) -> anyhow::Result<Output> {
         print(LINES_ONLY)?;
     }
     Output::open(interactive, config)
+}
+
+/// Takes the history first, so that the first drawn frame is complete.
+async fn take_history(
+    link: &mut StationConnection,
+    model: &mut Model,
+    (times, clock): (&mut Times, &Clock),
+    viewer: &Viewer,
+) -> anyhow::Result<()> {
+    // What another screen of this folder has kept for it.
+    let kept = read_unfinished(Some(Path::new("")), clock.unix_ns() / 1_000_000_000);
+    let asked = kept.and_then(|kept| kept.abort).map(|at| format!("; ABORT asked at {at} NOT CONFIRMED"));
+    let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
+    loop {
+        let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.with_context(|| silent.clone())?;
+        let Some((told, at)) = told else { return Ok(()) };
+        times.heard(at, clock.now());
+        let live = told == ToScreen::Live;
+        check_version(&told)?;
+        take(model, told, at, viewer);
+        if live {
+            return Ok(());
+        }
+    }
 }
 
 fn check_version(told: &ToScreen) -> anyhow::Result<()> {
@@ -195,8 +222,13 @@ async fn act(
     let mut quit = false;
     for action in actions {
         match action {
-            Action::Request(request) if !link.ask(&ToStation::Request(request)).await => {
-                report_unsent(model, request, now);
+            Action::Request(request) => {
+                let is_sent = link.ask(&ToStation::Request(request)).await;
+                if !is_sent {
+                    report_unsent(model, request, now);
+                } else if request == Request::Command(CommandKind::Abort) {
+                    model.link.abort_asked_at.get_or_insert(now);
+                }
             }
             Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
                 link.ask(&ToStation::Key(action.detail)).await;
@@ -222,6 +254,21 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
         None => stations::station_over(links).await?,
     };
     StationConnection::open(&place, viewer).await.ok()
+}
+
+/// Keeps an abort beside the station's log while its station has not sent it, for the next station and its screens. A station
+/// that goes on keeps it by itself.
+fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
+    let abort = model.link.why_abort_not_sent(now).map(|_| asked_words(unix_s, &model.settings.seat));
+    let changes = abort.is_some() != std::mem::replace(is_kept, abort.is_some());
+    if !changes || (abort.is_none() && !model.link.is_station_gone()) {
+        return;
+    }
+    let folder = model.settings.log_path.as_deref().and_then(|log| Path::new(log).parent());
+    let kept = Unfinished { abort, ..model.unfinished(now) };
+    if let Some(Err(error)) = folder.map(|folder| write_unfinished(folder, &kept, unix_s)) {
+        model.warn(now, format!("the next station will not know of this abort: {error:#}"));
+    }
 }
 
 /// Tells the crew that a request has not reached any station.

@@ -1,5 +1,7 @@
 //! The clock, the only place that reads the time; and the signals that end the program.
 
+use std::future::poll_fn;
+use std::task::Poll;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context as _;
@@ -80,14 +82,13 @@ fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
+/// POSIX.1-2017, `kill`: its number is the same everywhere.
+const SIGABRT: i32 = 6;
+
 // Waits for the signals that end the program. None of them affects the vehicle.
 
-/// The signals that end the program.
-pub struct Signals {
-    interrupt: Signal,
-    terminate: Signal,
-    hangup: Signal,
-}
+/// The signals that end the program, with their names: every one that would otherwise leave the terminal as the screen has it.
+pub struct Signals([(Signal, &'static str); 7]);
 
 impl Signals {
     /// Begins to listen.
@@ -95,20 +96,27 @@ impl Signals {
     /// # Errors
     /// The system refuses.
     pub fn listen() -> anyhow::Result<Self> {
-        let listen = |kind| signal(kind).context("listening for signals");
-        Ok(Self {
-            interrupt: listen(SignalKind::interrupt())?,
-            terminate: listen(SignalKind::terminate())?,
-            hangup: listen(SignalKind::hangup())?,
-        })
+        let listen =
+            |kind, name| Ok::<_, anyhow::Error>((signal(kind).context("listening for signals")?, name));
+        Ok(Self([
+            listen(SignalKind::interrupt(), "SIGINT")?,
+            listen(SignalKind::terminate(), "SIGTERM")?,
+            listen(SignalKind::hangup(), "SIGHUP")?,
+            listen(SignalKind::quit(), "SIGQUIT")?,
+            listen(SignalKind::user_defined1(), "SIGUSR1")?,
+            listen(SignalKind::user_defined2(), "SIGUSR2")?,
+            listen(SignalKind::from_raw(SIGABRT), "SIGABRT")?,
+        ]))
     }
 
     /// The next one's name.
     pub async fn next(&mut self) -> &'static str {
-        tokio::select! {
-            _ = self.interrupt.recv() => "SIGINT",
-            _ = self.terminate.recv() => "SIGTERM",
-            _ = self.hangup.recv() => "SIGHUP",
-        }
+        poll_fn(|context| {
+            let mut signals = self.0.iter_mut();
+            let come =
+                signals.find_map(|(signal, name)| signal.poll_recv(context).is_ready().then_some(*name));
+            come.map_or(Poll::Pending, Poll::Ready)
+        })
+        .await
     }
 }

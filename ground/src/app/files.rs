@@ -18,8 +18,8 @@ use time::macros::format_description;
 
 use crate::cli::LogChoice;
 use crate::model::{
-    Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, entry_text, geojson, kml, parse_checklist,
-    read_geojson, remembered,
+    Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, Unfinished, entry_text, geojson, kml,
+    parse_checklist, read_geojson, remembered,
 };
 
 /// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that exists is kept: the new one
@@ -414,6 +414,34 @@ pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<Las
     places
         .filter(|place| now_unix_s.saturating_sub(place.heard_unix_s) <= KEPT_FOR_S)
         .max_by_key(|place| place.heard_unix_s)
+}
+
+// The file beside the log with what must not be forgotten when the station ends.
+
+const UNFINISHED_NAME: &str = "touchdown-unfinished.json";
+/// Older ones are of another day.
+const UNFINISHED_FOR_S: u64 = 12 * 3_600;
+
+/// Writes what is unfinished now, or removes the file when nothing is.
+///
+/// # Errors
+/// The folder cannot be written.
+pub(super) fn write_unfinished(folder: &Path, kept: &Unfinished, now_unix_s: u64) -> anyhow::Result<()> {
+    if *kept != Unfinished::default() {
+        return write_one(folder, UNFINISHED_NAME, &serde_json::to_string(&(now_unix_s, kept))?);
+    }
+    match fs::remove_file(folder.join(UNFINISHED_NAME)) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error).context(UNFINISHED_NAME),
+        _ => Ok(()),
+    }
+}
+
+/// What an earlier run has left unfinished in this folder, as it is now.
+pub(super) fn read_unfinished(folder: Option<&Path>, now_unix_s: u64) -> Option<Unfinished> {
+    let text = fs::read_to_string(folder?.join(UNFINISHED_NAME)).ok()?;
+    let (at_unix_s, kept): (u64, Unfinished) = serde_json::from_str(&text).ok()?;
+    let passed_s = now_unix_s.saturating_sub(at_unix_s);
+    (passed_s <= UNFINISHED_FOR_S).then(|| kept.after(passed_s))
 }
 
 #[cfg(test)]

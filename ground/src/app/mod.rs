@@ -44,7 +44,7 @@ use crate::model::{KeyOwner, Model, Role, Seat, Settings};
 use crate::update::update;
 use attached::Viewer;
 use clock::{Clock, LogTime};
-use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name};
+use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Output, print};
 use replaying::Again;
@@ -248,7 +248,7 @@ async fn start(
         }
         file
     });
-    model.place = newest_place(recorder.as_ref().and_then(|log| log.path().parent()), start_unix_s);
+    take_what_is_kept(&mut model, recorder.as_ref(), clock.now());
     announce_what_is_there(&mut model, is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
     let output = Output::open(interactive, config)?;
@@ -293,6 +293,15 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
     }
     if let Some(words) = renamed {
         model.warn(now, words);
+    }
+}
+
+/// Takes what an earlier run has kept beside its log. A demonstration has another vehicle.
+fn take_what_is_kept(model: &mut Model, recorder: Option<&Recorder>, now: Duration) {
+    let (folder, unix_s) = (recorder.and_then(|log| log.path().parent()), model.settings.start_unix_s);
+    model.place = newest_place(folder, unix_s);
+    if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
+        model.take_unfinished(kept, now);
     }
 }
 

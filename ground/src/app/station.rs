@@ -1,6 +1,6 @@
 //! The run loop of a station: link, log, clock, signals, screen and attached screens around the model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use protocol::book::{CLOSED, Line};
@@ -21,7 +21,7 @@ use super::wire::Wire;
 use super::{files, programs, screen, stations};
 use crate::attach::{ToScreen, ToStation};
 use crate::demo::Demo;
-use crate::model::{BookLine, ChecklistEntry, LastPlace, LogHealth, Model, Seat, Settings, role_name};
+use crate::model::{BookLine, ChecklistEntry, LogHealth, Model, Seat, Settings, role_name};
 use crate::update::{Action, Msg, update};
 
 /// How often the end of the closed book is sent to the vehicle, because a frame may be lost.
@@ -321,7 +321,12 @@ impl Station {
                     }
                     self.record(record);
                 }
-                Action::KeepPlace(place) => self.keep_place(model, &place, now),
+                Action::KeepPlace(place) => {
+                    self.keep(model, now, |folder, _| files::write_place(folder, &place));
+                }
+                Action::KeepUnfinished(kept) => {
+                    self.keep(model, now, |folder, unix_s| files::write_unfinished(folder, &kept, unix_s));
+                }
                 Action::Enter(line) => self.enter(&line),
                 Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
                 Action::RefuseSignature(why) => self.publish(&Msg::SignRefused(why), now),
@@ -418,20 +423,28 @@ impl Station {
         })
     }
 
-    /// Writes the files for maps. A failure is reported once.
-    fn keep_place(&mut self, model: &mut Model, place: &LastPlace, now: Duration) {
+    /// Writes a file beside the log. A failure is reported once.
+    fn keep(
+        &mut self,
+        model: &mut Model,
+        now: Duration,
+        write: impl FnOnce(&Path, u64) -> anyhow::Result<()>,
+    ) {
         let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
             return;
         };
-        if let Err(error) = files::write_place(folder, place)
+        if let Err(error) = write(folder, self.clock.unix_ns() / 1_000_000_000)
             && !std::mem::replace(&mut self.place_failed, true)
         {
-            model.warn(now, format!("the last place is not kept: {error:#}"));
+            model.warn(now, format!("a restart will not know this: {error:#}"));
         }
     }
 
-    /// Tells every screen what is kept from before this run: the checklist, and the last place.
+    /// Tells every screen what is kept from before this run: the checklist, the last place, what is unfinished.
     pub(super) fn publish_kept(&mut self, model: &Model, now: Duration) {
+        if let Some((kept, _)) = &model.kept {
+            self.publish(&Msg::Unfinished(Box::new(kept.clone())), now);
+        }
         self.publish_checklist(model, now);
         if let Some(place) = model.place {
             self.publish(&Msg::Place(Box::new(place)), now);

@@ -14,6 +14,7 @@ use ratatui::backend::{Backend, ClearType, CrosstermBackend, WindowSize};
 use ratatui::buffer::Cell;
 use ratatui::layout::{Position, Size};
 use ratatui::style::{Color, Modifier};
+use ratatui::text::Span;
 
 /// ratatui's own backend, except for the cells.
 #[derive(Debug)]
@@ -40,6 +41,8 @@ const MODIFIERS: [(Modifier, u8, u8); 3] =
 fn codes(colour: Color, base: u8) -> Vec<u8> {
     match colour {
         Color::Indexed(number) => vec![base + 8, 5, number],
+        Color::Black => vec![base],
+        Color::White => vec![base + 67],
         Color::Red => vec![base + 1],
         Color::Green => vec![base + 2],
         Color::Yellow => vec![base + 3],
@@ -169,16 +172,19 @@ struct Run {
     style: Style,
     /// Nothing but blanks, which have a background alone.
     is_blank: bool,
+    /// A single letter of more columns than one.
+    is_wide: bool,
     from: Place,
     columns: u16,
     symbols: String,
 }
 
 impl Run {
-    /// Where the cursor stands behind it; behind the last column of the terminal that is not sure.
+    /// Where the cursor stands behind it; behind the last column of the terminal, and behind a letter that terminals do not
+    /// all give the same columns, that is not sure.
     fn end(&self, rightmost: u16) -> Option<Place> {
         let (row, column) = self.from;
-        Some((row, column + self.columns)).filter(|(_, column)| *column <= rightmost)
+        Some((row, column + self.columns)).filter(|(_, column)| !self.is_wide && *column <= rightmost)
     }
 
     /// The style in which it is written after another.
@@ -191,21 +197,29 @@ impl Run {
     }
 }
 
+/// Whether it takes one column, as every letter of ours.
+fn is_narrow(cell: &Cell) -> bool {
+    cell.symbol().is_ascii() || Span::raw(cell.symbol()).width() == 1
+}
+
 /// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour these have.
 fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for (column, row, cell) in content {
         let style = Style { fore: cell.fg, back: cell.bg, modifier: cell.modifier };
         let is_blank = cell.symbol() == " " && !cell.modifier.contains(Modifier::REVERSED);
+        let is_wide = !is_narrow(cell);
         let beside = runs.last_mut().filter(|run| {
             let one_back = run.style.back == style.back;
             let blank_fits = is_blank && !run.style.modifier.contains(Modifier::REVERSED)
                 || run.is_blank && !style.modifier.contains(Modifier::REVERSED);
-            run.end(u16::MAX) == Some((row, column)) && (run.style == style || one_back && blank_fits)
+            !is_wide
+                && run.end(u16::MAX) == Some((row, column))
+                && (run.style == style || one_back && blank_fits)
         });
         let Some(run) = beside else {
             let symbols = cell.symbol().to_owned();
-            runs.push(Run { style, is_blank, from: (row, column), columns: 1, symbols });
+            runs.push(Run { style, is_blank, is_wide, from: (row, column), columns: 1, symbols });
             continue;
         };
         if run.is_blank {
@@ -228,7 +242,9 @@ fn between(shown: &BTreeMap<Place, Cell>, cursor: Option<Place>, (row, to): Plac
     }
     let fits = |cell: &&Cell| {
         let is_blank = cell.symbol() == " " && !(cell.modifier | style.modifier).contains(Modifier::REVERSED);
-        cell.bg == style.back && (is_blank || cell.fg == style.fore && cell.modifier == style.modifier)
+        is_narrow(cell)
+            && cell.bg == style.back
+            && (is_blank || cell.fg == style.fore && cell.modifier == style.modifier)
     };
     let cells: Option<Vec<&Cell>> = (from..to).map(|column| shown.get(&(row, column)).filter(fits)).collect();
     cells.unwrap_or_default().into_iter().map(Cell::symbol).collect()
@@ -239,7 +255,13 @@ impl<W: Write> Backend for Thrifty<W> {
 
     fn draw<'a, I: Iterator<Item = (u16, u16, &'a Cell)>>(&mut self, content: I) -> io::Result<()> {
         let content: Vec<_> = content.collect();
-        self.shown.extend(content.iter().map(|(column, row, cell)| ((*row, *column), (*cell).clone())));
+        for (column, row, cell) in &content {
+            self.shown.insert((*row, *column), (*cell).clone());
+            if !is_narrow(cell) {
+                // Its second half: nothing is known of it.
+                self.shown.remove(&(*row, *column + 1));
+            }
+        }
         let mut left = runs(content.into_iter());
         if left.is_empty() {
             return Ok(());

@@ -4,7 +4,6 @@
 //! The abort is not among them: its keys cannot be changed. What commands the vehicle only opens a dialog.
 
 use std::collections::BTreeMap;
-use std::str::FromStr;
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
@@ -55,7 +54,6 @@ pub enum Act {
     Follow,
     Filter,
     Palette,
-    Pin,
     NextTheme,
     AskParameters,
     Redraw,
@@ -75,7 +73,7 @@ const fn define(act: Act, name: &'static str, usual: char, words: &'static str) 
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 40] = [
+pub const DEFINITIONS: [Definition; 39] = [
     define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -113,14 +111,13 @@ pub const DEFINITIONS: [Definition; 40] = [
     define(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
     define(Act::Filter, "filter", '/', "show only events, messages or parameters with a text"),
     define(Act::Palette, "palette", ':', "list every action; type a part of its words"),
-    define(Act::Pin, "pin", 'i', "pin the plotted number to every page, or remove it"),
     define(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
     define(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     define(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     define(Act::Download, "download", 'L', "fetch the vehicle's own log; disarmed on the ground"),
     define(Act::AskParameters, "ask", 'r', "ask the vehicle for its parameters again"),
     Definition { act: Act::Redraw, name: "redraw", usual: Key::CtrlL, words: "draw the screen again" },
-    define(Act::Quit, "quit", 'q', "quit; armed or in flight: then type QUIT and Enter"),
+    define(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
 /// Whether a flight has been flown that this screen's log holds, and nothing is at risk.
@@ -154,7 +151,6 @@ impl Act {
             Self::Check | Self::CheckStill => acts && why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
-            Self::Pin => matches!(model.page(), Page::Plot),
             Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
             Self::Checklist => model.checklist.is_some(),
             Self::ReplayFlight => flown_here(model),
@@ -218,7 +214,6 @@ impl Act {
                     | Self::Follow
                     | Self::Filter
                     | Self::Palette
-                    | Self::Pin
                     | Self::NextTheme
                     | Self::Redraw
             ),
@@ -253,8 +248,6 @@ pub enum BindingError {
     NotCapital { action: &'static str, given: String },
     #[error("{first} and {second} have the same key `{key}`; give each its own")]
     Twice { first: &'static str, second: &'static str, key: String },
-    #[error("`{given}` is no list of keys; give ACTION=KEY,ACTION=KEY, as in theme=w,path=m")]
-    NoList { given: String },
 }
 
 fn names() -> String {
@@ -335,17 +328,7 @@ impl TryFrom<BTreeMap<String, String>> for Bindings {
     }
 }
 
-impl FromStr for Bindings {
-    type Err = BindingError;
-
-    fn from_str(given: &str) -> Result<Self, BindingError> {
-        let pairs: Option<Vec<(&str, &str)>> = given.split(',').map(|pair| pair.split_once('=')).collect();
-        let pairs = pairs.ok_or_else(|| BindingError::NoList { given: given.to_owned() })?;
-        Self::chosen(pairs.into_iter())
-    }
-}
-
-// The palette: every action with its key, and every number to plot or to pin; found by a part of its words.
+// The palette: every action with its key, and every number to plot; found by a part of its words.
 
 /// How to abort.
 pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X (or Ctrl-X twice)";
@@ -360,7 +343,6 @@ pub enum Does {
     /// Shows and commands this boot, of several vehicles under one id.
     Choose(u32),
     Plot(&'static Quantity),
-    Pin(&'static Quantity),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -405,15 +387,7 @@ fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntr
         key: String::new(),
         does: Does::Plot(quantity),
     });
-    let pins = quantity::ALL.iter().map(|quantity| {
-        let verb = if model.pages.pinned.contains(&quantity) { "unpin" } else { "pin" };
-        PaletteEntry {
-            words: format!("{verb} {}", quantity.name),
-            key: String::new(),
-            does: Does::Pin(quantity),
-        }
-    });
-    std::iter::once(abort).chain(choices).chain(acts).chain(plots).chain(pins)
+    std::iter::once(abort).chain(choices).chain(acts).chain(plots)
 }
 
 #[cfg(test)]
@@ -445,18 +419,18 @@ mod tests {
 
     #[test]
     fn a_wrong_choice_is_refused_with_what_would_do() {
-        let refused = |given: &str| given.parse::<Bindings>().unwrap_err().to_string();
+        let refused =
+            |given: &str| Bindings::chosen(given.split_once('=').into_iter()).unwrap_err().to_string();
         assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
         assert!(refused("theme=Enter").contains("one printable ASCII character"));
         assert!(refused("theme=").contains("theme: ``"));
         assert!(refused("arm=a").contains("no capital letter"));
         assert!(refused("theme=p").contains("path and theme have the same key `p`"));
-        assert!(refused("theme").contains("ACTION=KEY"));
     }
 
     #[test]
     fn shift_counts_unless_the_capital_letter_has_its_own_action() {
-        let keys: Bindings = "theme=a,hold=J".parse().unwrap();
+        let keys = Bindings::chosen([("theme", "a"), ("hold", "J")].into_iter()).unwrap();
         assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
         assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
         assert_eq!(keys.act(Key::Char('P')), Some(Act::Show(Page::Path)));

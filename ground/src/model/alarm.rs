@@ -63,6 +63,8 @@ pub enum AlarmKind {
     Unfit,
     /// The countdown has reached zero while the vehicle was not heard.
     MayBeFlying,
+    /// An earlier run of the station was asked for an abort that was not confirmed.
+    AbortBefore,
 }
 
 impl AlarmKind {
@@ -72,6 +74,7 @@ impl AlarmKind {
         match self {
             Self::Unanswered(CommandKind::Abort)
             | Self::Disagreement(CommandKind::Abort)
+            | Self::AbortBefore
             | Self::Refused(CommandKind::Abort) => 3,
             Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign | Self::MayBeFlying => 2,
             Self::LinkLost
@@ -286,6 +289,7 @@ impl Default for Talk {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Called {
     pub(crate) phase: Option<TdPhase>,
+    pub(crate) has_lifted: bool,
     pub(crate) height_m: Option<f64>,
     pub(crate) height_at: Option<Duration>,
     /// Whether GO was the last that was called out on the pad.

@@ -18,7 +18,7 @@ pub const AGAIN_KEY: Key = Key::CtrlY;
 pub const AGAIN_AFTER: Duration = Duration::from_millis(500);
 /// How long the crew has for that key.
 pub const AGAIN_TIME_LIMIT: Duration = Duration::from_secs(10);
-/// Letters of a word whose dialog does not open, or has closed, are swallowed for this long after the one before.
+/// The first letter of a word whose dialog does not open, or has closed, is swallowed for this long, and then the word until Enter.
 const REST_WITHIN: Duration = Duration::from_secs(1);
 
 /// What the crew is to confirm.
@@ -157,9 +157,11 @@ pub struct RestOfWord {
 }
 
 impl RestOfWord {
-    /// The whole word: its dialog did not open.
-    pub fn refused(words: &[&'static str], why: String, now: Duration) -> Self {
-        let words = words.iter().map(|word| (*word, 0)).collect();
+    /// The word of a dialog that did not open, or the one that confirms what a second person asks. The key of a take-over is the
+    /// first letter of that one.
+    pub fn refused(prompt: Prompt, why: String, now: Duration) -> Self {
+        let passed = usize::from(prompt == Prompt::TakeCommand);
+        let words = prompt.word().map(|word| (word, 0)).into_iter().chain([(CONFIRM_WORD, passed)]).collect();
         Self { words, why, until: now + REST_WITHIN }
     }
 
@@ -169,9 +171,10 @@ impl RestOfWord {
         let typed = dialog.typed.len();
         let mut words = vec![(word, typed.max(1))];
         // The crew may have meant the other word of the same key.
-        let other =
-            wrong.filter(|letter| typed == 0 && CONFIRM_WORD.starts_with(letter.to_ascii_uppercase()));
-        words.extend(other.map(|_| (CONFIRM_WORD, 1)));
+        let passed = usize::from(dialog.prompt == Prompt::TakeCommand);
+        let rest = &CONFIRM_WORD[passed..];
+        let other = wrong.filter(|letter| typed == 0 && rest.starts_with(letter.to_ascii_uppercase()));
+        words.extend(other.map(|_| (CONFIRM_WORD, passed + 1)));
         Some(Self { words, why, until: now + REST_WITHIN })
     }
 
@@ -186,7 +189,7 @@ impl RestOfWord {
         let words: Vec<_> = self.words.iter().filter_map(goes_on).collect();
         let takes = self.waits(now) && !words.is_empty();
         if takes {
-            (self.words, self.until) = (words, now + REST_WITHIN);
+            (self.words, self.until) = (words, now + WORD_TIME_LIMIT);
         }
         takes
     }
@@ -207,6 +210,8 @@ impl RestOfWord {
 
 /// How long the second key may take, from the first press or from the end of its hold.
 pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
+/// An Enter that comes this soon after Ctrl-X, and after that time, was meant for it.
+const LATE_WITHIN: Duration = Duration::from_secs(10);
 /// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100 ms, fingers are
 /// slower. A second press also waits this long to show that it is no repeat.
 pub const REPEATS_WITHIN: Duration = Duration::from_millis(120);
@@ -272,15 +277,24 @@ impl AbortChord {
         complete
     }
 
-    /// Lets time pass. Returns whether the chord is complete; then it starts over.
-    pub fn pass(&mut self, now: Duration) -> bool {
-        if self.acts_at().is_some_and(|at| now >= at) {
-            return self.end();
-        }
+    /// A key came that means something else: an Enter after it is none that came late.
+    pub fn forget_if_over(&mut self, now: Duration) {
         if !self.is_begun(now) {
             *self = Self::Open;
         }
-        false
+    }
+
+    /// Lets time pass. Returns whether the chord is complete; then it starts over.
+    pub fn pass(&mut self, now: Duration) -> bool {
+        self.acts_at().is_some_and(|at| now >= at) && self.end()
+    }
+
+    /// Enter was pressed: whether it came too late, a moment after the question had run out. It is asked once.
+    pub fn take_late_enter(&mut self, now: Duration) -> bool {
+        match std::mem::take(self) {
+            Self::Once(at) => now.saturating_sub(at) <= LATE_WITHIN,
+            Self::Open | Self::Twice(_) => false,
+        }
     }
 }
 

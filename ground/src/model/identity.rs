@@ -205,15 +205,10 @@ impl Foreign {
         format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
     }
 
-    /// The name of its mode: as it tells it, otherwise from the tables of the two great autopilots.
+    /// The name of its mode, if it tells it; else its number.
     pub fn mode(&self) -> String {
-        let told = self.modes.get(&self.custom_mode).filter(|name| !name.is_empty()).map(String::as_str);
-        let known = || match self.autopilot {
-            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => ardupilot_mode(self.mavtype, self.custom_mode),
-            MavAutopilot::MAV_AUTOPILOT_PX4 => px4_mode(self.custom_mode),
-            _ => None,
-        };
-        told.or_else(known).map_or_else(|| format!("mode {}", self.custom_mode), str::to_owned)
+        let told = self.modes.get(&self.custom_mode).filter(|name| !name.is_empty());
+        told.cloned().unwrap_or_else(|| format!("mode {}", self.custom_mode))
     }
 
     /// What `MAV_CMD_DO_FLIGHTTERMINATION` would do there.
@@ -248,43 +243,6 @@ fn turns_rotors(mavtype: MavType) -> bool {
             | MavType::MAV_TYPE_HELICOPTER
             | MavType::MAV_TYPE_COAXIAL
     )
-}
-
-/// <https://ardupilot.org/copter/docs/parameters.html#fltmode1>, and the same pages for plane and rover. Only what people
-/// fly: other modes are shown by number.
-fn ardupilot_mode(mavtype: MavType, number: u32) -> Option<&'static str> {
-    let copter = "STABILIZE ACRO ALT_HOLD AUTO GUIDED LOITER RTL CIRCLE - LAND - DRIFT - SPORT FLIP \
-        AUTOTUNE POSHOLD BRAKE THROW AVOID_ADSB GUIDED_NOGPS SMART_RTL";
-    let plane = "MANUAL CIRCLE STABILIZE TRAINING ACRO FBWA FBWB CRUISE AUTOTUNE - AUTO RTL LOITER TAKEOFF \
-        AVOID_ADSB GUIDED - QSTABILIZE QHOVER QLOITER QLAND QRTL";
-    let rover = "MANUAL ACRO - STEERING HOLD LOITER FOLLOW SIMPLE - - AUTO RTL SMART_RTL";
-    let table = match mavtype {
-        MavType::MAV_TYPE_FIXED_WING => plane,
-        MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => rover,
-        _ if turns_rotors(mavtype) => copter,
-        _ => return None,
-    };
-    table.split_whitespace().nth(usize::try_from(number).ok()?).filter(|name| *name != "-")
-}
-
-/// PX4 packs a main mode into the third byte and a sub-mode into the fourth (`px4_custom_mode.h`).
-fn px4_mode(number: u32) -> Option<&'static str> {
-    let [_, _, main, sub] = number.to_le_bytes();
-    Some(match (main, sub) {
-        (1, _) => "MANUAL",
-        (2, _) => "ALTITUDE",
-        (3, _) => "POSITION",
-        (4, 1) => "READY",
-        (4, 2) => "TAKEOFF",
-        (4, 3) => "HOLD",
-        (4, 4) => "MISSION",
-        (4, 5) => "RETURN",
-        (4, 6) => "LAND",
-        (5, _) => "ACRO",
-        (6, _) => "OFFBOARD",
-        (7, _) => "STABILIZED",
-        _ => return None,
-    })
 }
 
 #[cfg(test)]
@@ -330,26 +288,6 @@ mod foreign_tests {
 
     fn beat(autopilot: MavAutopilot, mavtype: MavType, custom_mode: u32) -> HEARTBEAT_DATA {
         HEARTBEAT_DATA { autopilot, mavtype, custom_mode, ..HEARTBEAT_DATA::default() }
-    }
-
-    /// The numbers are those of the autopilots' own documentation.
-    #[test]
-    fn val_ardupilot_and_px4_modes_have_their_names() {
-        use {MavAutopilot as A, MavType as T};
-        for (autopilot, mavtype, number, name) in [
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 1, "ACRO"),
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_HEXAROTOR, 6, "RTL"),
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 9, "LAND"),
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_QUADROTOR, 8, "mode 8"),
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_FIXED_WING, 5, "FBWA"),
-            (A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_GROUND_ROVER, 4, "HOLD"),
-            (A::MAV_AUTOPILOT_PX4, T::MAV_TYPE_QUADROTOR, 0x0304_0000, "HOLD"),
-            (A::MAV_AUTOPILOT_PX4, T::MAV_TYPE_FIXED_WING, 0x0001_0000, "MANUAL"),
-            (A::MAV_AUTOPILOT_GENERIC, T::MAV_TYPE_QUADROTOR, 3, "mode 3"),
-        ] {
-            let foreign = Foreign::of(&beat(autopilot, mavtype, number), None, Duration::ZERO);
-            assert_eq!(foreign.mode(), name, "{}", foreign.name());
-        }
     }
 
     #[test]

@@ -74,6 +74,8 @@ pub struct Link {
     /// The crew has asked for an abort that reached no station. The screen sends it to the next station that it
     /// finds.
     pub abort_unsent: bool,
+    /// When this attached screen has asked its station for an abort that the station has not taken yet.
+    pub abort_asked_at: Option<Duration>,
     /// On an attached screen: the last tick of its station. `None` in the station itself.
     pub(crate) station_at: Option<Duration>,
     /// On an attached screen: its station has ended.
@@ -125,6 +127,15 @@ impl Link {
     pub fn station_silence(&self, now: Duration) -> Option<Duration> {
         let silence = now.saturating_sub(self.station_at?);
         (silence > STATION_SILENT_AFTER && !self.station_gone).then_some(silence)
+    }
+
+    /// Why an abort that was asked for is not sent, and what becomes of it.
+    pub fn why_abort_not_sent(&self, now: Duration) -> Option<&'static str> {
+        if self.abort_unsent {
+            return Some("no station. The next one sends it; Esc cancels it");
+        }
+        let hangs = self.abort_asked_at.is_some() && self.station_silence(now).is_some();
+        hangs.then_some("the station hangs; it sends it when it goes on")
     }
 
     /// Whether the station of this attached screen has ended: the screen shows the past, and commands nothing.

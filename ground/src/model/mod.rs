@@ -248,6 +248,10 @@ pub struct Model {
     pub(crate) sign_refused: Option<(String, Duration)>,
     /// The last place of the vehicle: of this flight, or kept from before a restart.
     pub place: Option<LastPlace>,
+    /// An abort of an earlier run of this station, or of its screen, that was asked for and not confirmed.
+    pub(crate) abort_before: Option<String>,
+    /// What is kept of it beside the log, and since when.
+    pub(crate) kept: Option<(Unfinished, Duration)>,
     /// When it is looked at next.
     pub(crate) place_due: Option<Duration>,
     /// The radio range test, once one has begun.
@@ -422,6 +426,8 @@ pub enum Action {
     RefuseSignature(String),
     /// Keep the last place of the vehicle in the files for maps.
     KeepPlace(Box<LastPlace>),
+    /// Keep beside the log what must not be forgotten when the station ends.
+    KeepUnfinished(Unfinished),
     /// Show the flight just flown again, on this screen.
     ReplayFlight,
     /// Write the report of the flight.

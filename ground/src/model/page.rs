@@ -122,8 +122,6 @@ pub struct Pages {
     pub chosen: Option<AlarmKind>,
     /// What the plot page shows.
     pub plotted: &'static Quantity,
-    /// The numbers on every page.
-    pub pinned: Vec<&'static Quantity>,
     /// Only lines with this text are listed; empty for all.
     pub filter: String,
     /// Whether the Pad page lists the checklist instead of the arming checks.
@@ -152,9 +150,6 @@ pub enum TextEntry {
     },
 }
 
-/// How many numbers fit beside each other on every page.
-const PINNED_MAX: usize = 4;
-
 impl Default for Pages {
     fn default() -> Self {
         Self {
@@ -162,7 +157,6 @@ impl Default for Pages {
             scroll: 0,
             chosen: None,
             plotted: &quantity::ALL[0],
-            pinned: Vec::new(),
             filter: String::new(),
             checklist: false,
             step: None,
@@ -185,18 +179,6 @@ impl Pages {
     /// Whether a line of a list passes the filter.
     pub fn lets_pass(&self, text: &str) -> bool {
         self.filter.is_empty() || text.to_lowercase().contains(&self.filter.to_lowercase())
-    }
-
-    /// Pins a number, or removes it. The oldest makes room for a new one.
-    pub fn pin(&mut self, quantity: &'static Quantity) {
-        if let Some(place) = self.pinned.iter().position(|pinned| *pinned == quantity) {
-            self.pinned.remove(place);
-            return;
-        }
-        if self.pinned.len() == PINNED_MAX {
-            self.pinned.remove(0);
-        }
-        self.pinned.push(quantity);
     }
 
     /// Holds a page; `None` follows the flight again.

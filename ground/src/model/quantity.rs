@@ -1,4 +1,4 @@
-//! Every number that can be pinned to the screen or plotted over time.
+//! Every number that can be plotted over time.
 
 use std::time::Duration;
 

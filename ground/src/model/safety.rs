@@ -7,9 +7,11 @@ use protocol::dialect::{
     TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
 };
 use protocol::log::record::EventLevel;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    CommandKind, Model, Speaker, Vehicle, Verdict,
+    Acknowledgement, CommandKind, Event, Model, Role, Sample, Seat, Speaker, TrackedCommand, Vehicle,
+    Verdict,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     is_on_pad, role_name,
 };
@@ -20,7 +22,7 @@ const ONE_PERSON: &str = "ONE PERSON: PIN IN";
 const MAY_APPROACH: &str = "MAY BE APPROACHED";
 
 /// Why nobody may approach, the worst reason first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Danger {
     /// The motor is not lit, and only software keeps it from lighting.
     Live,
@@ -37,7 +39,7 @@ pub enum Danger {
 }
 
 /// Why people must stay away from the vehicle, and for how long.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeepAway {
     pub danger: Danger,
     /// For how long, s; `None` while it is unknown.
@@ -49,7 +51,7 @@ impl KeepAway {
     ///
     /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
-        Self::told(vehicle, now).or_else(|| vehicle.wait_before(now))
+        Self::told(vehicle, now).or_else(|| vehicle.away_before(now))
     }
 
     /// What the vehicle's own state says of it.
@@ -101,13 +103,90 @@ impl KeepAway {
 const UNTOLD_WAIT_S: u16 = 60;
 
 impl Vehicle {
-    /// The waiting time that ran before the power cycle, while it lasts.
+    /// The waiting time that ran before a power cycle or a restart of the station, while it lasts.
     pub(crate) fn wait_before(&self, now: Duration) -> Option<KeepAway> {
         let before = self.before?;
         let passed_s = u16::try_from(before.age(now).as_secs()).unwrap_or(u16::MAX);
         let left_s = before.value.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
         (left_s > 0).then_some(KeepAway { wait_s: Some(left_s), ..before.value })
     }
+
+    /// The same, and after it that the motor may be live, until the vehicle says of it what ends that.
+    fn away_before(&self, now: Duration) -> Option<KeepAway> {
+        let live = || {
+            let may_be = !matches!(self.before?.value.danger, Danger::Hot | Danger::Wait);
+            let motor = self.status.as_ref().map_or(TdMotor::TD_MOTOR_UNKNOWN, |status| status.value.motor);
+            let is_open = matches!(motor, TdMotor::TD_MOTOR_LIVE | TdMotor::TD_MOTOR_UNKNOWN);
+            let rests = !self.is_armed() && !self.in_flight();
+            (may_be && is_open && rests).then_some(KeepAway { danger: Danger::LiveWaited, wait_s: Some(0) })
+        };
+        self.wait_before(now).or_else(live)
+    }
+
+    /// The pin was seen, or the crew has armed it since: the motor is known again.
+    pub(crate) fn end_before(&mut self, now: Duration) {
+        let pinned = self.status.as_ref().is_some_and(|told| told.value.motor == TdMotor::TD_MOTOR_PIN_IN);
+        if (pinned || self.is_armed()) && self.wait_before(now).is_none() {
+            self.before = None;
+        } else if pinned && let Some(before) = &mut self.before {
+            before.value.danger = Danger::Wait;
+        }
+    }
+}
+
+/// What must not be forgotten when the station ends; it keeps it beside its log.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Unfinished {
+    /// An abort that was asked for and not confirmed: when, and by whom.
+    pub abort: Option<String>,
+    /// Why people must keep away.
+    pub away: Option<KeepAway>,
+}
+
+impl Unfinished {
+    /// The same this much later.
+    #[must_use]
+    pub fn after(self, passed_s: u64) -> Self {
+        let passed_s = u16::try_from(passed_s).unwrap_or(u16::MAX);
+        let left_s = |away: &KeepAway| away.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
+        Self { away: self.away.map(|away| KeepAway { wait_s: Some(left_s(&away)), ..away }), ..self }
+    }
+}
+
+impl Model {
+    /// What is unfinished now.
+    pub fn unfinished(&self, now: Duration) -> Unfinished {
+        // A final refusal is an answer, too.
+        let confirmed = |track: &TrackedCommand| {
+            let answered = matches!(track.acknowledged, Acknowledgement::Answered(_));
+            answered && (track.observed_at.is_some() || !track.accepted())
+        };
+        let abort = match self.commands.of(CommandKind::Abort) {
+            Some(track) if confirmed(track) => None,
+            Some(track) => {
+                Some(asked_words(self.settings.start_unix_s + track.commanded_at.as_secs(), &track.by))
+            }
+            None => self.abort_before.clone(),
+        };
+        Unfinished { abort, away: KeepAway::of(&self.vehicle, now) }
+    }
+
+    /// Goes on with what an earlier run has left unfinished.
+    pub fn take_unfinished(&mut self, kept: Unfinished, now: Duration) {
+        self.kept = Some((kept.clone(), now));
+        if let Some(asked) = &kept.abort {
+            let text = format!("an ABORT was asked for at {asked} and not confirmed");
+            self.say(now, Speaker::Ground, EventLevel::Error, text);
+        }
+        self.abort_before = kept.abort;
+        self.vehicle.before = kept.away.map(|away| Sample::new(away, now));
+    }
+}
+
+/// When an abort was asked for, and by whom.
+pub fn asked_words(unix_s: u64, by: &Seat) -> String {
+    let [hour, minute, second] = [unix_s / 3_600 % 24, unix_s / 60 % 60, unix_s % 60];
+    format!("{hour:02}:{minute:02}:{second:02} UTC{}", by.in_brackets())
 }
 
 /// Whether people may approach a vehicle that is down, or whose countdown was aborted.
@@ -123,13 +202,15 @@ pub enum Approach {
 impl Approach {
     /// `None` in flight, and while a vehicle is being prepared.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
-        let status = &vehicle.status.as_ref()?.value;
-        if vehicle.in_flight() || !(concerns(status) || vehicle.wait_before(now).is_some()) {
+        let before = vehicle.away_before(now);
+        let Some(status) = vehicle.status.as_ref().map(|status| &status.value) else {
+            return before.map(Self::of_away);
+        };
+        if vehicle.in_flight() || !(concerns(status) || before.is_some()) {
             return None;
         }
         Some(match (KeepAway::of(vehicle, now), status.motor) {
-            (Some(away), _) if away.danger == Danger::LiveWaited => Self::OneForThePin(away),
-            (Some(away), _) => Self::DoNot(away),
+            (Some(away), _) => Self::of_away(away),
             (None, TdMotor::TD_MOTOR_PIN_IN) => Self::May("the pin is in"),
             (None, TdMotor::TD_MOTOR_BURNT) => Self::May("the motor is burnt out and cool"),
             (None, TdMotor::TD_MOTOR_HOT) => {
@@ -137,6 +218,10 @@ impl Approach {
             }
             (None, _) => Self::May("the waiting time is over"),
         })
+    }
+
+    fn of_away(away: KeepAway) -> Self {
+        if away.danger == Danger::LiveWaited { Self::OneForThePin(away) } else { Self::DoNot(away) }
     }
 
     /// The words that stand largest on every page.
@@ -163,6 +248,14 @@ pub fn why_not_stop(model: &Model, now: Duration) -> Option<String> {
         return Some("the vehicle is armed or in flight".to_owned());
     }
     KeepAway::of(&model.vehicle, now).map(|away| format!("people must keep away, {}", away.sentence()))
+}
+
+/// Why quitting has to be confirmed: as for [`why_not_stop`]. Nobody stands near the vehicle of a demonstration.
+pub fn why_not_quit(model: &Model, now: Duration) -> Option<String> {
+    let asks = model.settings.role.why_not_command().is_none();
+    let is_near =
+        model.is_at_risk() || (model.settings.role == Role::Station && !model.settings.demonstration);
+    why_not_stop(model, now).filter(|_| asks && is_near)
 }
 
 /// Whether the motor matters to people on the ground: the flight is over or does not go as planned, or a waiting time
@@ -447,8 +540,22 @@ pub fn latch_words(model: &Model) -> Option<String> {
         (false, _) => return None,
     };
     let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here");
-    let cause = cause.or(ours).map(str::to_owned).or_else(|| text_of_the_latch(model));
+    let told = cause.or(ours).map(str::to_owned);
+    let cause = why_gate_stayed_shut(model).or(told).or_else(|| text_of_the_latch(model));
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
+}
+
+/// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave the gate up.
+fn why_gate_stayed_shut(model: &Model) -> Option<String> {
+    let vehicle = &model.vehicle;
+    vehicle.status.as_ref().filter(|status| status.value.latch == TdLatch::TD_LATCH_GATE)?;
+    let found = vehicle.findings.in_time();
+    let found = found.iter().find_map(|(_, words)| words.strip_prefix("ignition gate stayed shut: "));
+    let since = vehicle.left_pad_at.unwrap_or_default();
+    let of_this_flight = |event: &&Event| event.at >= since && event.speaker == Speaker::Vehicle;
+    let mut said = model.events.newest(TEXTS_SEARCHED).filter(of_this_flight);
+    let said = || said.find_map(|event| event.text.strip_prefix("ignition gate closed: "));
+    found.or_else(said).map(|why| format!("gate stayed shut: {why}"))
 }
 
 /// The first grave text of the vehicle about the time of its latch, for a cause that only a text tells: what follows is about the

@@ -6,7 +6,7 @@ use mavlink::MessageData;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
     SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_PREDICTED_PATH_DATA, TdLimit, TdStart,
+    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 pub use protocol::told::{phase_from_number, phase_of};
@@ -70,11 +70,22 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     }
     // The flight may have passed unheard: what comes after it shows that it was.
     match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
-        Some(true) if vehicle.verdict().is_none() => vehicle.left_pad_at = None,
-        Some(_) => _ = vehicle.left_pad_at.get_or_insert(now),
+        Some(true) if vehicle.verdict().is_none() => {
+            (vehicle.left_pad_at, vehicle.has_lifted) = (None, false);
+        }
+        Some(_) => {
+            let since = *vehicle.left_pad_at.get_or_insert(now);
+            let climbs =
+                |motion: Sample<Motion>| motion.received_at >= since && motion.value.climb_m_s > MOVES_M_S;
+            let is_lit = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+            vehicle.has_lifted |= !is_lit || vehicle.best_motion().is_some_and(climbs);
+        }
         None => {}
     }
 }
+
+/// A vehicle on its pad seems to climb more slowly than this, m/s; one that lifts off is faster within a tenth of a second.
+const MOVES_M_S: f64 = 1.0;
 
 // What is converted when it is asked for.
 impl Vehicle {

@@ -140,6 +140,8 @@ pub struct Vehicle {
     /// The path since the landing motor was commanded to light.
     pub burn: FlownPath,
     pub left_pad_at: Option<Duration>,
+    /// It was seen to move since then: a motor that was commanded to light may not have lit.
+    pub has_lifted: bool,
     /// The present boot of the vehicle.
     pub boot: Boot,
     /// What was said of approaching before a power cycle, and when: a waiting time goes on through a boot.

@@ -58,6 +58,9 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
         let text = "STATION SILENT: it does not answer this screen, which shows the past".to_owned();
         found.push((AlarmKind::StationSilent, text));
     }
+    if let Some(why) = model.link.why_abort_not_sent(now) {
+        found.push((AlarmKind::Unanswered(CommandKind::Abort), format!("ABORT NOT SENT: {why}")));
+    }
     found.extend(identity_conditions(model, now));
     // A silent station says nothing about the link.
     let now = model.link.known_until(now);
@@ -78,10 +81,8 @@ fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, Str
     if let Some(why) = &model.link.trouble {
         found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
     }
-    if model.link.abort_unsent {
-        let text = "ABORT NOT SENT: no station; the next one sends it, Esc cancels it".to_owned();
-        found.push((AlarmKind::Unanswered(CommandKind::Abort), text));
-    }
+    let open = |at| (AlarmKind::AbortBefore, format!("ABORT asked at {at} NOT CONFIRMED: ask again?"));
+    found.extend(model.abort_before.as_ref().map(open));
     if let LogStanding::Unfit(_, words) | LogStanding::Warned(words) = model.station_log(now) {
         found.push((AlarmKind::Log, format!("STATION LOG {words}")));
     }
@@ -257,6 +258,7 @@ const WRONG: u8 = 3;
 /// Compares the present state with what was called out.
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
+    call_liftoff(model);
     call_height(model, now);
     call_readiness(model, now);
     call_link(model, now);
@@ -311,7 +313,7 @@ fn call_phase(model: &mut Model) {
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
     let climbed = matches!(before, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
     match phase {
-        TdPhase::TD_PHASE_BOOST => call(model, Amount::Few, "liftoff", WATCH),
+        TdPhase::TD_PHASE_BOOST => call(model, Amount::Normal, "commanded to light", 0),
         TdPhase::TD_PHASE_CHUTE => call(model, Amount::Few, "parachute", WRONG),
         TdPhase::TD_PHASE_IGNITION => call(model, Amount::Few, "ignition", WATCH),
         TdPhase::TD_PHASE_TOUCHDOWN => call(model, Amount::Few, "touchdown", WATCH),
@@ -322,6 +324,13 @@ fn call_phase(model: &mut Model) {
     }
     if is_on_pad(phase) {
         model.called.height_m = None;
+    }
+}
+
+fn call_liftoff(model: &mut Model) {
+    let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+    if !std::mem::replace(&mut model.called.has_lifted, model.vehicle.has_lifted) && lifts {
+        call(model, Amount::Few, "liftoff", WATCH);
     }
 }
 

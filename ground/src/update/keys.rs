@@ -14,10 +14,10 @@ use protocol::log::record::EventLevel;
 use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
 use crate::model::{
-    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CONFIRM_WORD, CommandKind, Dialog, Does, FINGERS_APART,
-    KeyOrigin, LogStanding, Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry,
-    overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check, why_not_confirm,
-    why_not_here, why_not_seat, why_not_start, why_not_take, why_nothing_moves, why_untested,
+    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, Does, FINGERS_APART, KeyOrigin, LogStanding,
+    Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by, palette_entries,
+    quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
+    why_not_seat, why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 use crate::update;
 
@@ -125,6 +125,15 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     let complete = if key == Key::Enter { model.abort_chord.confirm(now) } else { model.abort_chord.end() };
     if complete {
         abort(model, now);
+    } else if key != Key::Enter {
+        model.abort_chord.forget_if_over(now);
+    } else if model.abort_chord.take_late_enter(now) && model.dialog.is_none() && model.pages.entry.is_none()
+    {
+        model.warn(
+            now,
+            "too late for the abort: its question had run out, NOTHING WAS SENT; Ctrl-X, then Enter",
+        );
+        return true;
     }
     // While the chord is begun, another key neither cancels it nor does anything else.
     complete || model.abort_chord.is_begun(now)
@@ -155,7 +164,10 @@ fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrig
             let (name, word) = (dialog.prompt.name(), dialog.word());
             let wanted = word.filter(|_| matches!(key, Key::Enter | Key::Char(_)));
             let wanted = wanted.map_or_else(String::new, |word| format!("; the word is {word}"));
-            let why = format!("{name}: cancelled, nothing was done{wanted}");
+            let why = match key {
+                Key::Char(letter) if !letter.is_ascii() => format!("{name}: cancelled; {}", layout(letter)),
+                _ => format!("{name}: cancelled, nothing was done{wanted}"),
+            };
             if let Key::Char(letter) = key {
                 model.rest_of_word = RestOfWord::of(&dialog, Some(letter), why.clone(), now);
             }
@@ -199,7 +211,8 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         Prompt::Quit => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
-            let leave = if stays && model.is_at_risk() { Action::LeaveScreen } else { Action::Quit };
+            let leave =
+                if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
             model.outbox.push(leave);
         }
     }
@@ -237,6 +250,11 @@ fn pass_quit(model: &mut Model, now: Duration) {
     }
 }
 
+/// A letter that no key and no word has.
+fn layout(letter: char) -> String {
+    format!("KEYBOARD LAYOUT: {letter} is no key here; change to Latin letters")
+}
+
 fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     let act = model.settings.keys.act(key);
     model.key_timing.hurried = touch != KeyOrigin::Typed;
@@ -262,8 +280,10 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         Key::Char(letter) if model.settings.keys.meant_as_capital(letter).is_some() => {
             let keys = &model.settings.keys;
             let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(|act| keys.name(act));
-            model.info(now, format!("capital letters: {arm} arms, {start} starts, {disarm} disarms"));
+            let words = format!("capital letters: {arm} arms, {start} starts, {disarm} disarms (caps lock?)");
+            model.info(now, words);
         }
+        Key::Char(letter) if !letter.is_ascii() => model.warn(now, layout(letter)),
         _ => {}
     }
 }
@@ -346,10 +366,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::Filter => open_filter(model),
         Act::Palette => open_palette(model),
-        Act::Pin if shown == Page::Plot => model.pages.pin(model.pages.plotted),
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::AskParameters if shown == Page::Parameters && model.playing.is_none() => ask_parameters(model),
-        Act::Pin | Act::AskParameters => {}
+        Act::AskParameters => {}
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
     }
@@ -364,7 +383,7 @@ fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>,
     }
     let why = format!("cannot {verb}: {why}");
     model.warn(now, why.clone());
-    model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
+    model.rest_of_word = Some(RestOfWord::refused(prompt, why, now));
 }
 
 /// Swallows the word that the crew types on after a key that this screen refuses: no letter of it may act as a key.
@@ -375,17 +394,11 @@ fn swallow_word(model: &mut Model, act: Act, why: String, now: Duration) {
         Act::TakeCommand => Prompt::TakeCommand,
         _ => return,
     };
-    model.rest_of_word = Some(RestOfWord::refused(&words(model, prompt), why, now));
+    model.rest_of_word = Some(RestOfWord::refused(prompt, why, now));
 }
 
 fn open(model: &mut Model, prompt: Prompt, now: Duration) {
     model.dialog = Some(prompt.open(now));
-}
-
-/// The words that the crew may type after a key: its own, or the one that confirms what a second person asks.
-fn words(model: &Model, prompt: Prompt) -> Vec<&'static str> {
-    let confirmed = model.people() == Some(2) && matches!(prompt, Prompt::Arm | Prompt::Start);
-    prompt.word().into_iter().chain(confirmed.then_some(CONFIRM_WORD)).collect()
 }
 
 /// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
@@ -542,6 +555,9 @@ fn see_alarm(model: &mut Model, now: Duration) {
 }
 
 pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
+    if kind == AlarmKind::AbortBefore {
+        model.abort_before = None;
+    }
     if let Some(text) = model.alarms.acknowledge(kind) {
         model.info(now, format!("alarm acknowledged: {text}"));
     }
@@ -577,8 +593,7 @@ fn abort(model: &mut Model, now: Duration) {
 }
 
 fn quit(model: &mut Model, now: Duration) {
-    let commands = model.settings.role.why_not_command().is_none();
-    if commands && model.is_at_risk() {
+    if why_not_quit(model, now).is_some() {
         open(model, Prompt::Quit, now);
     } else {
         model.quit_at = Some(now + FINGERS_APART);
@@ -669,7 +684,6 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);
         }
-        Does::Pin(quantity) => model.pages.pin(quantity),
     }
 }
 

@@ -22,7 +22,7 @@ use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
     BookState, Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat,
-    Speaker,
+    Speaker, Unfinished,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -107,6 +107,8 @@ pub enum Msg {
     SimulatorEnded(Option<String>),
     /// Time passes; sent ten times a second.
     Tick,
+    /// What an earlier run of the station, or its screen, has left unfinished.
+    Unfinished(Box<Unfinished>),
     // Skipped ones come last: the others are numbered without them.
     #[serde(skip)]
     Key(Key),
@@ -167,6 +169,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Download(Ok(words)) => model.info(now, words),
         Msg::Download(Err(why)) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
         Msg::Place(place) => model.place = Some(*place),
+        Msg::Unfinished(kept) => model.take_unfinished(*kept, now),
         Msg::Book { head, is_signed } => {
             let is_another = model.book.head.is_some_and(|signed| signed.head.book != head.head.book);
             let before = if is_another { BookState::default() } else { model.book };
@@ -175,8 +178,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
-            let goes_on = "armed or in flight, so the station continues";
-            model.warn(now, format!("the screen was quit; {goes_on}: `ground attach` shows it"));
+            let why = if model.is_at_risk() { "armed or in flight" } else { "people must keep away" };
+            model.warn(
+                now,
+                format!("the screen was quit; {why}, so the station continues: `ground attach` shows it"),
+            );
         }
         Msg::ScreenGone => {
             model.warn(now, "the terminal is gone: link and log continue; `ground attach` shows them");
@@ -234,6 +240,9 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
 }
 
 fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
+    if request == Request::Command(CommandKind::Abort) {
+        model.link.abort_asked_at = None;
+    }
     match request {
         Request::Command(kind) => keys::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),

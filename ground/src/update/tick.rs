@@ -65,6 +65,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     pad::pass_range_test(model, now);
     vehicle_changes::send_book_end(model, now);
     keep_place(model, now);
+    vehicle_changes::keep_unfinished(model, now);
     if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
         let telemetry = telemetry_record(model, now);
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));

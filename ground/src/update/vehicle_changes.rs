@@ -8,9 +8,9 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, commands, pad};
 use crate::model::{
-    Approach, Danger, Ending, Extremes, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Model,
-    Parameters, RestOfWord, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted,
-    is_flight, is_on_pad, latch_words, words,
+    Approach, CommandKind, Danger, Ending, Extremes, FlightSoFar, FlownMission, FlownPath, History, KeepAway,
+    Model, Parameters, RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict,
+    hold_words, is_aborted, is_flight, is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -61,6 +61,8 @@ impl Announced {
         }
     }
 }
+/// A waiting time is kept anew if it differs by more than this from what is kept, s.
+const KEPT_WITHIN_S: u16 = 2;
 
 /// Shows another run if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
@@ -78,6 +80,28 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
     others.retain(|id, _| runs.knows(*id));
     on_shown(model, did, now);
     on_change(model, Announced::default(), now);
+}
+
+/// Has what is unfinished kept when it has changed. A demonstration ends with its vehicle.
+pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
+    model.vehicle.end_before(now);
+    // Asked for again, or seen: the one before is no longer open.
+    if model.vehicle.interlocks().is_some_and(is_aborted) || model.commands.of(CommandKind::Abort).is_some() {
+        model.abort_before = None;
+    }
+    if model.settings.role != Role::Station || model.settings.demonstration {
+        return;
+    }
+    let present = model.unfinished(now);
+    let (kept, at) = model.kept.clone().unwrap_or_default();
+    let wait_s = |unfinished: &Unfinished| unfinished.away.and_then(|away| away.wait_s).unwrap_or(0);
+    let about = |unfinished: &Unfinished| (unfinished.abort.clone(), unfinished.away.map(|away| away.danger));
+    let differs = about(&present) != about(&kept);
+    let expected = kept.after(now.saturating_sub(at).as_secs());
+    if differs || wait_s(&present).abs_diff(wait_s(&expected)) > KEPT_WITHIN_S {
+        model.kept = Some((present.clone(), now));
+        model.outbox.push(Action::KeepUnfinished(present));
+    }
 }
 
 /// The crew shows and commands this boot, of several vehicles under one id.

@@ -11,7 +11,7 @@ use ratatui::widgets::{Block, Clear};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
     AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
-    role_name, why_not_here, why_untested,
+    role_name, why_not_here, why_not_quit, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -83,7 +83,10 @@ pub fn dialog_lines(
             };
             let leaves = "Quitting neither disarms nor aborts. Any other key cancels.";
             let below = [goes_on, leaves].map(|words| plain(words.to_owned()));
-            ("QUIT although armed or in flight", Vec::new(), below.to_vec())
+            let above = why_not_quit(model, now).map(|why| theme.line(why, TextRole::Alarm));
+            let title =
+                if model.is_at_risk() { "QUIT although armed or in flight" } else { "QUIT too early" };
+            (title, above.into_iter().collect(), below.to_vec())
         }
         Prompt::Hold => {
             let anew = "Then only a new start counts down again. Any other key cancels.".to_owned();

@@ -109,8 +109,13 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
             cells[column(event.at)] = (EVENT, Ink::Body);
         }
     }
-    let been =
-        phases.iter().filter_map(|(phase, at)| Some((words::event(*phase)?, *at, BEEN, Ink::Measured)));
+    let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
+        let after = phases.get(place + 1).map(|(phase, _)| *phase);
+        let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
+        let is_told = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
+        let name = if is_told { "commanded to light" } else { words::event(*phase)? };
+        Some((name, *at, BEEN, Ink::Measured))
+    });
     // In steps, so that it does not tremble; never in the past.
     let step_s = length_s * EXPECTED_STEP;
     let steady = |at: Duration| {
@@ -150,7 +155,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
 // The keys that count now, and the pages.
 
 /// The keys come in this order.
-const KEYS: [Act; 18] = [
+const KEYS: [Act; 17] = [
     Act::Tap,
     Act::HoldCountdown,
     Act::Acknowledge,
@@ -167,7 +172,6 @@ const KEYS: [Act; 18] = [
     Act::RangeTest,
     Act::Checklist,
     Act::Filter,
-    Act::Pin,
     Act::AskParameters,
 ];
 /// At least this many columns are for the keys, if every page need not be named.

@@ -23,6 +23,8 @@ use crate::model::{
 
 /// What is said of a vehicle that has left the pad, and nobody commanded it.
 const LIFT_OFF: &str = "LIFT-OFF";
+/// What is said of an abort that its station has not sent.
+const NOT_SENT: &str = "ABORT NOT SENT";
 /// What is said of a vehicle that may have left the pad unheard.
 pub const MAY_FLY: &str = "MAY BE IN THE AIR";
 
@@ -35,8 +37,6 @@ pub struct Banner {
     /// Its end: for how long, and why.
     rest: String,
     pub role: TextRole,
-    /// Whether it is about approaching a vehicle that is down.
-    is_of_approach: bool,
 }
 
 /// The present words; `None` on the pad and in flight, as long as all is as planned.
@@ -54,20 +54,21 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         };
         let words = approach.headline();
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
-        return Some(Banner { words, lead, rest: approach.reason(), role, is_of_approach: true });
+        return Some(Banner { words, lead, rest: approach.reason(), role });
+    }
+    if let Some(why) = model.link.why_abort_not_sent(now) {
+        return Some(Banner::alarm(NOT_SENT, format!(": {why}")));
     }
     if ending.is_none() && may_have_left(vehicle, now).is_some() {
         return Some(may_fly(model));
     }
     if is_liftoff_by_itself(vehicle) {
         let rest = " that nobody commanded: TAKE COVER, look up".to_owned();
-        let lead = format!(" {LIFT_OFF}");
-        return Some(Banner { words: LIFT_OFF, lead, rest, role: TextRole::Alarm, is_of_approach: false });
+        return Some(Banner::alarm(LIFT_OFF, rest));
     }
     ending.filter(|ending| *ending == Ending::Lost)?;
-    let words = Ending::Lost.word();
     let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
-    Some(Banner { words, lead: format!(" {words}"), rest, role: TextRole::Alarm, is_of_approach: false })
+    Some(Banner::alarm(Ending::Lost.word(), rest))
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
@@ -82,20 +83,17 @@ fn may_fly(model: &Model) -> Banner {
         }
         None => "where is not told".to_owned(),
     };
-    let rest = format!(" since T-0, unheard from T-{left_s:.1} s; {place}");
-    Banner { words: MAY_FLY, lead: format!(" {MAY_FLY}"), rest, role: TextRole::Alarm, is_of_approach: false }
+    Banner::alarm(MAY_FLY, format!(" since T-0, unheard from T-{left_s:.1} s; {place}"))
 }
 
 impl Banner {
+    fn alarm(words: &'static str, rest: String) -> Self {
+        Self { words, lead: format!(" {words}"), rest, role: TextRole::Alarm }
+    }
+
     /// The line above the large words, which also says them as text.
     pub fn reason(&self) -> String {
         format!("{}{}", self.lead, self.rest)
-    }
-
-    /// Whether the words stand in large letters on this page. The others keep their rows; the line stands on every page.
-    pub fn is_large_on(&self, page: Page) -> bool {
-        let of_a_phase = matches!(page, Page::Ascent | Page::Descent | Page::Landing);
-        matches!(page, Page::Pad | Page::Review) || (of_a_phase && !self.is_of_approach)
     }
 
     /// The words and the reason in one line, for small screens and without a screen.
@@ -248,7 +246,7 @@ pub fn draw_flight_band(
 
 /// Whether the large words stand on the shown page instead of its band.
 pub fn replaces_band(model: &Model, now: Duration) -> bool {
-    banner(model, now).is_some_and(|banner| banner.is_large_on(model.page()))
+    banner(model, now).is_some()
 }
 
 /// The verdict, if it stands beside the large words, as large as they are: on Review, where the screen is wide enough.

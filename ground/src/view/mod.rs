@@ -95,19 +95,18 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
 }
 
 // The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
-// approaching; pinned numbers; the page; the flight along its time, or an alarm; the keys.
+// approaching; the page; the flight along its time, or an alarm; the keys.
 
 pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let banner = headline::banner(model, now);
     let messages = footer::message_rows(model, theme, now, area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
-    let [identity, state, words, pinned, body, message, keys] = stacked(
+    let [identity, state, words, body, message, keys] = stacked(
         area,
         [
             Length(1),
             Length(state_rows),
             Length(banner.is_some().into()),
-            Length((!model.pages.pinned.is_empty()).into()),
             Fill(1),
             Length(messages.len() as u16),
             Length(1),
@@ -122,9 +121,7 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         frame.buffer_mut().set_style(words, theme.level(top_lines::level(model, now)));
         draw_line(frame, words, Line::from(banner.reason()));
     }
-    draw_line(frame, pinned, status_lines::pinned_line(model, theme, now));
-    let large = banner.filter(|banner| banner.is_large_on(model.page()));
-    let body = large.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
+    let body = banner.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     let pictures = pages::draw(model, theme, now, frame, body);
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);
@@ -159,7 +156,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         line.extend(styled(link));
         lines.push(Line::from(line));
     }
-    lines.push(compact_abort(model, theme, now));
+    lines.push(compact_abort(model, theme, now, area.width));
     if let Some((_, text)) = open {
         draw_lines(frame, area, &lines);
         let fixed = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(area.height);
@@ -195,13 +192,11 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     }
 }
 
-fn compact_abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let line = top_lines::abort(model, theme, now);
-    if model.abort_chord.is_begun(now) || model.link.abort_unsent {
+fn compact_abort(model: &Model, theme: Theme, now: Duration, columns: u16) -> Line<'static> {
+    let line = top_lines::abort(model, theme, now, usize::from(columns));
+    let acts = model.abort_chord.is_begun(now) || model.link.why_abort_not_sent(now).is_some();
+    if acts || model.commands.of(CommandKind::Abort).is_some() {
         return line;
-    }
-    if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return top_lines::command_facts_short(track, theme, now);
     }
     let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
     let mut spans = vec![theme.key(key)];

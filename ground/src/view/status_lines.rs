@@ -1,11 +1,11 @@
-//! The lines around a page: what happens next, the link, the alarm, the bar of the flight, the pinned numbers.
+//! The lines around a page: what happens next, the link, the alarm, the bar of the flight.
 
 use std::time::Duration;
 
 use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
 use ratatui::text::{Line, Span};
 
-use super::{STALE_MARK, TextRole, Theme, age_mark, fixed, shortest};
+use super::{STALE_MARK, TextRole, Theme, fixed, shortest};
 use crate::model::{
     Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, TextEntry, Vehicle, latch_cause,
 };
@@ -48,18 +48,29 @@ pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Lin
     ]))
 }
 
+/// In how long it is at apogee, by its climb.
+fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
+    let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
+    within(climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64()))
+}
+
 /// The event, in how long, and what else is known about it.
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
+        TdPhase::TD_PHASE_BOOST if !vehicle.has_lifted => words("lift-off", ", commanded to light"),
+        // The time stands in the row of the abort, on every page.
+        TdPhase::TD_PHASE_COAST if is_inhibited(vehicle) => {
+            words("parachute", &format!("{}, at apogee", apogee_in(vehicle, now)))
+        }
+        TdPhase::TD_PHASE_BOOST if is_inhibited(vehicle) => words("parachute", ", at apogee"),
+        TdPhase::TD_PHASE_DEPLOY if is_inhibited(vehicle) => words("parachute", ""),
         TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
         TdPhase::TD_PHASE_COAST => {
-            let climb = vehicle.best_motion().map(|motion| (motion.value.climb_m_s, motion.age(now)));
-            let left_s = climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64());
             let attached =
                 vehicle.descent().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);
             let (before, after) = if attached { ("separation, ", "") } else { ("", ", then the fins open") };
-            Some((format!("{before}apogee"), within(left_s), after.to_owned()))
+            Some((format!("{before}apogee"), apogee_in(vehicle, now), after.to_owned()))
         }
         TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
@@ -75,8 +86,13 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
     }
 }
 
+/// Whether the vehicle says that its landing motor will not light.
+fn is_inhibited(vehicle: &Vehicle) -> bool {
+    vehicle.interlocks().is_some() && !vehicle.may_light()
+}
+
 fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String, String) {
-    if vehicle.interlocks().is_some() && !vehicle.may_light() {
+    if is_inhibited(vehicle) {
         let why = latch_cause(vehicle).map_or_else(String::new, |cause| format!(", {cause}"));
         return ("the ground".to_owned(), String::new(), format!(", NO BURN{why}"));
     }
@@ -291,8 +307,8 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
     let text = cut(&alarm.text, room);
     let line = format!(" {word} {text} {age}{more}");
-    let columns = columns.saturating_sub(key.len());
-    let mut spans = vec![theme.span(format!("{line:<columns$}"), role)];
+    let blank = columns.saturating_sub(key.len() + Span::raw(&*line).width());
+    let mut spans = vec![theme.span(format!("{line}{:blank$}", ""), role)];
     if !key.is_empty() {
         spans.push(theme.key(key));
     }
@@ -327,36 +343,22 @@ pub fn alarm_state(alarm: &Alarm, now: Duration) -> AlarmState {
 /// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept, unless that would lose more
 /// than a third of what fits.
 pub fn cut(text: &str, columns: usize) -> String {
-    if text.chars().count() <= columns {
+    if Span::raw(text).width() <= columns {
         return text.to_owned();
     }
     let room = columns.saturating_sub(2);
-    let fits: String = text.chars().take(room).collect();
-    let ends_a_word = text.chars().nth(room).is_none_or(|next| next == ' ');
+    let fits = beginning(text, room);
+    let ends_a_word = text[fits.len()..].starts_with(' ');
     let words = fits.rsplit_once(' ').map(|(words, _)| words).filter(|_| !ends_a_word);
-    let kept = words.filter(|words| 3 * words.chars().count() >= 2 * room).unwrap_or(&fits);
+    let kept = words.filter(|words| 3 * Span::raw(*words).width() >= 2 * room).unwrap_or(fits);
     format!("{}..", kept.trim_end())
 }
 
-// The line of the pinned numbers.
-
-/// Columns of one number with its name, so that nothing moves when it changes.
-const COLUMNS: usize = 26;
-
-pub fn pinned_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let spans = model.pages.pinned.iter().flat_map(|quantity| {
-        let sample = quantity.read(model, now);
-        let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
-        let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
-        let name = format!(" {}", quantity.name);
-        let room = COLUMNS.saturating_sub(name.chars().count());
-        let role = if role == TextRole::Plain { TextRole::Title } else { role };
-        [
-            theme.label(name),
-            theme.span(format!("{:<room$}", format!("{mark}{value} {}", quantity.unit)), role),
-        ]
-    });
-    Line::from(spans.collect::<Vec<_>>())
+/// As much of a text as fits into so many columns; some letters take two.
+pub fn beginning(text: &str, columns: usize) -> &str {
+    let ends = text.char_indices().map(|(at, letter)| at + letter.len_utf8());
+    let fitting = ends.take_while(|end| Span::raw(&text[..*end]).width() <= columns).last();
+    &text[..fitting.unwrap_or(0)]
 }
 
 #[cfg(test)]

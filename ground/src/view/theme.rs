@@ -247,10 +247,14 @@ impl Theme {
             Level::Danger => Some(Color::Red),
             Level::Free => Some(Color::Green),
         };
-        Style {
-            fg: colour.filter(|_| self.palette == Palette::Sixteen),
-            ..bold.add_modifier(Modifier::REVERSED)
-        }
+        bold.patch(self.reversed(colour))
+    }
+
+    /// Letters on one of the sixteen colours. They have a colour, too: the terminal's own background may be as bright or as dark.
+    fn reversed(self, colour: Option<Color>) -> Style {
+        let fg = colour.filter(|_| self.palette == Palette::Sixteen);
+        let bg = fg.map(|colour| if colour == Color::Red { Color::White } else { Color::Black });
+        Style { fg, bg, ..Style::new().add_modifier(Modifier::REVERSED) }
     }
 
     /// The style of a role. A letter's weight and slant say the same without colour.
@@ -267,14 +271,13 @@ impl Theme {
                 TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
             }
         } else {
-            let style = if role == TextRole::Alarm { plain.add_modifier(Modifier::REVERSED) } else { plain };
             let colour = match role {
+                TextRole::Alarm => return self.reversed(Some(Color::Red)).add_modifier(Modifier::BOLD),
                 TextRole::Good => Some(Color::Green),
                 TextRole::Caution => Some(Color::Yellow),
-                TextRole::Alarm => Some(Color::Red),
                 _ => None,
             };
-            Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..style }
+            Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..plain }
         };
         match role {
             TextRole::Plain | TextRole::Label | TextRole::Good => style,

@@ -8,14 +8,15 @@ use protocol::identity::VEHICLE;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
+use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role, Standing,
-    TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself,
-    is_on_pad, standing, unheard_hints, why_not_reached, why_other_mission, why_untested, words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
+    Standing, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
+    is_liftoff_by_itself, is_on_pad, standing, why_not_reached, why_other_mission, why_untested, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -116,22 +117,25 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         let event = model.events.newest(1).next().filter(fresh)?;
         Some(format!(" {}{}", event.mark().trim_start(), event.text))
     };
-    let words = seen.or_else(next).or_else(ready).or_else(said)?;
+    // Of an abort that was seen, what comes after it counts.
+    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.kind == AlarmKind::Aborted);
+    let after = if aborted { next() } else { None };
+    let words = after.or(seen).or_else(next).or_else(ready).or_else(said)?;
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, and its key at the right end. A begun or sent abort in their place needs most of the row: then the key
-/// stands where it fits.
+/// What an abort would do, or how far it is, and its key at the right end. What a begun or unsent abort says has its keys in
+/// it, and the whole row if it needs it.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let line = abort(model, theme, now);
-    let sent = model.link.abort_unsent || model.commands.of(CommandKind::Abort).is_some();
-    let acts = sent || model.abort_chord.is_begun(now);
     let key = format!(" {} ", abort_key(model));
-    if acts && line.width() + key.len() > usize::from(area.width) {
+    let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
+    let line = abort(model, theme, now, usize::from(words.width));
+    let has_keys = model.link.why_abort_not_sent(now).is_some() || model.abort_chord.is_begun(now);
+    if has_keys && line.width() > usize::from(words.width) {
         return draw_line(frame, area, line);
     }
-    let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
-    draw_line(frame, words, if acts { line } else { Line::from(line.to_string()) });
+    // In the colours of the row: those of a page vanish on it.
+    draw_line(frame, words, if has_keys { line } else { Line::from(line.to_string()) });
     draw_line(frame, key_area, Line::from(key));
 }
 
@@ -154,7 +158,10 @@ pub fn identity_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
 fn mode(model: &Model, theme: Theme) -> Span<'static> {
     let simulated = model.vehicle.is_simulated();
     let (word, role) = match model.settings.role {
-        Role::Station if model.settings.demonstration => ("DEMO", TextRole::Title),
+        Role::Station if model.settings.demonstration => {
+            let style = theme.style(TextRole::Caution).add_modifier(Modifier::REVERSED);
+            return Span::styled(" DEMO, NOT REAL ", style);
+        }
         Role::Watching if simulated => ("WATCH SIM", TextRole::Title),
         Role::Watching => ("WATCH LIVE", TextRole::Caution),
         Role::Replaying if simulated => ("REPLAY SIM", TextRole::Title),
@@ -282,7 +289,11 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// What the vehicle does, in words.
 pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-    if is_on_pad(phase) && counts { "Countdown" } else { words::doing(phase) }
+    match phase {
+        _ if is_on_pad(phase) && counts => "Countdown",
+        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
+        _ => words::doing(phase),
+    }
 }
 
 /// Whether the vehicle is armed, from HEARTBEAT.
@@ -349,18 +360,20 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up, Span::raw(" ")])
 }
 
-/// What an abort would do now, or the progress of the commanded abort.
-pub fn abort(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if model.link.abort_unsent {
-        let words = " ABORT NOT SENT: no station. The next one sends it; Esc cancels it";
-        return theme.line(words, TextRole::Alarm);
+/// What an abort would do now, or the progress of the commanded abort, in as many columns.
+pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+    if let Some(why) = model.link.why_abort_not_sent(now) {
+        return theme.line(format!(" ABORT NOT SENT: {why}"), TextRole::Alarm);
+    }
+    if model.link.abort_asked_at.is_some() {
+        return theme.line(" ABORT asked, not yet taken by the station", TextRole::Alarm);
     }
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
         return theme.line(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), TextRole::Alarm);
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return command_facts(track, theme, now);
+        return command_facts_within(track, columns, theme, now);
     }
     let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
@@ -383,6 +396,9 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
 fn abort_effect(model: &Model, now: Duration) -> String {
     if model.link.is_station_gone() {
         return "NOT SENT: no station; kept for the next one".to_owned();
+    }
+    if model.link.station_silence(now).is_some() {
+        return "NOT SENT while the station hangs; kept".to_owned();
     }
     if let Some(foreign) = model.vehicle.as_foreign() {
         return foreign.termination().to_owned();
@@ -421,54 +437,52 @@ fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
     Some(theme.line(words, TextRole::Alarm))
 }
 
-/// The three facts of a command, for narrow screens.
-pub fn command_facts_short(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    let (acknowledged, acknowledged_role) = match track.acknowledged {
-        Acknowledgement::Waiting | Acknowledgement::InProgress => ("-", TextRole::Caution),
-        Acknowledgement::Asked => ("asked", TextRole::Caution),
-        Acknowledgement::GivenUp => ("NEVER", TextRole::Alarm),
-        Acknowledgement::Answered(_) if track.accepted() => ("ok", TextRole::Good),
-        Acknowledgement::Answered(_) => ("REFUSED", TextRole::Alarm),
-    };
-    let (observed, observed_role) = match track.observed_at {
-        Some(_) => ("ok", TextRole::Good),
-        None if track.is_withdrawn => ("ended", TextRole::Plain),
-        None if track.disagrees(now) => ("NO", TextRole::Alarm),
-        None => ("-", TextRole::Plain),
-    };
-    Line::from(vec![
-        theme.span(format!("{} x{}", track.kind.name(), track.attempts), TextRole::Title),
-        theme.label(" ack "),
-        theme.span(acknowledged, acknowledged_role),
-        theme.label(" obs "),
-        theme.span(observed, observed_role),
-    ])
-}
-
 /// The three facts of a command: commanded, acknowledged, observed.
 pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    let label = |text: &str| theme.label(text.to_owned());
+    command_facts_within(track, usize::MAX, theme, now)
+}
+
+/// The same in as many columns: first its time is left out.
+pub fn command_facts_within(
+    track: &TrackedCommand,
+    columns: usize,
+    theme: Theme,
+    now: Duration,
+) -> Line<'static> {
+    // Other names are longer.
+    let room = "DISARM".len().saturating_sub(track.kind.name().len());
+    let at_s = track.commanded_at.as_secs_f64();
+    let commanded = format!("{:room$} commanded {at_s:.1} s x", "");
+    let lines = [
+        facts(track, [&commanded, "  acknowledged ", "  observed "], theme, now),
+        facts(track, [" x", "  acknowledged ", "  observed "], theme, now),
+    ];
+    let fits = lines.into_iter().find(|line| line.width() <= columns);
+    fits.unwrap_or_else(|| facts(track, [" x", " ack ", " obs "], theme, now))
+}
+
+fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) -> Line<'static> {
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
-        Acknowledgement::Asked => ("asked, awaits another role".to_owned(), TextRole::Caution),
+        Acknowledgement::Asked => ("asked, not confirmed".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),
     };
     let (observed, observed_role) = match track.observed_at {
-        Some(_) => ("yes".to_owned(), TextRole::Good),
-        None if track.is_withdrawn => ("no longer so".to_owned(), TextRole::Plain),
-        None if track.disagrees(now) => ("NOT OBSERVED".to_owned(), TextRole::Alarm),
-        None => ("not yet".to_owned(), TextRole::Plain),
+        Some(_) => ("yes", TextRole::Good),
+        None if track.is_withdrawn => ("no longer so", TextRole::Plain),
+        None if track.disagrees(now) => ("NOT OBSERVED", TextRole::Alarm),
+        None => ("not yet", TextRole::Plain),
     };
+    let [commanded, ack, obs] = names;
     Line::from(vec![
-        theme.span(format!(" {:<6} ", track.kind.name()), TextRole::Title),
-        label("commanded "),
-        theme.plain(format!("{:.1} s x{}", track.commanded_at.as_secs_f64(), track.attempts)),
-        label("  acknowledged "),
+        theme.span(format!(" {}", track.kind.name()), TextRole::Title),
+        theme.plain(format!("{commanded}{}", track.attempts)),
+        theme.label(ack.to_owned()),
         theme.span(acknowledged, acknowledged_role),
-        label("  observed "),
+        theme.label(obs.to_owned()),
         theme.span(observed, observed_role),
     ])
 }
@@ -490,33 +504,6 @@ pub fn message(model: &Model, theme: Theme, now: Duration) -> Option<Line<'stati
         .or_else(|| open_command(model, now).map(|track| command_facts(track, theme, now)))
         .or_else(|| hold(model, theme))
         .or_else(|| shown.map(|track| command_facts(track, theme, now)))
-}
-
-/// The first of these that applies: that a check moves the surfaces; a command (other than an abort) that is not observed
-/// yet; a hold; the next event of the flight; the latest command, unless it was answered long ago and the vehicle is NO-GO;
-/// whether the vehicle may be armed.
-pub fn command(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(line) = hands_off(model, theme, now) {
-        return line;
-    }
-    if open_command(model, now).is_none()
-        && let Some(hold) = hold(model, theme)
-    {
-        return hold;
-    }
-    let next = status_lines::next_event_line(model, theme, now);
-    if let Some(next) = next.filter(|_| open_command(model, now).is_none()) {
-        return next;
-    }
-    let ready = readiness(model, now);
-    let go = ready.as_ref().is_none_or(|(_, role)| *role == TextRole::Good);
-    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    if let Some(track) = latest.filter(|track| go || !answered_long_ago(track, now)) {
-        return command_facts(track, theme, now);
-    }
-    let unheard = unheard_hints(model, now).and_then(|hints| hints.into_iter().next());
-    let words = ready.or_else(|| unheard.map(|words| (words, TextRole::Caution)));
-    words.map_or_else(Line::default, |(words, role)| theme.line(format!(" {words}"), role))
 }
 
 fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {

@@ -1,16 +1,12 @@
-//! Rows of numbers, scales and sparklines.
+//! Rows of numbers, and scales.
 
 use std::time::Duration;
 
-use ratatui::Frame;
-use ratatui::layout::Constraint::{Fill, Length};
-use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
-use ratatui::widgets::Sparkline;
+use ratatui::text::Line;
 
-use super::{TextRole, Theme, draw_line, stacked};
+use super::{TextRole, Theme};
+use crate::model::Sample;
 pub use crate::model::words::{fixed, shortest};
-use crate::model::{Model, Sample, quantity::Quantity};
 
 /// The mark before a value that is too old.
 pub const STALE_MARK: &str = "~";
@@ -82,92 +78,6 @@ pub fn ticks(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
 /// The decimals that a step needs.
 pub fn tick_decimals(step: f64) -> usize {
     (-libm::floor(libm::log10(step))).clamp(0.0, 6.0) as usize
-}
-
-// A quantity over the last minute, in one or a few rows, with its name, its range and its present value.
-
-/// How far back a sparkline reaches.
-const SPAN: Duration = Duration::from_mins(1);
-/// Rows of one sparkline with its heading.
-pub const SPARKLINE_ROWS: u16 = 4;
-/// Steps of the height of a bar; a terminal shows eight a row.
-const STEPS: f64 = 100.0;
-
-/// Draws as many sparklines as fit, one below the other.
-pub fn draw_sparklines(
-    names: &[&str],
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) {
-    let known = names.iter().filter_map(|name| Quantity::named(name));
-    for (quantity, y) in known.zip((area.y..area.bottom()).step_by(usize::from(SPARKLINE_ROWS))) {
-        let at = Rect { y, height: SPARKLINE_ROWS, ..area };
-        if at.bottom() <= area.bottom() {
-            draw_sparkline(quantity, model, theme, now, frame, at);
-        }
-    }
-}
-
-/// Draws one sparkline: a heading and the bars.
-pub fn draw_sparkline(
-    quantity: &Quantity,
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) {
-    let [heading, bars] = stacked(area, [Length(1), Fill(1)]);
-    let columns = usize::from(bars.width.saturating_sub(2));
-    let values = resampled(quantity, model, now, columns);
-    let known = || values.iter().flatten().copied();
-    let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    let sample = quantity.read(model, now);
-    let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
-    let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
-    let mut spans = vec![
-        theme.label(format!(" {}", quantity.name)),
-        theme.span(format!("{mark}{value} {}", quantity.unit), role),
-    ];
-    if least <= most {
-        let range =
-            format!("  60 s: {}..{}", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
-        let used: usize = spans.iter().map(Span::width).sum();
-        if used + range.len() <= usize::from(heading.width) {
-            spans.push(theme.label(range));
-        }
-    }
-    draw_line(frame, heading, Line::from(spans));
-    let span = (most - least).max(f64::MIN_POSITIVE);
-    let heights =
-        values.iter().map(|value| value.map(|value| (1.0 + (STEPS - 1.0) * (value - least) / span) as u64));
-    let bars = Rect { x: bars.x + 1, width: bars.width.saturating_sub(2), ..bars };
-    let widget = Sparkline::default()
-        .data(heights.collect::<Vec<_>>())
-        .absent_value_symbol(" ")
-        .max(STEPS as u64)
-        .style(theme.ground().fg(theme.ink(crate::view::theme::Ink::Predicted)));
-    frame.render_widget(widget, bars);
-}
-
-/// The last value in each of so many equal parts of the last minute; `None` where none is known.
-fn resampled(quantity: &Quantity, model: &Model, now: Duration, columns: usize) -> Vec<Option<f64>> {
-    // Steps of a whole part, so that the bars do not tremble while time passes.
-    let part = SPAN.as_secs_f64() / columns.max(1) as f64;
-    let last = libm::floor(now.as_secs_f64() / part);
-    let first = last - columns as f64 + 1.0;
-    let mut values = vec![None; columns];
-    let from = Duration::from_secs_f64((first * part).max(0.0));
-    for (at, value) in model.history.trace.values(quantity, from, now) {
-        let place = libm::floor(at.as_secs_f64() / part) - first;
-        if let Some(slot) = (place >= 0.0).then(|| values.get_mut(place as usize)).flatten() {
-            *slot = Some(value);
-        }
-    }
-    values
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
-//! The palette, the filter, pinned and plotted numbers, and keys of the crew's choice.
+//! The palette, the filter, plotted numbers, and keys of the crew's choice.
+
+use std::collections::BTreeMap;
 
 use ground::key::Key;
-use ground::model::{Act, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
+use ground::model::{Act, Bindings, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 
@@ -11,6 +13,12 @@ use crate::screens::{armed, descending, on_the_pad, powered};
 /// Opens the palette, types a text and presses Enter.
 fn choose(rig: &mut Rig, text: &str) {
     rig.keys(&[typed(":"), typed(text), vec![Key::Enter]].concat());
+}
+
+/// Keys of the crew's choice.
+fn chosen(pairs: &[(&str, &str)]) -> Bindings {
+    let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
+    Bindings::try_from(pairs.collect::<BTreeMap<_, _>>()).expect("a valid choice")
 }
 
 #[test]
@@ -24,7 +32,6 @@ fn the_palette_lists_every_action_with_its_key() {
     assert!(listed.iter().any(|entry| entry.does == Does::TellAbort && entry.key == "Ctrl-X"));
     for quantity in &quantity::ALL {
         assert!(listed.iter().any(|entry| entry.does == Does::Plot(quantity)));
-        assert!(listed.iter().any(|entry| entry.does == Does::Pin(quantity)));
     }
 }
 
@@ -87,7 +94,7 @@ fn the_palette_only_tells_how_to_abort() {
 fn the_abort_works_in_the_palette_and_in_the_filter() {
     for opened in [typed(":"), typed("/pin"), typed(":arm"), typed("t")] {
         let mut settings = settings(false, true);
-        settings.keys = "theme=m,path=M,filter=/".parse().unwrap();
+        settings.keys = chosen(&[("theme", "m"), ("path", "M"), ("filter", "/")]);
         let mut rig = Rig::new(settings);
         rig.run(1.0);
         rig.keys(&opened);
@@ -123,7 +130,7 @@ proptest! {
 #[test]
 fn other_keys_open_the_same_ladder() {
     let mut settings = settings(false, true);
-    settings.keys = "arm=Z,theme=w".parse().unwrap();
+    settings.keys = chosen(&[("arm", "Z"), ("theme", "w")]);
     let mut rig = Rig::new(settings);
     rig.run(1.0);
     rig.key(Key::Char('A'));
@@ -158,19 +165,11 @@ fn the_filter_shows_only_what_fits() {
 }
 
 #[test]
-fn any_number_can_be_pinned_and_plotted() {
+fn any_number_can_be_plotted() {
     let mut rig = descending();
-    choose(&mut rig, "unused words");
-    assert_eq!(rig.model.pages.pinned.len(), 0);
-    choose(&mut rig, "pin wind");
-    rig.key(Key::Char('5'));
-    assert!(rig.screen(80, 24).contains(" wind 3.0 m/s"), "{}", rig.screen(80, 24));
     for quantity in &quantity::ALL {
-        rig.model.pages.pinned.clear();
         choose(&mut rig, &format!("plot {}", quantity.name));
         assert_eq!((rig.model.page(), rig.model.pages.plotted), (Page::Plot, quantity));
-        rig.key(Key::Char('i'));
-        assert_eq!(rig.model.pages.pinned, [quantity]);
     }
     rig.key(Key::Up);
     assert_eq!(rig.model.pages.plotted.place(), quantity::COUNT - 2);
@@ -206,7 +205,7 @@ fn help_shows_only_the_keys_that_work_now() {
         !screen.contains("type ARM") && screen.contains("type START") && screen.contains("disarm:"),
         "{screen}"
     );
-    assert!(!Act::Pin.works(&rig.model, rig.now));
+    assert!(!Act::AskParameters.works(&rig.model, rig.now));
 }
 
 /// Pasted text does nothing through the palette, and a marked paste closes it.

@@ -22,7 +22,7 @@ fn the_first_line_of_every_page_is_the_identity() {
     let demo =
         Settings { demonstration: true, vehicle_name: Some("mk2".to_owned()), ..settings(false, true) };
     let cases = [
-        (demo, true, " DEMO mk2 boot 1A2B3C4D "),
+        (demo, true, " DEMO, NOT REAL  mk2 boot 1A2B3C4D "),
         (settings(false, true), true, " SIM boot 1A2B3C4D"),
         (settings(false, true), false, " LIVE boot 1A2B3C4D"),
         (Settings { role: Role::Watching, ..settings(false, true) }, false, " WATCH LIVE boot 1"),
@@ -38,7 +38,8 @@ fn the_first_line_of_every_page_is_the_identity() {
             assert!(line.starts_with(expected) && !line.contains("255/190"), "{digit}: {line}");
         }
         let word = expected.split(" boot").next().unwrap_or_default().trim_end_matches(" mk2");
-        assert!(first_line(&rig, 20, 5).starts_with(word), "{word}");
+        let fits: String = word.chars().take(19).collect();
+        assert!(first_line(&rig, 20, 5).starts_with(&fits), "{word}");
     }
 }
 
@@ -111,8 +112,7 @@ fn large(rig: &Rig) -> String {
     rig.screen(80, 24).lines().skip(3).take(5).collect::<Vec<_>>().join("\n")
 }
 
-/// The words with their reason are one row on every page, and large on Pad and Review only; small screens have them as their
-/// second line.
+/// The words with their reason are one row on every page, and large under it; small screens have them as their second line.
 fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
     rig.key(Key::Char('1'));
     let expected = large(rig);
@@ -122,9 +122,7 @@ fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
     assert!(widest.is_some_and(|widest| (columns - 4..=columns).contains(&widest)), "{words}: {expected}");
     for digit in "123456789?pftvx".chars() {
         rig.key(Key::Char(digit));
-        let row = |rows: &str| rows.lines().next().map(str::to_owned);
-        assert_eq!(row(&large(rig)), row(&expected), "{digit}");
-        assert_eq!(large(rig) == expected, "14".contains(digit), "{digit}");
+        assert_eq!(large(rig), expected, "{digit}");
         assert!(large(rig).contains(reason), "{digit}: {reason}\n{}", rig.screen(80, 24));
         let small = rig.screen(60, 12);
         let second = small.lines().nth(1).unwrap_or_default();

@@ -58,6 +58,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
     let mut rig = rig(Amount::Normal, true);
     fly(&mut rig);
     let expected = [
+        "commanded to light",
         "liftoff",
         "50 metres",
         "100 metres",
@@ -128,6 +129,9 @@ fn without_a_voice_bells_differ() {
     };
     let mut rig = rig(Amount::Normal, false);
     rig.phase = TdPhase::TD_PHASE_BOOST;
+    rig.run(1.0);
+    assert_eq!(bells(&mut rig), 0, "it has not moved");
+    rig.state(0.0, 2.0, 0.0, 12.0, 90.0);
     rig.run(1.0);
     assert_eq!(bells(&mut rig), 2, "liftoff");
     rig.phase = TdPhase::TD_PHASE_COAST;

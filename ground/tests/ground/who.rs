@@ -9,7 +9,7 @@ use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
     MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA,
-    TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdPhase, TdRole, VFR_HUD_DATA,
+    TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdMotor, TdPhase, TdRole, VFR_HUD_DATA,
 };
 use protocol::identity::GROUND;
 
@@ -210,8 +210,15 @@ fn a_power_cycle_does_not_end_the_waiting_time_after_an_abort() {
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
     assert!(rig.events().contains("cannot arm: do not approach for 5"), "{}", rig.events());
+    // The motor is live as before; a pin that was seen ends it, and so does an arming.
     rig.run(60.0);
-    assert!(rig.screen(80, 24).contains(" every arming check passes"), "{}", rig.screen(80, 24));
+    assert!(rig.screen(80, 24).contains("one person: pin in"), "{}", rig.screen(80, 24));
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(1.0);
+    rig.motor = TdMotor::TD_MOTOR_LIVE;
+    rig.run(1.0);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains(" every arming check passes") && !screen.contains("one person"), "{screen}");
 }
 
 #[test]
@@ -445,7 +452,7 @@ fn answer_timesync(rig: &mut Rig) {
     rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
 }
 
-/// A copter in a mode whose number is a phase of ours: ACRO is PAD_IDLE, LAND is POWERED.
+/// A copter in a mode whose number is a phase of ours: ACRO (1) is PAD_IDLE, LAND (9) is POWERED.
 fn beside_a_copter() -> Rig {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
@@ -491,7 +498,7 @@ fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
         assert!(line.contains("NOT A TOUCHDOWN VEHICLE: Ardu"), "{line}");
     }
     let screen = rig.screen(80, 24);
-    for words in ["ACRO", "ARMED", "12.5 m above home", "roll 6 deg", "CUTS ITS MOTORS"] {
+    for words in ["mode 1", "ARMED", "12.5 m above home", "roll 6 deg", "CUTS ITS MOTORS"] {
         assert!(screen.contains(words), "{words}: {screen}");
     }
     assert!(!screen.contains("PAD_IDLE") && !screen.contains(" GO"), "{screen}");

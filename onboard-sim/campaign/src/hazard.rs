@@ -8,6 +8,7 @@ use core::fmt;
 use flight::computer::{AbortEffect, FRAME_MS};
 use flight::rules::phase::Phase;
 use flight::vehicle::atmosphere::Air;
+use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
@@ -16,6 +17,7 @@ use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
 use sim::recipe::{Recipe, RecipeError};
 use sim::sortie::{SetUpError, Sortie};
+use sim::world::ground::RestOutcome;
 use sim::world::wind::Wind;
 use sim::world::{Actuators, Fault};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
@@ -164,6 +166,54 @@ pub struct Impact {
     pub downwind_rad: f64,
     /// Within the limits of the legs.
     pub landed: bool,
+    pub course: Course,
+}
+
+/// What else a flight tells that people on the ground ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Course {
+    /// Greatest height of the centre of gravity above the pad, m.
+    pub highest_m: f64,
+    /// Speed at the end of the rail, m/s; of a flight that is looked at from its rail on.
+    pub rail_m_s: Option<f64>,
+    /// Lowest height of the feet in the fall from which an abort would still have opened the parachute, m.
+    pub chute_down_to_m: Option<f64>,
+    /// Height of the feet when the landing motor got its current, m.
+    pub lit_at_m: Option<f64>,
+    /// From the ejection of the parachute to the ground, s.
+    pub canopy_s: Option<f64>,
+    /// It does not stand at the end: it tipped over, or its body struck the ground.
+    pub lies: bool,
+    /// Where the stack stood, m, and its speed a frame ago, m/s, while it is on its rail.
+    on_rail: Option<(Vector3<f64>, f64)>,
+}
+
+impl Course {
+    fn note(&mut self, flight: &Sortie) {
+        let (world, computer) = (flight.world(), flight.computer());
+        let (state, phase) = (world.state(), computer.mode().phase);
+        self.highest_m = self.highest_m.max(state.position_m.z);
+        self.lies = world.rest().is_some_and(|rest| rest.outcome != RestOutcome::Upright);
+        let ejected_s = world.parachute_ejected_s();
+        let down_s = world.touchdown().map(|touchdown| touchdown.time_s);
+        self.canopy_s = down_s.zip(ejected_s).map(|(down_s, ejected_s)| down_s - ejected_s);
+        if world.thrust_begins_s().is_some() {
+            self.lit_at_m.get_or_insert(world.height_m());
+        }
+        if !phase.before_apogee() && computer.abort_effect() == AbortEffect::ChuteNow {
+            self.chute_down_to_m = Some(world.height_m());
+        }
+        if let Some(launch) = flight.mission().launched().filter(|_| world.booster_attached()) {
+            let speed_m_s = libm::sqrt(state.velocity_m_s.norm_squared());
+            let (stood_m, last_m_s) = *self.on_rail.get_or_insert((state.position_m, speed_m_s));
+            let travelled_m = libm::sqrt((state.position_m - stood_m).norm_squared());
+            if travelled_m < launch.rail.length_m {
+                self.on_rail = Some((stood_m, speed_m_s));
+            } else {
+                self.rail_m_s.get_or_insert(last_m_s);
+            }
+        }
+    }
 }
 
 impl Impact {
@@ -330,8 +380,9 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
     let mut impacts = Vec::with_capacity(ways.len());
     let drawn = draw(&recipe.mission, &recipe.dispersion, recipe.seed, number);
     let downwind_rad = drawn.truth.wind_towards_rad;
-    let mut add =
-        |way: Way, place_m, landed| impacts.push(Impact { way, number, place_m, downwind_rad, landed });
+    let mut add = |way: Way, (place_m, course), landed| {
+        impacts.push(Impact { way, number, place_m, downwind_rad, landed, course });
+    };
     let (alone, beside): (Vec<Way>, Vec<Way>) =
         ways.iter().partition(|way| way.faults().is_some() || **way == Way::Uncommanded);
     if !beside.is_empty() {
@@ -357,13 +408,13 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
                 (Way::AsPlanned, _) => add(Way::AsPlanned, planned, flight.outcome().legs),
                 (Way::Booster, _) => {
                     if let Some(place_m) = booster {
-                        add(Way::Booster, Some(place_m), false);
+                        add(Way::Booster, (Some(place_m), Course::default()), false);
                     }
                 }
                 (way, Some(mut aborted)) => {
                     aborted.abort();
-                    let place_m = come_down(&mut aborted, |_| true);
-                    add(way, place_m, aborted.outcome().legs);
+                    let down = come_down(&mut aborted, |_| true);
+                    add(way, down, aborted.outcome().legs);
                 }
                 // This flight had no such part.
                 (_, None) => {}
@@ -378,8 +429,8 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
             }
             None => uncommanded(recipe, number)?,
         };
-        let place_m = come_down(&mut flight, |_| true);
-        add(way, place_m, flight.outcome().legs);
+        let down = come_down(&mut flight, |_| true);
+        add(way, down, flight.outcome().legs);
     }
     let place_of = |way: Way| ways.iter().position(|known| *known == way);
     impacts.sort_by_key(|impact| place_of(impact.way));
@@ -411,14 +462,16 @@ impl Branch {
 }
 
 /// Flies until the vehicle lies still, and looks at every frame before it is flown, which says whether to go on. Where it
-/// lies, m.
-fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> Option<[f64; 2]> {
+/// lies, m, and how it came there.
+fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Option<[f64; 2]>, Course) {
+    let mut course = Course::default();
     let goes_on = |flight: &Sortie| {
         let world = flight.world();
         let slides = world.touchdown().is_none_or(|touchdown| world.time_s() < touchdown.time_s + SLIDES_S);
         world.rest().is_none() && slides && world.time_s() < LONGEST_S && world.state().is_finite()
     };
     while goes_on(flight) && look(flight) {
+        course.note(flight);
         if flight.computer().mode().phase == Phase::Chute {
             // The computer has nothing to decide any more: its commands stay as they are.
             let last = *flight.computer().commands();
@@ -427,6 +480,7 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> Opti
                 let held =
                     Actuators { gimbal_rad: last.gimbal_rad, fins_rad: last.fins_rad, ..Actuators::NONE };
                 while goes_on(flight) {
+                    course.note(flight);
                     flight.world_mut().advance(&held, FRAME_MS as usize);
                 }
             }
@@ -436,7 +490,8 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> Opti
     }
     let place_m = flight.world().state().position_m;
     let down = flight.world().touchdown().is_some() && flight.world().state().is_finite();
-    down.then_some([place_m.x, place_m.y])
+    course.note(flight);
+    (down.then_some([place_m.x, place_m.y]), course)
 }
 
 /// A vehicle that stands on its pad, disarmed, when its ascent motor lights.
@@ -520,8 +575,7 @@ impl Rule {
         };
         let impulse_n_s: f64 = motors().map(ThrustCurve::total_impulse_n_s).sum();
         let propellant_kg: f64 = motors().map(ThrustCurve::propellant_mass_kg).sum();
-        let mass_kg = mission.airframe.mass.loaded_kg
-            + booster.map_or(0.0, |booster| booster.dry_kg + booster.motor_curve.propellant_mass_kg());
+        let mass_kg = lift_off_kg(mission, mission.launched());
         let model = impulse_n_s <= 160.0 && propellant_kg <= 0.125 && mass_kg <= 1.5;
         let complex = booster.is_some();
         let feet = if model {
@@ -536,6 +590,13 @@ impl Rule {
     pub fn distance_m(&self) -> f64 {
         0.3048 * self.feet
     }
+}
+
+/// Mass of a mission's vehicle with its booster, if it has one, kg.
+pub fn lift_off_kg(mission: &Mission, launch: Option<&Launch>) -> f64 {
+    let booster = launch.map(|launch| &launch.booster);
+    let booster_kg = booster.map_or(0.0, |booster| booster.dry_kg + booster.motor_curve.propellant_mass_kg());
+    mission.airframe.mass.loaded_kg + booster_kg
 }
 
 /// Least distance of people by the total impulse, N s, feet.

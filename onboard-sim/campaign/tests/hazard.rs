@@ -1,7 +1,7 @@
 //! Where flights come down that do not end on the pad.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
-use campaign::hazard::{Flights, Impact, Radius, Way, fly, study, widest};
+use campaign::hazard::{Course, Flights, Impact, Radius, Way, fly, study, widest};
 use campaign::run::threads;
 use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
@@ -96,6 +96,7 @@ fn val_hand_a_place_downwind_and_left_of_it() {
         place_m: Some([-3.0, 10.0]),
         downwind_rad: core::f64::consts::FRAC_PI_2,
         landed: false,
+        course: Course::default(),
     };
     let [along_m, left_m] = impact.in_wind_m().unwrap();
     assert!((along_m - 10.0).abs() < 1e-12 && (left_m - 3.0).abs() < 1e-12, "{along_m} {left_m}");

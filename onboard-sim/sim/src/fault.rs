@@ -279,6 +279,8 @@ impl fmt::Display for TimedFault {
             Breakage::Sensor(sensor, defect) => {
                 let (name, _) = named(sensor);
                 let (how, value) = how(defect);
+                let inertial = matches!(sensor, Sensor::Gyro | Sensor::Accelerometer);
+                let how = if inertial && how == "step" { "bias" } else { how };
                 write!(f, "{name}-{how}")?;
                 value.map_or(Ok(()), |value| write!(f, ":{value}"))
             }
@@ -382,7 +384,7 @@ mod tests {
             "reboot:0.5@descent+4",
             "link-loss@0",
             "link-delay:1.5@descent",
-            "accelerometer-step:50@armed",
+            "accelerometer-bias:50@armed",
             "abort@ignition+0..4.5",
         ] {
             assert_eq!(text.parse::<TimedFault>().unwrap().to_string(), text);

@@ -17,6 +17,7 @@ use campaign::motors::table;
 use clap::Args;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
+use protocol::mission::MissionHash;
 use sim::dispersion;
 
 use super::hazard::check_winds;
@@ -74,24 +75,24 @@ pub(crate) fn motors(arguments: &MotorsArguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The files of a card.
-const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
+/// The files of a card; the last one only if another mass or motor is proposed.
+const FILES: [&str; 4] = ["card.html", "card.txt", "mission.toml", "proposal.toml"];
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
 
 /// For the help.
 pub(crate) const CARD_EXAMPLE: &str =
-    "Example: onboard-sim card --mission mini-f10 --motor F10 --mass 0.85 --out card";
+    "Example: onboard-sim card --mission mini-f10 --wind-from 270 --out card";
 
 #[derive(Args)]
 pub(crate) struct CardArguments {
     #[command(flatten)]
     choices: Choices,
-    /// The landing motor: an .eng or .rse file, or the name of one of the motors of --from (built in if not given). By default
-    /// the mission's own.
+    /// The landing motor of the proposal at the card's end: an .eng or .rse file, or the name of one of the motors of --from (built
+    /// in if not given). By default the mission's own.
     #[arg(long, value_name = "FILE|NAME")]
     motor: Option<String>,
-    /// Mass with the motor full, kg. By default the best one within --ballast.
+    /// Mass of the proposal with the motor full, kg. By default the best one within --ballast.
     #[arg(long, value_name = "KG")]
     mass: Option<f64>,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
@@ -118,12 +119,11 @@ pub(crate) struct CardArguments {
 pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let choices = &arguments.choices;
     check_winds(&arguments.winds)?;
-    if let Some(mass_kg) = arguments.mass {
-        anyhow::ensure!(
-            mass_kg.is_finite() && mass_kg > 0.0,
-            "--mass {mass_kg}: a mass in kg above 0 is accepted"
-        );
-    }
+    anyhow::ensure!(
+        arguments.mass.is_none_or(|mass_kg| mass_kg.is_finite() && mass_kg > 0.0),
+        "--mass {}: a mass in kg above 0 is accepted",
+        arguments.mass.unwrap_or_default()
+    );
     for name in FILES {
         refuse_loss(&arguments.out.join(name), arguments.force)?;
     }
@@ -147,6 +147,7 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let order = Order {
         team: &team,
+        hash: &MissionHash::of(&team.recipe.mission_toml).to_string(),
         motor: &motor,
         mass_kg: arguments.mass,
         winds: &days,
@@ -157,13 +158,12 @@ pub(crate) fn card(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
         wind_from_deg: arguments.wind_from,
     };
     let card = on_threads(choices.jobs, || Ok(Card::new(&order, &show_progress())?))?;
-    let [html, text, mission_file] = FILES;
+    let [html, text, mission_file, proposal] = FILES;
     let page = card.text();
-    let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
+    let mut files = vec![(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
+    files.extend(card.proposed.map(|proposed| (proposal, proposed.mission_toml)));
     write_folder(&arguments.out, &files, arguments.force)?;
-    let mut stdout = std::io::stdout().lock();
-    write!(stdout, "{page}")?;
-    writeln!(stdout, "card {}", arguments.out.join(html).display())?;
+    writeln!(std::io::stdout().lock(), "{page}card {}", arguments.out.join(html).display())?;
     Ok(ExitCode::SUCCESS)
 }
 

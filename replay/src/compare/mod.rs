@@ -5,14 +5,11 @@
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
 //! one flight has are counted separately, because interpolation would hide a lost record.
 //!
-//! The numbers in MAVLink messages are compared over the vehicle's time in them. When a message is sent depends on who asks for
-//! it, so between two vehicles no message counts as missing. Tables of words (events, limits) are compared row by row, without
-//! times.
+//! Tables of words (events, limits) are compared row by row, without times.
 //!
 //! The log of a ground station has no frames of the flight computer. It is compared with the vehicle's own log by the MAVLink
-//! messages that both have, while both recorded, and what the air lost is counted frame by frame.
+//! messages that both have, over the vehicle's time in them, while both recorded.
 
-mod air;
 mod missions;
 mod print;
 mod series;
@@ -21,12 +18,11 @@ mod tolerance;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-pub use air::{OverTheAir, Stream};
 use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission, print_missions};
-pub use print::{compare_cases, print_compare};
+pub use print::print_compare;
 use serde::Serialize;
 pub use series::{Align, Anchors, Flown, Samples, Series};
 pub use tolerance::SignalDifference;
@@ -35,7 +31,7 @@ pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
 use crate::log::RecordingError;
 use crate::log::VerdictFacts;
-use crate::print::{print_json, print_junit};
+use crate::print::print_json;
 
 /// Why flights cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -79,8 +75,6 @@ pub struct Comparison {
     pub added: Vec<String>,
     /// Rows of words that only one of the two has.
     pub words: Vec<WordsOfOne>,
-    /// If one log is the vehicle's and the other a station's: what each end sent, and what of it the air lost.
-    pub over_the_air: Vec<OverTheAir>,
     /// Violations of the tolerances, in words.
     pub failures: Vec<String>,
 }
@@ -120,7 +114,6 @@ pub fn compare(
 ) -> Result<Comparison, CompareError> {
     let shift_s = align.shift_s(baseline, other)?;
     let over_the_air = baseline.only_one_has_frames(other);
-    let messages_shift_s = align.messages_shift_s(baseline, other);
     let both_recorded_s = over_the_air
         .then(|| series::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
         .flatten();
@@ -138,8 +131,7 @@ pub fn compare(
     };
     let (ours, theirs): (Vec<String>, Vec<String>) =
         (a.keys().cloned().collect(), b.keys().cloned().collect());
-    let messages = baseline.over_the_air.keys().chain(other.over_the_air.keys());
-    tolerances.check_names(&ours.iter().chain(&theirs).chain(messages))?;
+    tolerances.check_names(&ours.iter().chain(&theirs))?;
     let missing: Vec<String> = ours.iter().filter(|name| !b.contains_key(*name)).cloned().collect();
     let added: Vec<String> = theirs.iter().filter(|name| !a.contains_key(*name)).cloned().collect();
     let mut signals = Vec::new();
@@ -150,12 +142,6 @@ pub fn compare(
     }
     let mut failures = tolerances.record_failures([baseline, other]);
     failures.extend(samples_failures(&signals, tolerances));
-    if let Some(shift_s) = messages_shift_s.filter(|_| !over_the_air) {
-        signals.extend(baseline.over_the_air.iter().filter_map(|(name, ours)| {
-            let theirs = other.over_the_air.get(name)?;
-            Some(SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name)))
-        }));
-    }
     failures.extend(signals.iter().filter_map(SignalDifference::failure));
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
@@ -185,7 +171,6 @@ pub fn compare(
         missing,
         added,
         words: words_of_one(baseline, other),
-        over_the_air: air::over_the_air(baseline, other),
         failures,
     })
 }
@@ -259,11 +244,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.
-    #[arg(long, conflicts_with = "junit")]
-    json: bool,
-    /// Answer in JUnit XML.
     #[arg(long)]
-    junit: bool,
+    json: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -295,13 +277,7 @@ impl Args {
             comparisons.push(compare(&baseline, &other, align, &tolerances)?);
         }
         answer(|output| {
-            if self.json {
-                print_json(&comparisons, output)
-            } else if self.junit {
-                print_junit("compare", compare_cases(&comparisons), output)
-            } else {
-                print_compare(&comparisons, output)
-            }
+            if self.json { print_json(&comparisons, output) } else { print_compare(&comparisons, output) }
         })?;
         let within = |comparison: &Comparison| comparison.failures.is_empty();
         Ok(Outcome::Decided { yes: comparisons.iter().all(within) })
@@ -310,10 +286,7 @@ impl Args {
 
 impl Args {
     fn missions(&self) -> Result<Outcome> {
-        ensure!(
-            !self.junit && self.tolerances.is_none(),
-            "missions are compared without tolerances and JUnit"
-        );
+        ensure!(self.tolerances.is_none(), "missions are compared without tolerances");
         let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
         let compared = compare_missions(&self.baseline, &others)?;
         answer(

@@ -1,9 +1,9 @@
-//! A comparison for people, and as test cases.
+//! A comparison for people.
 
 use std::io::{self, Write};
 
-use super::{Align, Comparison, OverTheAir, Stream, WordsOfOne};
-use crate::print::{JunitCase, JunitOutcome, LimitRow, counted, shown, verdict_rows, verdict_words};
+use super::{Align, Comparison, WordsOfOne};
+use crate::print::{LimitRow, counted, shown, verdict_rows, verdict_words};
 
 /// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
@@ -23,7 +23,7 @@ pub fn print_compare(comparisons: &[Comparison], output: &mut impl Write) -> io:
 
 /// The answer in one sentence.
 fn sentence(comparison: &Comparison) -> String {
-    let Comparison { baseline, other, signals, failures, over_the_air, .. } = comparison;
+    let Comparison { baseline, other, signals, failures, .. } = comparison;
     let identical = comparison.identical();
     let tables = counted(comparison.tables() as u64, "table");
     let differing = signals.len() - identical;
@@ -43,20 +43,7 @@ fn sentence(comparison: &Comparison) -> String {
             counted(signals.len() as u64, "signal")
         ),
     };
-    let air = over_the_air.first().map(|crossed| format!("; {}", crossing(crossed))).unwrap_or_default();
-    format!("{other} {found}{air}.")
-}
-
-/// What the air lost of what one end sent, in words.
-fn crossing(crossed: &OverTheAir) -> String {
-    let OverTheAir { sender, link, sent, lost, longest_gap_s, longest_gap_at_s, .. } = crossed;
-    let gap =
-        longest_gap_at_s.map(|at_s| format!(", the longest gap {longest_gap_s:.2} s from log {at_s:.2} s"));
-    format!(
-        "of {sent} messages that the {sender} sent over {link} the air lost {lost} ({:.1} %{})",
-        100.0 - crossed.heard_percent(),
-        gap.unwrap_or_default()
-    )
+    format!("{other} {found}.")
 }
 
 fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()> {
@@ -89,9 +76,6 @@ fn print_one(comparison: &Comparison, output: &mut impl Write) -> io::Result<()>
         }
     }
     print_words(comparison, output)?;
-    for crossed in &comparison.over_the_air {
-        print_crossing(crossed, output)?;
-    }
     if comparison.failures.len() < 2 {
         return Ok(());
     }
@@ -114,19 +98,6 @@ fn print_words(comparison: &Comparison, output: &mut impl Write) -> io::Result<(
     }
     if words.len() > NAMES_SHOWN {
         writeln!(output, "\nand {} more that differ", words.len() - NAMES_SHOWN)?;
-    }
-    writeln!(output)
-}
-
-fn print_crossing(crossed: &OverTheAir, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "Over the air: {}.\n", shown(&crossing(crossed)))?;
-    let losing: Vec<_> = crossed.streams.iter().filter(|(_, stream)| stream.lost > 0).collect();
-    if losing.is_empty() {
-        return Ok(());
-    }
-    writeln!(output, "| message | sent | lost | longest gap, s |\n|---|---:|---:|---:|")?;
-    for (name, Stream { sent, lost, longest_gap_s }) in losing {
-        writeln!(output, "| {name} | {sent} | {lost} | {longest_gap_s:.2} |")?;
     }
     writeln!(output)
 }
@@ -179,37 +150,4 @@ fn print_signals(comparison: &Comparison, output: &mut impl Write) -> io::Result
 /// Escapes text for a table cell.
 fn cell(text: &str) -> String {
     shown(text).replace('|', "\\|")
-}
-
-/// Comparisons as test cases: one for the verdict and the counts, and one for each signal with a tolerance.
-pub fn compare_cases(comparisons: &[Comparison]) -> Vec<JunitCase> {
-    let mut cases = Vec::new();
-    for comparison in comparisons {
-        let flights = format!("{} against {}", shown(&comparison.other), shown(&comparison.baseline));
-        let mut of_signals = Vec::new();
-        for signal in comparison.signals.iter().filter(|signal| signal.tolerance.is_some()) {
-            let message = comparison
-                .failures
-                .iter()
-                .find(|failure| failure.starts_with(&format!("{}: ", signal.signal)))
-                .cloned()
-                .unwrap_or_default();
-            of_signals.push(message.clone());
-            let outcome = if signal.passed {
-                JunitOutcome::Passed { said: String::new() }
-            } else {
-                JunitOutcome::Failed { details: message.clone(), message }
-            };
-            cases.push(JunitCase { name: format!("{flights}: {}", signal.signal), outcome });
-        }
-        let others: Vec<String> =
-            comparison.failures.iter().filter(|failure| !of_signals.contains(failure)).cloned().collect();
-        let outcome = if others.is_empty() {
-            JunitOutcome::Passed { said: String::new() }
-        } else {
-            JunitOutcome::Failed { message: others.join("; "), details: others.join("\n") }
-        };
-        cases.push(JunitCase { name: format!("{flights}: verdict and signals"), outcome });
-    }
-    cases
 }

@@ -4,14 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use flight::rules::phase::Phase;
-use protocol::dialect::MavMessage;
 use serde::Serialize;
 
 use super::CompareError;
-use super::air::Frames;
 use crate::log::{
-    Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Flights, LogError, RecordingError, VerdictFacts,
-    Verdicts, heard_message,
+    Cut, Entry, FlightLog, Flights, LogError, RecordingError, VerdictFacts, Verdicts, heard_message,
 };
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
@@ -86,11 +83,6 @@ pub struct Flown {
     pub over_the_air: BTreeMap<String, Series>,
     /// The rows of tables of words, without times and numbers, with how often each is there.
     pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
-    /// The frames that went over the air.
-    pub(super) frames: Frames,
-    clocks: Clocks,
-    /// The number of the vehicle's boot, as it was told first.
-    boot_number: Option<u32>,
     /// The log has what the vehicle decided, not only what was heard of it.
     pub has_frames: bool,
     /// Events to align on.
@@ -118,20 +110,13 @@ impl Flown {
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut anchors = Anchors::default();
         let mut verdicts = Verdicts::default();
-        let (mut frames, mut clocks, mut boot_number) = (Frames::default(), Clocks::default(), None);
         let (mut has_frames, mut first_ns) = (false, None);
         let mut log = FlightLog::open(path)?;
         let mut flights = Flights::default();
         while let Some(stamped) = log.next_entry()? {
             flights.note(&stamped);
-            let channel = log.channel(stamped.channel_id);
-            let message = heard_message(channel, &stamped);
-            frames.note(channel, &stamped);
-            if let Some(MavMessage::TD_FLIGHT_STATUS(status)) = &message {
-                boot_number.get_or_insert(status.boot_number);
-            }
-            let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
-            clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
+            first_ns.get_or_insert(stamped.log_time_ns);
+            let message = heard_message(log.channel(stamped.channel_id), &stamped);
             verdicts.note(&stamped, message.as_ref());
             anchors.note(&stamped.entry);
             has_frames |= matches!(stamped.entry, Entry::ComputerFrame(_));
@@ -200,9 +185,6 @@ impl Flown {
             signals,
             over_the_air,
             words,
-            frames,
-            clocks,
-            boot_number,
             has_frames,
             anchors,
             verdict,
@@ -302,23 +284,6 @@ impl Align {
             anchor(&flown.anchors).ok_or(CompareError::NoAnchor { name: flown.name.clone(), event })
         };
         Ok(of(baseline)? - of(other)?)
-    }
-
-    /// What to add to the times since power-up in the other flight's messages, s. `None` if the logs do not tell it.
-    pub(super) fn messages_shift_s(self, baseline: &Flown, other: &Flown) -> Option<f64> {
-        if baseline.boot_number.is_some() && baseline.boot_number == other.boot_number {
-            return Some(0.0);
-        }
-        let boot_s = |flown: &Flown| {
-            let time_s = match self {
-                Self::Time => 0.0,
-                Self::Ignition => flown.anchors.ignition_s?,
-                Self::Touchdown => flown.anchors.touchdown_s?,
-            };
-            let since_release = ClockTime { clock: Clock::Flight, time_s };
-            Some(flown.clocks.convert(since_release, Clock::Boot)?.time_s)
-        };
-        Some(boot_s(baseline)? - boot_s(other)?).filter(|_| baseline.has_frames && other.has_frames)
     }
 
     /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.

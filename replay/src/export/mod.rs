@@ -82,8 +82,7 @@ enum Format {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        // What is wrong with the file is said by what reads it.
-        let is_tlog = is_tlog(&self.file).unwrap_or_default();
+        let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv, parquet, tlog, rrd or frames")?;
         let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));

@@ -40,6 +40,9 @@ const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
 const BUFFER_BYTES: usize = 1 << 20;
 
+/// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a log is not in order.
+pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
+
 /// The summary of a log of many hours has some megabytes.
 const SUMMARY_LIMIT_BYTES: u64 = 64 << 20;
 
@@ -51,6 +54,8 @@ pub struct FlightLog<R: Read> {
     /// Whether a record was found that only flight logs have.
     recognised: bool,
     last_log_time_ns: Option<u64>,
+    /// Its times need not be in order.
+    may_go_back: bool,
     in_flight: InFlight,
     /// The first verdict that contradicts itself.
     contradiction: Option<Damage>,
@@ -75,7 +80,11 @@ impl FlightLog<BufReader<File>> {
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
         match open_log(path) {
-            Ok(file) => Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file)),
+            Ok((file, of_tlog)) => {
+                let log = Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file))?;
+                // The clock of another station may have been set back; its frames are in the order in which they came.
+                Ok(Self { may_go_back: of_tlog, ..log })
+            }
             Err(source) => Err(LogError::Read { name, source }),
         }
     }
@@ -104,6 +113,7 @@ impl<R: Read> FlightLog<R> {
             head: Head::default(),
             recognised: false,
             last_log_time_ns: None,
+            may_go_back: false,
             in_flight: InFlight::default(),
             contradiction: None,
             wanted: None,
@@ -166,6 +176,13 @@ impl<R: Read> FlightLog<R> {
             match item {
                 None => return self.end().map(|()| None),
                 Some(LogItem::Message { channel_id, log_time_ns, sequence, data }) => {
+                    let back_ns = self.last_log_time_ns.unwrap_or(0).saturating_sub(log_time_ns);
+                    if back_ns > IN_ORDER_NS && !self.may_go_back {
+                        return Err(LogError::NotInOrder {
+                            name: self.name.clone(),
+                            back_s: back_ns as f64 / 1e9,
+                        });
+                    }
                     let channel = self.reader.channel(channel_id);
                     let wanted = |channel: &&LogChannel| {
                         self.wanted.is_none_or(|topics| topics.contains(&channel.topic.as_str()))
@@ -246,6 +263,11 @@ pub enum LogError {
         /// What is wrong.
         damage: String,
     },
+    /// MCAP allows any order; a flight is told from its beginning to its end.
+    #[error(
+        "{name}: is not in order of time: a record comes {back_s:.1} s after later ones; `replay recover` sorts it"
+    )]
+    NotInOrder { name: String, back_s: f64 },
     /// An MCAP file of another program.
     #[error(
         "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {} or similar topics",

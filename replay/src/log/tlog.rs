@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, BufWriter, Read as _, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -22,6 +22,8 @@ use super::open_regular;
 use super::verdict::frame_of;
 use crate::output::{Destination, NewFile, WriteError};
 
+/// A frame of a `.tlog` follows a time of this length.
+const TIME_BYTES: usize = 8;
 /// System id of a ground station, by convention.
 const GROUND_SYSTEM: u8 = 255;
 
@@ -58,17 +60,17 @@ pub struct ImportedTlog {
     pub telemetry: u64,
 }
 
-/// Opens a flight log; of a `.tlog`, a temporary one with what it holds. Memory does not grow with its size.
-pub(crate) fn open_log(path: &Path) -> io::Result<File> {
+/// Opens a flight log; of a `.tlog`, a temporary one with what it holds, and `true`. Memory does not grow with its size.
+pub(crate) fn open_log(path: &Path) -> io::Result<(File, bool)> {
     let file = open_regular(path)?;
     if !is_tlog(path)? {
-        return Ok(file);
+        return Ok((file, false));
     }
     match convert(file, path, BufWriter::new(tempfile::tempfile()?)) {
         Ok((log, _)) => {
             let mut log = log.into_inner().map_err(io::IntoInnerError::into_error)?;
             log.rewind()?;
-            Ok(log)
+            Ok((log, true))
         }
         Err(Stopped::NoFrames) => {
             Err(io::Error::new(io::ErrorKind::InvalidData, "it has only frames of MAVLink 1"))
@@ -79,8 +81,39 @@ pub(crate) fn open_log(path: &Path) -> io::Result<File> {
 }
 
 /// Whether a file has the content of a `.tlog`, whatever its name is.
+///
+/// # Errors
+/// The file cannot be read, or it holds frames without times.
 pub(crate) fn is_tlog(path: &Path) -> io::Result<bool> {
+    let mut start = Vec::new();
+    open_regular(path)?.take(RAW_WITHIN_BYTES).read_to_end(&mut start)?;
+    if is_raw(&start) {
+        let words = "it is a raw stream of MAVLink frames: a .tlog has a time of 8 bytes before each frame, and without times nothing says what happened when";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, words));
+    }
     tlog::is_tlog(open_regular(path)?)
+}
+
+/// Enough to tell frames with times from frames without.
+const RAW_WITHIN_BYTES: u64 = 1 << 16;
+
+/// Whether more frames follow at once upon the one before than after the 8 bytes of a time.
+fn is_raw(bytes: &[u8]) -> bool {
+    let begins = |at: usize| matches!(bytes.get(at), Some(0xfd | 0xfe));
+    let end_of = |at: usize| {
+        let payload = at + usize::from(*bytes.get(at + 1)?);
+        let signed = bytes.get(at + 2)? & 1 != 0;
+        Some(if bytes[at] == 0xfe { payload + 8 } else { payload + 12 + 13 * usize::from(signed) })
+    };
+    let (mut at_once, mut after_time, mut at) = (0, 0, 0);
+    while at < bytes.len() {
+        match end_of(at).filter(|_| begins(at)) {
+            Some(end) if begins(end) => (at_once, at) = (at_once + 1, end),
+            Some(end) if begins(end + TIME_BYTES) => (after_time, at) = (after_time + 1, end + TIME_BYTES),
+            _ => at += 1,
+        }
+    }
+    at_once > after_time && !bytes.starts_with(mcap::MAGIC)
 }
 
 /// Imports a `.tlog` into a new flight log. Memory does not grow with its size.
@@ -94,6 +127,7 @@ pub fn import_tlog<'a>(
     let destination = output.into();
     let read = |source| ImportError::Read { path: input.to_owned(), source };
     let failed = WriteError::at(destination.path);
+    is_tlog(input).map_err(read)?;
     let file = open_regular(input).map_err(read)?;
     let new = BufWriter::new(NewFile::create(destination, input)?);
     let (log, imported) = convert(file, input, new).map_err(|stopped| match stopped {

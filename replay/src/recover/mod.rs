@@ -1,9 +1,9 @@
 //! Recovers a whole log from a damaged one.
 //!
 //! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the middle. Every chunk with a
-//! correct checksum is kept, also after a broken one. What the file says about itself is taken as true: its checksums, and the
-//! chunks and messages that its summary counts. The report lists what is lost, and so does the recovered log itself
-//! ([`METADATA_RECOVERY`]). Nothing is invented: a message is kept unchanged or not at all.
+//! correct checksum is kept, also after a broken one. The chunks are the truth: what the summary lists and counts helps only if
+//! the summary is whole. The report lists what is lost, and so does the recovered log itself ([`METADATA_RECOVERY`]). Nothing is
+//! invented: a message is kept unchanged or not at all. A log that is not in order of time is sorted.
 
 pub(crate) mod scan;
 pub(crate) mod write;
@@ -20,7 +20,7 @@ use serde::Serialize;
 use write::Rescue;
 
 use crate::cli::{Outcome, answer};
-use crate::log::{LogError, is_tlog};
+use crate::log::{IN_ORDER_NS, LogError, is_tlog};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{counted, print_json, shown};
 
@@ -84,6 +84,10 @@ pub struct Recovery {
     pub foreign: u64,
     /// Chunks were not in the order of the summary; they are now.
     pub reordered: bool,
+    /// Messages were not in order of time, which is no damage; they are now.
+    pub sorted: bool,
+    /// What was wrong with the summary; no message is lost with it.
+    pub summary_fault: Option<&'static str>,
     /// Whether the log has its end mark, so nothing is missing at the end.
     pub ended: bool,
 }
@@ -91,8 +95,11 @@ pub struct Recovery {
 impl Recovery {
     /// Whether the log was whole.
     pub fn was_whole(&self) -> bool {
-        let Self { lost, messages_lost, undecodable, repeated, foreign, reordered, ended, .. } = self;
+        let Self {
+            lost, messages_lost, undecodable, repeated, foreign, reordered, ended, summary_fault, ..
+        } = self;
         lost.is_empty()
+            && summary_fault.is_none()
             && messages_lost.unwrap_or(0) + undecodable + repeated + foreign == 0
             && !reordered
             && *ended
@@ -138,6 +145,7 @@ impl Recovery {
         if self.reordered {
             faults.push("its chunks were out of order".to_owned());
         }
+        faults.extend(self.summary_fault.map(|fault| format!("{fault}, and no message with it")));
         if !self.ended {
             faults.push("it had no end mark, so its end may be lost".to_owned());
         }
@@ -164,6 +172,8 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
         input: input.display().to_string(),
         output: destination.path.to_owned(),
         ended,
+        sorted: contents.back_ns > IN_ORDER_NS,
+        summary_fault: contents.summary_fault,
         ..Recovery::default()
     };
     let (good, repeated) = without_repeats(contents.good);
@@ -175,6 +185,7 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     recovery.reordered = reordered;
     let mut keeps_all = |_: &str, _: u64| true;
     let mut rescue = Rescue::create(destination, input, &told, &mut keeps_all)?;
+    rescue.sorts = recovery.sorted;
     for piece in good {
         let body = records.body(piece.at)?;
         rescue.keep(piece.opcode, &body)?;
@@ -332,6 +343,9 @@ pub fn print_recovery(recovery: &Recovery, output: &mut impl Write) -> io::Resul
             lost.from_byte,
             shown(&lost.reason)
         )?;
+    }
+    if recovery.sorted {
+        writeln!(output, "the log was not in order of time; the new one is")?;
     }
     if recovery.was_whole() {
         return writeln!(output, "the log was whole: nothing is lost");

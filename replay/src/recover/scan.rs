@@ -63,11 +63,16 @@ pub(crate) struct Contents {
     pub(crate) lost: Vec<LostStretch>,
     /// The end mark is there.
     pub(crate) ended: bool,
+    /// A message comes this long after later ones, ns.
+    pub(crate) back_ns: u64,
+    latest_ns: u64,
     pub(crate) told: WriterReport,
+    /// What is wrong with the summary. The chunks before it do not depend on it.
+    pub(crate) summary_fault: Option<&'static str>,
 }
 
-/// What the summary behind the end mark tells, as far as it can be read. Its own index is not used: bytes that were lost
-/// have shifted it.
+/// What the summary behind the end mark tells. Its schemas and channels are used as far as they can be read, its list of
+/// chunks and its count only if it is whole. Its own index is not used: bytes that were lost have shifted it.
 #[derive(Debug, Default)]
 pub(crate) struct WriterReport {
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
@@ -76,8 +81,6 @@ pub(crate) struct WriterReport {
     pub(crate) chunks: Vec<(u64, u64, ChunkName)>,
     /// How many messages there were; `None` if it is not told.
     pub(crate) messages: Option<u64>,
-    /// Its checksum does not fit.
-    is_changed: bool,
 }
 
 /// A file being read record by record.
@@ -157,13 +160,15 @@ impl Records {
                         "the checksum over all data does not fit: something between the records was changed";
                     contents.lose(at, 0, None, reason);
                 }
-                contents.told = self.told(next)?;
-                if contents.told.is_changed {
-                    contents.lose(next, 0, None, "the checksum over the summary does not fit");
+                contents.summary_fault = self.read_summary(next, &mut contents.told)?;
+                if contents.summary_fault.is_some() {
+                    // What is left of a list looks like a shorter one.
+                    contents.told.chunks.clear();
+                    contents.told.messages = None;
                 }
                 break;
             }
-            match check(opcode, &body) {
+            match contents.check(opcode, &body) {
                 Ok(keeps) => {
                     hasher.update(&[opcode]);
                     hasher.update(&length.to_le_bytes());
@@ -191,10 +196,13 @@ impl Records {
         Ok(contents)
     }
 
-    /// What is counted from here to the footer, or to the first record that makes no sense.
-    fn told(&mut self, from_byte: u64) -> Result<WriterReport, LogError> {
-        let mut told = WriterReport::default();
-        let mut checksum = crc32fast::Hasher::new();
+    /// Reads from here to the end of the file; says what is wrong.
+    fn read_summary(
+        &mut self,
+        from_byte: u64,
+        told: &mut WriterReport,
+    ) -> Result<Option<&'static str>, LogError> {
+        let (mut checksum, mut chunks) = (crc32fast::Hasher::new(), None);
         let mut at = from_byte;
         while self.begins_record(at)? {
             let Some((opcode, length)) =
@@ -203,6 +211,9 @@ impl Records {
                 break;
             };
             let body = self.read(at + HEAD_BYTES as u64, length)?;
+            checksum.update(&[opcode]);
+            checksum.update(&length.to_le_bytes());
+            at += HEAD_BYTES as u64 + length;
             match parse_record(opcode, &body) {
                 Ok(Record::Schema { header, data }) => {
                     told.schemas.insert(header.id, (header, data.into_owned()));
@@ -219,26 +230,29 @@ impl Records {
                     };
                     told.chunks.push((index.chunk_start_offset, index.chunk_length, name));
                 }
-                Ok(Record::Statistics(statistics)) => told.messages = Some(statistics.message_count),
+                Ok(Record::Statistics(statistics)) => {
+                    told.messages = Some(statistics.message_count);
+                    chunks = Some(statistics.chunk_count as usize);
+                }
                 Ok(Record::Footer(footer)) => {
-                    checksum.update(&[opcode]);
-                    checksum.update(&length.to_le_bytes());
                     checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
                     // What the bits of a number were cannot be seen from it.
                     if footer.summary_crc != 0 && footer.summary_crc != checksum.finalize() {
-                        (told.messages, told.is_changed) = (None, true);
+                        return Ok(Some("the checksum over its summary does not fit"));
                     }
-                    break;
+                    // A writer may list no chunk at all.
+                    if !told.chunks.is_empty() && chunks.is_some_and(|count| count != told.chunks.len()) {
+                        return Ok(Some("its summary does not list as many chunks as it counts"));
+                    }
+                    let ends = self.read(at, mcap::MAGIC.len() as u64 + 1)? == mcap::MAGIC;
+                    return Ok((!ends).then_some("the file does not end behind its footer"));
                 }
                 Err(_) => break,
                 Ok(_) => {}
             }
-            checksum.update(&[opcode]);
-            checksum.update(&length.to_le_bytes());
             checksum.update(&body);
-            at += HEAD_BYTES as u64 + length;
         }
-        Ok(told)
+        Ok(Some("its summary is cut off"))
     }
 
     /// Loses what comes until the next chunk or the end mark, and returns where that is.
@@ -329,7 +343,31 @@ impl Contents {
     /// What is wrong with the file, if something is.
     pub(crate) fn fault(&self) -> Option<String> {
         let lost = self.lost.first().map(|lost| format!("byte {}: {}", lost.from_byte, lost.reason));
-        lost.or_else(|| (!self.ended).then(|| "it has no end mark".to_owned()))
+        lost.or_else(|| self.summary_fault.map(str::to_owned))
+            .or_else(|| (!self.ended).then(|| "it has no end mark".to_owned()))
+    }
+
+    /// Whether a record is kept, if it can be read: indexes are made anew. Notes the times of its messages.
+    fn check(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
+        match opcode {
+            op::CHUNK => records_of_chunk(body, |record| {
+                self.note_time(&record);
+                Ok(())
+            })
+            .map(|()| true),
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
+                self.note_time(&parse_record(opcode, body)?);
+                Ok(true)
+            }
+            _ => Ok(false),
+        }
+    }
+
+    fn note_time(&mut self, record: &Record) {
+        if let Record::Message { header, .. } = record {
+            self.back_ns = self.back_ns.max(self.latest_ns.saturating_sub(header.log_time));
+            self.latest_ns = self.latest_ns.max(header.log_time);
+        }
     }
 
     /// Notes a lost stretch; one that continues the last is part of it.
@@ -396,17 +434,6 @@ fn may_begin(bytes: &[u8], left: u64) -> bool {
     head.is_some_and(|head| {
         head.body_bytes == length && head.name.uncompressed_bytes <= RECORD_LIMIT_BYTES as u64
     })
-}
-
-/// Whether a record is kept, if it can be read: indexes are made anew.
-fn check(opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
-    match opcode {
-        op::CHUNK => records_of_chunk(body, |_| Ok(())).map(|()| true),
-        op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
-            parse_record(opcode, body).map(|_| true).map_err(RecordError::from)
-        }
-        _ => Ok(false),
-    }
 }
 
 fn number_at(bytes: &[u8], place: usize) -> Option<u64> {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
 use super::scan::WriterReport;
 use crate::output::{Destination, NewFile, WriteError};
@@ -27,6 +28,36 @@ pub(crate) struct Rescue<'a> {
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     kept: Kept,
+    /// Messages wait until the end, and are then written in order of time.
+    pub(crate) sorts: bool,
+    waiting: Vec<Waiting>,
+}
+
+/// Of one time, what the computer starts from at power-up comes before its first frame. What a frame led to comes behind it, and
+/// the start at a release last.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    PowerUp,
+    Frame,
+    Other,
+    Start,
+}
+
+impl Place {
+    fn of(topic: &str) -> Self {
+        match topic {
+            TOPIC_COMPUTER_START => Self::Start,
+            TOPIC_COMPUTER_FRAME => Self::Frame,
+            _ => Self::Other,
+        }
+    }
+}
+
+struct Waiting {
+    header: MessageHeader,
+    data: Vec<u8>,
+    /// Among the messages of one time.
+    place: Place,
 }
 
 /// What was kept.
@@ -63,6 +94,8 @@ impl<'a> Rescue<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             kept: Kept::default(),
+            sorts: false,
+            waiting: Vec::new(),
         })
     }
 
@@ -134,7 +167,11 @@ impl<'a> Rescue<'a> {
             return Ok(());
         }
         let header = MessageHeader { channel_id: *channel_id, ..header };
-        self.writer("")?.write_to_known_channel(&header, data)?;
+        if self.sorts {
+            self.waiting.push(Waiting { header, data: data.to_vec(), place: Place::of(topic) });
+        } else {
+            self.writer("")?.write_to_known_channel(&header, data)?;
+        }
         self.kept.messages += 1;
         let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
         self.kept.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
@@ -182,6 +219,15 @@ impl<'a> Rescue<'a> {
     }
 
     fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
+        if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
+            first.place = Place::PowerUp;
+        }
+        waiting.sort_by_key(|message| (message.header.log_time, message.place));
+        for Waiting { header, data, .. } in waiting {
+            self.writer("")?.write_to_known_channel(&header, &data)?;
+        }
         let writer = self.writer("")?;
         writer.write_metadata(about)?;
         writer.finish()?;

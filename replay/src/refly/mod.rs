@@ -13,19 +13,17 @@
 //! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
 //! computer only. The crew's abort comes at its recorded frame.
 
-mod jobs;
 pub(crate) mod prepared;
 mod rerun;
-pub mod vary;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use clap::ValueEnum;
 use flight::rules::phase::Phase;
-pub use prepared::Prepared;
+use prepared::Prepared;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
@@ -260,14 +258,6 @@ pub struct ReflownFlight {
     pub verdict: Option<v1::LandingVerdict>,
 }
 
-/// Whether a flight can be flown again at all.
-///
-/// # Errors
-/// The log lacks what is needed, or this build cannot use it.
-pub fn can_be_flown(recording: &Recording) -> Result<(), ReflyError> {
-    rerun::Recorded::of(recording).map(|_| ())
-}
-
 /// Flies a recorded flight again.
 ///
 /// # Errors
@@ -465,26 +455,23 @@ pub(crate) fn print_verdicts(
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The log, an MCAP file; with --vary one or more.
-    #[arg(required = true)]
-    files: Vec<PathBuf>,
+    /// The log, an MCAP file.
+    file: PathBuf,
     #[command(flatten)]
     how: FlownHow,
     /// Begin at T+12.9, POWERED or frame:1290.
     ///
     /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8 (since power-up),
     /// log:19.7 (since the first record). A frame has its number in the log. Without this, it is the landing's first frame.
-    #[arg(long, value_name = "WHERE", conflicts_with_all = ["vary", "vary_plant"])]
+    #[arg(long, value_name = "WHERE")]
     at: Option<Moment>,
     /// Write the flight as a new log.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["vary", "vary_plant"])]
+    #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
     /// Replace an existing file, but never the log that is flown again.
     #[arg(long, requires = "log", hide_short_help = true)]
     force: bool,
-    #[command(flatten)]
-    vary: vary::Arguments,
-    /// Answer in JSON; with --vary, every point.
+    /// Answer in JSON.
     #[arg(long)]
     json: bool,
 }
@@ -538,13 +525,7 @@ impl FlownHow {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        if self.vary.is_asked() {
-            return self.vary.run(&self.files, &self.how, self.json);
-        }
-        let [file] = self.files.as_slice() else {
-            bail!("several flights need --vary, as in --vary powered.weights.theta=50:110:7")
-        };
-        let recording = Recording::open(file)?;
+        let recording = Recording::open(&self.file)?;
         let start = match self.at {
             Some(Moment::Frame(frame)) => StartAt::Frame(frame),
             Some(Moment::Time(time)) => StartAt::Time(flight_time_s(&recording, time)?),

@@ -30,7 +30,7 @@ type Kept = Vec<(f64, Record)>;
 
 /// A recorded flight at the moment it is flown again from.
 #[derive(Debug)]
-pub struct Prepared<'a> {
+pub(crate) struct Prepared<'a> {
     recording: &'a Recording,
     start: &'a ComputerStart,
     frames: &'a [ComputerFrame],
@@ -49,7 +49,7 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// See [`ReflyError`].
-    pub fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
+    pub(crate) fn new(recording: &'a Recording, options: &ReflyOptions) -> Result<Self, ReflyError> {
         let (start, frames) = recording.recorded_frames()?;
         let Recorded { dispersion, number, mut rerun, .. } = Recorded::of(recording)?;
         let place = find(recording, frames, &options.start)?;
@@ -104,34 +104,12 @@ impl<'a> Prepared<'a> {
         self.reached
     }
 
-    /// The flight.
-    pub fn recording(&self) -> &'a Recording {
-        self.recording
-    }
-
     /// Flies the flight again from the start it was prepared for; `options` must have the same start.
     ///
     /// # Errors
     /// See [`ReflyError`].
-    pub fn fly(&self, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
+    pub(crate) fn fly(&self, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
         Ok(self.fly_on(options, None)?.0)
-    }
-
-    /// Whether this build, with nothing changed, flies it as recorded: up to the start, and also after it if the start
-    /// is the true state. This takes the time of one flight. The start must be the one the flight was prepared for.
-    ///
-    /// # Errors
-    /// See [`ReflyError`].
-    pub fn is_reproduced(&self, options: &ReflyOptions) -> Result<bool, ReflyError> {
-        if self.reached.first_different.is_some() {
-            return Ok(false);
-        }
-        if options.from == From::Estimate {
-            return Ok(true);
-        }
-        let unchanged = ReflyOptions { start: options.start.clone(), ..ReflyOptions::default() };
-        let report = self.fly(&unchanged)?;
-        Ok(report.commands_identical == report.commands_recorded)
     }
 
     /// Continues the flight to its end; keeps the frames if a place for them is given.
@@ -199,7 +177,10 @@ impl<'a> Prepared<'a> {
     ///
     /// # Errors
     /// See [`ReflyError`].
-    pub fn fly_kept(&self, options: &ReflyOptions) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+    pub(crate) fn fly_kept(
+        &self,
+        options: &ReflyOptions,
+    ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
         let Recorded { mut rerun, faults, .. } = Recorded::with_faults(self.recording, &options.faults)?;
         let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie::start(&rerun.flight);
         let start = ComputerStart { believed, gyro_bias_rad_s, ..*self.start };
@@ -312,12 +293,11 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     let of_truth = |setting: &&Setting| setting.path.starts_with("truth.");
     let of_plant = |setting: &&Setting| of_truth(setting) || setting.path.starts_with("airframe");
     if let Some(setting) = options.settings.iter().find(of_truth) {
-        let belongs = "the random draw belongs to the plant alone (--plant, --vary-plant)";
+        let belongs = "the random draw belongs to the plant alone (--plant)";
         return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
     }
     if let Some(setting) = options.plant_settings.iter().find(|setting| !of_plant(setting)) {
-        let belongs =
-            "the plant has airframe.* and truth.*; everything else is the controller's (--set, --vary)";
+        let belongs = "the plant has airframe.* and truth.*; everything else is the controller's (--set)";
         return Err(ReflyError::Misplaced { setting: setting.to_string(), belongs });
     }
     Ok(())

@@ -32,11 +32,6 @@ pub(super) fn message(id: u32) -> Option<&'static Message> {
     DIALECT.messages.get(&id)
 }
 
-/// The name of a message, as in `HEARTBEAT`; `None` if the dialect does not have it.
-pub(crate) fn message_name(id: u32) -> Option<&'static str> {
-    message(id).map(|message| message.name.as_str())
-}
-
 /// The words for the numbers of an enum; empty if the dialect has none of that name.
 pub(super) fn words_of(name: &str) -> &'static [(i64, String)] {
     DIALECT.enums.get(name).map_or(&[], Vec::as_slice)

@@ -21,7 +21,6 @@ use protocol::log::reader::LogChannel;
 use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
 use protocol::log::v1;
 
-pub(crate) use self::dialect::message_name;
 use self::dialect::{cells_of_frame, shape_of_frame, words_of};
 use crate::log::{Entry, FlightLog, LogError, StampedEntry, frame_of};
 

@@ -150,7 +150,7 @@ struct Contents {
 /// The file cannot be read, or is no log.
 fn read(path: &Path) -> Result<Contents, ReadError> {
     let failed = |source| ReadError::Read { path: path.to_owned(), source };
-    let mut reader = LogReader::new(BufReader::new(open_log(path).map_err(failed)?));
+    let mut reader = LogReader::new(BufReader::new(open_log(path).map_err(failed)?.0));
     let mut contents = Contents { name: path.display().to_string(), ..Contents::default() };
     while let Some(item) = reader.next_item().map_err(failed)? {
         if let LogItem::Message { channel_id, data, .. } = item
@@ -261,7 +261,7 @@ fn print_book(book: &BookFound, output: &mut impl Write) -> io::Result<()> {
 pub(super) struct Arguments {
     /// Print and prove the books of ground stations (who did what when) in logs of stations and of the vehicle: only the
     /// vehicle's log shows that a book was cut.
-    #[arg(long, conflicts_with_all = ["junit", "strict", "explain", "baseline"])]
+    #[arg(long, conflicts_with_all = ["strict", "explain", "baseline"])]
     pub(super) book: bool,
     /// The station's public key, 64 hexadecimal digits, as the first entry of its book and the answer show it.
     #[arg(long, requires = "book", value_name = "HEX", value_parser = public_key)]

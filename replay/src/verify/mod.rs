@@ -20,13 +20,13 @@
 //! the landing would end differently: only for this, the flight is simulated from the first frame that differs.
 
 mod again;
+mod baseline;
 pub mod book;
 mod difference;
 pub mod explain;
 mod flight;
 mod inputs;
 mod parts;
-pub mod suite;
 
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -48,8 +48,7 @@ use serde::Serialize;
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
-use crate::output::NewFile;
-use crate::print::{self, JunitCase, JunitOutcome, counted, print_json, print_junit, shown};
+use crate::print::{counted, print_json, shown};
 
 /// The topics that a verification reads.
 const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_VERDICT];
@@ -606,49 +605,23 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     )
 }
 
-/// A verification as a test case. With `strict`, only a whole identical flight passes.
-pub fn verify_case(report: &VerifyReport, strict: bool) -> JunitCase {
-    let mut text = Vec::new();
-    // Writing into memory cannot fail.
-    let _ = print_verify(report, &mut text);
-    let details = String::from_utf8_lossy(&text).into_owned();
-    let message = details.lines().next().unwrap_or_default().to_owned();
-    let outcome = match report.outcome {
-        Verification::Identical if strict && !report.is_all_compared() => {
-            JunitOutcome::Failed { message, details }
-        }
-        Verification::IdenticalReadablePart if strict => JunitOutcome::Failed { message, details },
-        Verification::Identical | Verification::IdenticalReadablePart => {
-            JunitOutcome::Passed { said: details }
-        }
-        Verification::Diverged | Verification::Impossible => JunitOutcome::Failed { message, details },
-        Verification::NotReplayable => JunitOutcome::Error { message: details },
-    };
-    JunitCase { name: format!("verify {}", name_of(report)), outcome }
-}
-
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The logs, MCAP files, and directories of logs.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Answer in JSON: a report, or a list of reports for several logs.
-    #[arg(long, conflicts_with = "junit")]
+    #[arg(long)]
     json: bool,
-    /// Answer in JUnit XML, or write it to a file, beside the text; strict unless --strict=false.
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "-")]
-    junit: Option<PathBuf>,
     /// Exit code 1 unless all that can be compared was: damaged logs fail, logs that end before their flight did, and
     /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
-    #[arg(
-        long, value_name = "true|false", num_args = 0..=1, require_equals = true, default_missing_value = "true"
-    )]
-    strict: Option<bool>,
+    #[arg(long)]
+    strict: bool,
     /// Solve this frame of the only log again.
-    #[arg(long, value_name = "FRAME", conflicts_with_all = ["junit", "strict"])]
+    #[arg(long, value_name = "FRAME", conflicts_with = "strict")]
     explain: Option<u64>,
     #[command(flatten)]
-    suite: suite::Arguments,
+    held: baseline::Arguments,
     #[command(flatten)]
     book: book::Arguments,
 }
@@ -665,32 +638,23 @@ impl Args {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, frame, self.json);
         }
-        let to_stdout = |path: &Path| path.as_os_str() == "-";
-        let junit = self.junit.as_deref().filter(|path| !to_stdout(path));
-        let junit = junit.map(print::junit_file).transpose()?;
-        let kind = match &self.junit {
-            Some(path) if to_stdout(path) => Printed::Junit,
-            _ if self.json => Printed::Json,
-            _ => Printed::Text,
-        };
-        if self.suite.is_asked() {
+        if let Some(baseline) = &self.held.baseline {
             let [directory] = self.files.as_slice() else { bail!("--baseline takes one directory") };
-            return self.suite.run(directory, kind, junit);
+            return self.held.run(baseline, directory, self.json);
         }
-        self.verify(kind, junit)
+        self.verify()
     }
 
-    fn verify(&self, kind: Printed, junit: Option<NewFile>) -> Result<Outcome> {
+    fn verify(&self) -> Result<Outcome> {
         let mut files = Vec::new();
         for file in &self.files {
-            if file.is_dir() { files.extend(suite::logs_of(file)?) } else { files.push(file.clone()) }
+            if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }
         }
-        let strict = self.strict.unwrap_or(self.junit.is_some());
         let mut answers: Vec<Verified> = Vec::new();
         for file in &files {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            let verified = if strict { verify_strictly(file) } else { verify(file) };
+            let verified = if self.strict { verify_strictly(file) } else { verify(file) };
             let took = started.elapsed();
             match &verified {
                 Ok(reports) => {
@@ -712,42 +676,19 @@ impl Args {
         {
             return Err(error.into());
         }
-        let cases = || answers.iter().flat_map(|verified| cases(verified, strict)).collect();
-        if let Some(file) = junit {
-            print::write_junit("verify", cases(), file)?;
-        }
         let reports: Vec<&VerifyReport> =
             answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).flatten().collect();
-        answer(|output| match (kind, reports.as_slice()) {
-            (Printed::Junit, _) => print_junit("verify", cases(), output),
-            (Printed::Json, [report]) if answers.len() == 1 => print_json(report, output),
-            (Printed::Json, reports) => print_json(&reports, output),
-            (Printed::Text, reports) => reports.iter().try_for_each(|report| print_verify(report, output)),
+        answer(|output| match reports.as_slice() {
+            [report] if self.json && answers.len() == 1 => print_json(report, output),
+            reports if self.json => print_json(&reports, output),
+            reports => reports.iter().try_for_each(|report| print_verify(report, output)),
         })?;
         let all_compared = reports.iter().all(|report| report.is_all_compared());
         let outcome = match worst(&answers) {
-            Verification::Identical if strict && !all_compared => Verification::IdenticalReadablePart,
+            Verification::Identical if self.strict && !all_compared => Verification::IdenticalReadablePart,
             worst => worst,
         };
-        Ok(outcome.answer(strict))
-    }
-}
-
-/// What goes to standard output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Printed {
-    Text,
-    Json,
-    Junit,
-}
-
-fn cases((path, verified): &Verified, strict: bool) -> Vec<JunitCase> {
-    match verified {
-        Ok(reports) => reports.iter().map(|report| verify_case(report, strict)).collect(),
-        Err(error) => vec![JunitCase {
-            name: format!("verify {}", path.display()),
-            outcome: JunitOutcome::Error { message: error.to_string() },
-        }],
+        Ok(outcome.answer(self.strict))
     }
 }
 

@@ -3,9 +3,6 @@
 use replay::evaluate::evaluate;
 use replay::evaluate::print_evaluate;
 use replay::log::Recording;
-use replay::refly::ReflyOptions;
-use replay::refly::vary::print_sweep;
-use replay::refly::vary::{SweepReport, grid, sweep};
 
 use crate::asked::settings;
 use crate::simulated::MK2;
@@ -42,21 +39,4 @@ fn an_evaluation_counts_differences_caused_by_the_build() {
     let own = evaluate(&MK2.recording(), &settings(&["powered.weights.theta=300"])).unwrap();
     assert!(own.unchanged_different == 0 && own.commands_different > 0);
     assert!(!words(|output| print_evaluate(&own, output)).contains("with nothing changed"));
-}
-
-fn swept(flights: &[Recording]) -> SweepReport {
-    let points = grid(&["powered.weights.theta=110".parse().unwrap()], &[]).unwrap();
-    sweep(flights, &points, &ReflyOptions::default(), &|_, _| {}).unwrap()
-}
-
-#[test]
-fn a_sweep_names_the_flights_that_are_not_reproduced() {
-    let other = Recording { name: "other.mcap".to_owned(), ..forged() };
-    let report = swept(&[MK2.recording(), other]);
-    assert_eq!(report.not_reproduced, ["other.mcap"]);
-    let text = words(|output| print_sweep(&report, output));
-    assert!(
-        text.contains("other.mcap: with nothing changed this build does not fly it as recorded"),
-        "{text}"
-    );
 }

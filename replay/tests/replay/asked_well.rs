@@ -7,7 +7,7 @@ use replay::log::Recording;
 
 use crate::command_line::{replay, run};
 use crate::from_apogee::LANDED;
-use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
+use crate::simulated::{DISPERSED, MK2};
 
 #[test]
 fn another_seed_is_named_in_the_answer_and_in_the_log() {
@@ -55,39 +55,13 @@ fn info_takes_several_logs_and_standard_input() {
     );
 }
 
-#[test]
-fn a_sweep_skips_what_it_cannot_fly_and_says_so() {
-    let text = MK2.beside("notes.mcap");
-    std::fs::write(&text, "notes").unwrap();
-    let telemetry = WITH_FRAMES.beside("swept.tlog");
-    let (ground, open) =
-        (WITH_FRAMES.beside("swept.mcap"), || replay::log::FlightLog::open(&WITH_FRAMES.log));
-    replay::export::export_tlog(&open, None, &telemetry).unwrap();
-    replay::log::import_tlog(&telemetry, &ground).unwrap();
-    let (code, stdout, stderr) = run(replay("refly", &MK2.log).arg(&text).arg(&ground).args([
-        "--vary",
-        "powered.weights.theta=80,90",
-        "--jobs",
-        "1",
-    ]));
-    assert!(code == 0 && stdout.contains("2 points on 1 flight"), "{stdout}{stderr}");
-    assert_eq!(stderr.matches("skipped: ").count(), 2, "{stderr}");
-    let (code, _, stderr) =
-        run(replay("refly", &text).arg(&ground).args(["--vary", "powered.weights.theta=80,90"]));
-    assert!(code == 2 && stderr.contains("none of the 2 logs can be flown again"), "{stderr}");
-}
-
 /// A message and its cause do not repeat each other.
 #[test]
 fn no_message_is_printed_twice() {
     let none = MK2.beside("none.mcap");
-    let mut sweep = replay("refly", &MK2.log);
-    sweep.args(["--vary", "powered.wights.theta=80,90"]);
     let mut unknown = replay("refly", &MK2.log);
     unknown.args(["--set", "powered.wights.theta=80"]);
-    for mut command in
-        [replay("info", &none), replay("verify", &none), replay("report", &none), sweep, unknown]
-    {
+    for mut command in [replay("info", &none), replay("verify", &none), replay("report", &none), unknown] {
         let (code, stdout, stderr) = run(&mut command);
         assert!(code == 2, "{stdout}{stderr}");
         let message = stderr.lines().last().unwrap_or_default();

@@ -16,13 +16,11 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     frames[6].output.gimbal_rad[1] = 0.25;
     let bad = files.directory.path().join("bad <&>.mcap");
     std::fs::write(&bad, write_log(&frames, &Recipe::default()).bytes).unwrap();
-    let loosely = ["--junit", "--strict=false"];
-    let (code, stdout, _) = run(replay("verify", &good).arg(&bad).args(loosely));
+    let (code, stdout, _) = run(replay("verify", &good).arg(&bad));
     assert_eq!(code, 1);
-    assert!(stdout.contains("tests=\"2\" skipped=\"0\" failures=\"1\" errors=\"0\""), "{stdout}");
     // There is no landing in the log to fly on from.
     assert!(stdout.contains("verdict: whether it would change is not known"), "{stdout}");
-    assert!(stdout.contains("bad &lt;&amp;&gt;.mcap") && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
+    assert!(stdout.contains("bad <&>.mcap") && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--json"));
     let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, reports.as_array().unwrap().len()), (1, 2));
@@ -48,12 +46,6 @@ fn a_comparison_exits_1_outside_its_tolerance() {
     assert_eq!(code, 1);
     assert!(
         stdout.contains("| vehicle_truth3d.state.position_m.x |") && stdout.contains("**EXCEEDED**"),
-        "{stdout}"
-    );
-    let (code, stdout, _) = compare(Some("--junit"));
-    assert_eq!(code, 1);
-    assert!(
-        stdout.contains("failures=\"2\"") && stdout.contains("vehicle_truth3d.state.position_m.x"),
         "{stdout}"
     );
     let (code, stdout, _) = compare(Some("--json"));
@@ -88,43 +80,12 @@ fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
     assert_eq!(std::fs::read(by_file).unwrap(), std::fs::read(by_flag).unwrap());
 }
 
-/// A sweep on two threads, and one with the functions that the C library has for a processor without fused multiply-add,
-/// say the same as one on one thread.
-#[test]
-fn a_sweep_says_the_same_on_any_number_of_threads() {
-    let log = &DISPERSED.log;
-    let sweep = |jobs: &str, tunables: &str| {
-        let mut command = replay("refly", log);
-        command.args([
-            "--vary",
-            "powered.weights.theta=50:110:3",
-            "--vary-plant",
-            "truth.impulse_scale=0.99,1.0",
-        ]);
-        let directory = tempfile::tempdir().unwrap();
-        let table = directory.path().join("points.csv");
-        command.args(["--jobs", jobs, "--csv"]).arg(&table).env("GLIBC_TUNABLES", tunables);
-        let (code, _, stderr) = run(&mut command);
-        assert_eq!(code, 0, "{stderr}");
-        std::fs::read_to_string(table).unwrap()
-    };
-    let one = sweep("1", "");
-    assert_eq!(one.lines().count(), 7);
-    assert_eq!(sweep("2", ""), one);
-    assert_eq!(sweep("2", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4"), one);
-}
-
 /// One unreadable log among several is a separate error, and the others are still verified.
 #[test]
 fn an_unreadable_log_does_not_hide_the_others() {
     let files = Files::new();
     let good = files.file(&WHOLE.bytes);
     let none = files.directory.path().join("none.mcap");
-    let loosely = ["--junit", "--strict=false"];
-    let (code, stdout, _) = run(replay("verify", &none).arg(&good).args(loosely));
-    assert_eq!(code, 2);
-    assert!(stdout.contains("failures=\"0\" errors=\"1\""), "{stdout}");
-    assert!(stdout.contains("none.mcap: cannot be read"), "{stdout}");
     let (code, stdout, stderr) = run(replay("verify", &none).arg(&good));
     assert!(
         code == 2 && stdout.contains("frames identical") && stderr.contains("none.mcap"),
@@ -250,7 +211,6 @@ fn every_command_refuses_a_file_that_is_not_a_log() {
             &["evaluate"][..],
             &["refly"],
             &["verify", "--explain", "1"],
-            &["refly", "--vary", "powered.weights.theta=1:2:2"],
             &["report", "--output", "-"],
             &["export", "--to", "csv", "--output", output],
             &["compare"],

@@ -1,4 +1,4 @@
-//! Tests a log with a flipped byte: every command says what was not read, and a build server does not see a pass.
+//! Tests a log with a flipped byte: every command says what was not read.
 
 use std::path::{Path, PathBuf};
 
@@ -18,17 +18,6 @@ fn flipped(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     path
 }
 
-/// Every element of the XML with its attributes, and that it is well-formed.
-fn elements(xml: &str) -> Vec<(String, std::collections::BTreeMap<String, String>)> {
-    let document = roxmltree::Document::parse(xml).unwrap();
-    let elements = document.descendants().filter(roxmltree::Node::is_element).map(|element| {
-        let attributes =
-            element.attributes().map(|found| (found.name().to_owned(), found.value().to_owned()));
-        (element.tag_name().name().to_owned(), attributes.collect())
-    });
-    elements.collect()
-}
-
 #[test]
 fn a_log_with_a_flipped_byte_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
@@ -43,20 +32,6 @@ fn a_log_with_a_flipped_byte_does_not_pass() {
         assert!(stdout.contains(&unread), "{stdout}");
         let (code, _, _) = run(replay("verify", &path).arg("--strict"));
         assert_eq!(code, 1);
-
-        let (code, xml, _) = run(replay("verify", &path).arg("--junit"));
-        assert_eq!(code, 1, "{xml}");
-        let elements = elements(&xml);
-        let suite = &elements.iter().find(|(name, _)| name == "testsuite").unwrap().1;
-        assert_eq!((suite["tests"].as_str(), suite["failures"].as_str()), ("1", "1"), "{xml}");
-        let failure = &elements.iter().find(|(name, _)| name == "failure").unwrap().1;
-        assert!(failure["message"].contains(&unread), "{xml}");
-        assert!(xml.contains("unreadable near byte"), "{xml}");
-
-        // A user can ask for the readable part only, and then the XML says so.
-        let (code, xml, _) = run(replay("verify", &path).args(["--junit", "--strict=false"]));
-        assert_eq!(code, 0, "{xml}");
-        assert!(xml.contains("failures=\"0\"") && xml.contains(&unread), "{xml}");
     }
 }
 
@@ -90,13 +65,12 @@ fn no_command_is_silent_about_damage() {
     let at = |name: &str| directory.path().join(name).display().to_string();
     let (html, csv, tlog, whole, again) =
         (at("p.html"), at("csv"), at("f.tlog"), at("whole.mcap"), at("again.mcap"));
-    let questions: [&[&str]; 10] = [
+    let questions: [&[&str]; 9] = [
         &["info"],
         &["verify"],
         &["evaluate"],
         &["refly", "--log", &again],
         &["verify", "--explain", "20"],
-        &["refly", "--vary", "powered.weights.theta=75,80"],
         &["report", "--output", &html],
         &["export", "--to", "csv", "--output", &csv],
         &["export", "--to", "tlog", "--output", &tlog],

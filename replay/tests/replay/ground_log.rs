@@ -192,30 +192,3 @@ fn a_ground_log_is_compared_while_both_recorded() {
     assert!(code == 1 && stdout.contains("mavlink_1_1_local_position_ned: "), "{stdout}");
     assert!(stdout.contains("samples are missing"), "{stdout}");
 }
-
-/// What the air lost is counted message by message, also of messages that carry no time.
-#[test]
-fn what_the_air_lost_of_a_flight_is_counted() {
-    const SECOND_NS: u64 = 1_000_000_000;
-    let silent = |at_ns: &u64| (5 * SECOND_NS..7 * SECOND_NS).contains(at_ns);
-    let mut sent_ns = Vec::new();
-    let mut log = FlightLog::open(&WITH_FRAMES.log).unwrap();
-    while let Some(stamped) = log.next_entry().unwrap() {
-        if stamped.entry == Entry::RawFrame {
-            sent_ns.push(stamped.log_time_ns);
-        }
-    }
-    let lost = sent_ns.iter().map(|at_ns| at_ns - sent_ns[0]).filter(silent).count();
-    assert!(lost > 50, "{lost}");
-    let heard = heard_while(&WITH_FRAMES, "silence", |at_ns| !silent(&at_ns));
-    let (_, stdout, _) = run(replay("compare", &WITH_FRAMES.log).arg(&heard));
-    let answer = stdout.lines().next().unwrap();
-    assert!(answer.contains(&format!("of {} messages that the vehicle sent", sent_ns.len())), "{answer}");
-    assert!(
-        answer.contains(&format!("the air lost {lost} (")) && answer.contains("the longest gap 2."),
-        "{answer}"
-    );
-    assert!(stdout.contains("\n| HEARTBEAT | ") && stdout.contains("\n| TD_FLIGHT_STATUS | "), "{stdout}");
-    let (_, stdout, _) = run(replay("compare", &WITH_FRAMES.log).arg(GROUND.as_path()));
-    assert!(stdout.lines().next().unwrap().contains("the air lost 0 (0.0 %)"), "{stdout}");
-}

@@ -52,8 +52,6 @@ fn a_flight_that_lost_half_its_frames_does_not_pass() {
         let (code, stdout, _) = run(replay("compare", &thinned).arg(log));
         assert_eq!(code, 1, "{stdout}");
         assert!(stdout.contains("samples are added"), "{stdout}");
-        let (code, stdout, _) = run(replay("compare", log).arg(&thinned).arg("--junit"));
-        assert!(code == 1 && stdout.contains("samples are missing"), "{stdout}");
         let (_, stdout, _) = run(replay("compare", log).arg(&thinned).arg("--json"));
         let found: serde_json::Value = serde_json::from_str(&stdout).unwrap();
         let signals = found[0]["signals"].as_array().unwrap();

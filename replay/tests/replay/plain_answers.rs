@@ -47,9 +47,7 @@ fn telemetry_alone_is_refused_because_it_has_no_frames() {
     let log = telemetry_only();
     let mut frame = replay("verify", &log);
     frame.args(["--explain", "3"]);
-    let mut sweep = replay("refly", &log);
-    sweep.args(["--vary", "powered.weights.theta=1,2"]);
-    for mut command in [replay("evaluate", &log), replay("refly", &log), frame, sweep] {
+    for mut command in [replay("evaluate", &log), replay("refly", &log), frame] {
         let (code, stdout, stderr) = run(&mut command);
         assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
         assert!(stderr.contains("has no frames of a flight computer"), "{stderr}");

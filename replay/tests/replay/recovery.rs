@@ -1,14 +1,16 @@
 //! Tests the recovery of whole logs from damaged ones.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use mcap::records::{MessageHeader, Metadata};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use protocol::log::reader::Damage;
 use replay::info::info;
 use replay::log::{FlightLog, Recording};
+use replay::output::{Destination, Overwrite};
 use replay::recover::recover;
 use replay::verify::{Verification, verify};
 
@@ -16,6 +18,7 @@ use crate::command_line::{replay, run};
 use crate::flown::{FRAME_S, WHOLE, only};
 use crate::from_apogee::LANDED;
 use crate::simulated::DISPERSED;
+use crate::tampered::Held;
 
 /// Recovers bytes; `None` if they were refused.
 fn recovered(bytes: &[u8], directory: &Path) -> Option<(replay::recover::Recovery, Recording)> {
@@ -82,7 +85,88 @@ fn a_changed_summary_does_not_count_what_is_lost() {
     bytes[at + 9 + 3] ^= 1;
     let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
     assert_eq!((recovery.messages_lost, recovery.was_whole()), (None, false));
-    assert!(recovery.lost[0].reason.contains("summary"), "{recovery:?}");
+    assert!(recovery.summary_fault.unwrap().contains("checksum"), "{recovery:?}");
+}
+
+/// Messages, and the place behind the last chunk of a whole log.
+fn whole_and_its_chunks_end() -> (Messages, usize) {
+    let original = &ORIGINALS[0];
+    (original.messages.clone(), original.chunks.last().unwrap().end)
+}
+
+/// A log with everything that a summary can hold, and little of it: four chunks, two topics, metadata and an attachment.
+fn small_log() -> Vec<u8> {
+    let options = mcap::WriteOptions::new().chunk_size(None);
+    let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+    let schema = writer.add_schema("s", "text", b"x").unwrap();
+    let channels =
+        ["/a", "/b"].map(|topic| writer.add_channel(schema, topic, "text", &BTreeMap::new()).unwrap());
+    let about = Metadata { name: "about".to_owned(), metadata: BTreeMap::new() };
+    writer.write_metadata(&about).unwrap();
+    let (name, media_type) = ("n".to_owned(), "text".to_owned());
+    let data = std::borrow::Cow::Borrowed(&b"data"[..]);
+    writer.attach(&mcap::Attachment { log_time: 0, create_time: 0, name, media_type, data }).unwrap();
+    for number in 0..8 {
+        let (log_time, channel_id) = (1_000 * u64::from(number), channels[number as usize % 2]);
+        let header = MessageHeader { channel_id, sequence: number, log_time, publish_time: log_time };
+        writer.write_to_known_channel(&header, &[number as u8; 9]).unwrap();
+        if number % 2 == 1 {
+            writer.flush().unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+/// A disk that is full, a limit of the file's size, a recorder that is killed while it closes: what is left of the list of
+/// chunks is not taken for the whole list.
+#[test]
+fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
+    let directory = tempfile::tempdir().unwrap();
+    let (input, output) = (directory.path().join("in.mcap"), directory.path().join("out.mcap"));
+    let small = small_log();
+    let small_end = mcap::Summary::read(&small).unwrap().unwrap().chunk_indexes;
+    let small_end =
+        small_end.iter().map(|index| index.chunk_start_offset + index.chunk_length).max().unwrap();
+    let (_, whole_end) = whole_and_its_chunks_end();
+    // Every byte of the small one; of the other, whose schemas are long, some of every kind of record.
+    for (bytes, chunks_end, step) in
+        [(&small, usize::try_from(small_end).unwrap(), 1), (&WHOLE.bytes, whole_end, 97)]
+    {
+        std::fs::write(&input, bytes).unwrap();
+        let messages = Held::read(&input).facts();
+        for cut in (chunks_end..bytes.len()).step_by(step) {
+            std::fs::write(&input, &bytes[..cut]).unwrap();
+            let destination = Destination { path: &output, overwrite: Overwrite::Always };
+            let recovery = recover(&input, destination).unwrap();
+            assert_eq!(Held::read(&output).facts(), messages, "cut at {cut}: {recovery:?}");
+            assert_eq!((recovery.foreign, recovery.repeated, recovery.messages_lost), (0, 0, None), "{cut}");
+            assert!(!recovery.was_whole(), "{cut}");
+            assert!(recovery.lost.iter().all(|lost| lost.from_byte >= chunks_end as u64), "{recovery:?}");
+        }
+        std::fs::write(&input, &bytes[..bytes.len() - 60]).unwrap();
+        let (code, stdout, _) = run(replay("recover", &input).arg(&output).arg("--force"));
+        assert!(code == 0 && stdout.contains("its summary is cut off, and no message with it"), "{stdout}");
+    }
+}
+
+/// A list that leaves out a chunk, in a summary that claims no checksum.
+#[test]
+fn a_chunk_that_the_summary_does_not_list_is_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let (messages, chunks_end) = whole_and_its_chunks_end();
+    let mut bytes = WHOLE.bytes.clone();
+    let mut at = chunks_end;
+    while bytes[at] != mcap::records::op::CHUNK_INDEX {
+        at += 9 + usize::try_from(u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap())).unwrap();
+    }
+    let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+    bytes.drain(at..at + 9 + usize::try_from(length).unwrap());
+    let checksum = bytes.len() - mcap::MAGIC.len() - 4;
+    bytes[checksum..checksum + 4].fill(0);
+    let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
+    assert_eq!(messages_of(&directory.path().join("out.mcap")).0, messages, "{recovery:?}");
+    assert_eq!((recovery.foreign, recovery.was_whole()), (0, false));
 }
 
 /// One broken chunk loses only itself, and its position is reported.

@@ -88,8 +88,6 @@ fn another_version_of_the_contents_is_no_excuse() {
         on_disk(&held, |path| {
             let (code, stdout, _) = run(replay("verify", path).arg("--strict"));
             assert_ne!(code, 0, "{version}: {stdout}");
-            let (code, xml, _) = run(replay("verify", path).arg("--junit"));
-            assert!(code != 0 && xml.contains("failures=\"1\""), "{version}: {xml}");
         });
         let mut held = pad();
         held.metadata(METADATA_SCHEMA).insert("version".to_owned(), version.to_owned());

@@ -238,6 +238,36 @@ fn a_tlog_is_read_like_the_log_made_of_it() {
     assert!(code == 2 && error.contains("is a .tlog"), "{error}");
 }
 
+/// What some programs save of a link: one frame after the other.
+#[test]
+fn frames_without_times_are_refused_as_what_they_are() {
+    let clean = std::fs::read(tlog(&WITH_FRAMES, "timed.tlog")).unwrap();
+    let (mut frames, mut reader) = (Vec::new(), protocol::log::tlog::TlogReader::new(clean.as_slice()));
+    while let Some(frame) = reader.next_frame().unwrap() {
+        frames.extend(frame.bytes);
+    }
+    let (raw, log) = (WITH_FRAMES.beside("raw.tlog"), WITH_FRAMES.beside("raw.mcap"));
+    let log_name = log.to_str().unwrap();
+    // As a whole, and from the middle of a frame on.
+    for begin in [0, 5] {
+        std::fs::write(&raw, &frames[begin..]).unwrap();
+        for question in [
+            &["export", "--to", "mcap", "--output", log_name][..],
+            &["export"],
+            &["export", "--to", "csv", "--output", log_name],
+            &["info"],
+            &["verify"],
+            &["report", "--output", log_name],
+        ] {
+            let (code, stdout, stderr) = run(replay(question[0], &raw).args(&question[1..]));
+            assert_eq!((code, stdout.as_str(), log.exists()), (2, "", false), "{question:?}: {stderr}");
+            assert!(stderr.contains("a raw stream of MAVLink frames"), "{question:?}: {stderr}");
+        }
+        let (code, _, stderr) = run(replay("recover", &raw).arg(&log));
+        assert!(code == 2 && stderr.contains("is not a flight log"), "{stderr}");
+    }
+}
+
 #[test]
 fn a_tlog_is_found_between_garbage() {
     let clean = std::fs::read(tlog(&WITH_FRAMES, "clean.tlog")).unwrap();

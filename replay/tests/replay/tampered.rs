@@ -65,6 +65,16 @@ impl Held {
         held
     }
 
+    /// Time, topic, number and bytes of each message, in an order that the file's does not change.
+    pub(crate) fn facts(&self) -> Vec<(u64, String, u32, Vec<u8>)> {
+        let facts = |message: &Kept| {
+            (message.log_time_ns, message.topic.clone(), message.sequence, message.data.clone())
+        };
+        let mut facts: Vec<_> = self.messages.iter().map(facts).collect();
+        facts.sort_unstable();
+        facts
+    }
+
     /// How many frames or frames there are.
     pub(crate) fn frames(&self) -> usize {
         self.messages.iter().filter(|message| message.is_frame()).count()

@@ -73,8 +73,6 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} frames identical")), "{stdout}");
     assert!(stdout.contains("flight 2 of 2: nothing was compared"), "{stdout}");
     assert!(!stdout.contains("0 of 0"), "{stdout}");
-    let (_, stdout, _) = verify(&honest, &["--junit"]);
-    assert!(stdout.contains("tests=\"2\"") && stdout.contains("errors=\"1\""), "{stdout}");
 }
 
 /// The start record again in the middle: the frames after it do not begin a new flight.
@@ -84,7 +82,7 @@ fn a_start_copied_into_the_middle_is_no_flight() {
     let mut held = Held::read(&LANDED.log);
     let place = held.messages.len() / 2;
     let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
-    held.messages.insert(place, start);
+    held.messages.insert(place, start.at(held.messages[place].log_time_ns));
     let (code, stdout, _) = verify(&written(&held, &directory, "middle.mcap"), &[]);
     assert_eq!(code, 2, "{stdout}");
     assert!(stdout.contains("flight 1 of 2") && stdout.contains("INCOMPLETE flight: ends at T+"), "{stdout}");
@@ -185,12 +183,6 @@ fn a_log_without_its_last_frames_is_not_complete() {
             assert!(name == "verdict" || stdout.contains(" in POWERED"), "{name}: {stdout}");
             let (code, stdout, _) = verify(&path, &["--strict"]);
             assert_eq!(code, 1, "{name}: {stdout}");
-            let (code, stdout, _) = verify(&path, &["--junit"]);
-            assert_eq!(code, 1, "{name}: {stdout}");
-            assert!(
-                stdout.contains("failures=\"1\"") && stdout.contains("INCOMPLETE flight: ends at T+"),
-                "{name}: {stdout}"
-            );
             let (code, stdout, _) = verify(&path, &["--json"]);
             let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
             assert_eq!((code, report["outcome"].as_str()), (0, Some("identical-readable-part")), "{name}");

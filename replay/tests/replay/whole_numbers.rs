@@ -1,28 +1,19 @@
-//! Tests settings that take whole numbers, in a sweep.
+//! Tests settings that take whole numbers.
 
-use replay::refly::ReflyOptions;
-use replay::refly::vary::{grid, sweep};
+use replay::refly::{ReflyOptions, refly};
 
+use crate::asked::settings;
 use crate::simulated::MK2;
 
-const STEPS: &str = "powered.solver.max_iterations";
-
 #[test]
-fn a_range_of_whole_numbers_is_flown_and_a_fraction_is_refused() {
-    let flights = [MK2.recording()];
-    let fly = |range: &str| {
-        let points = grid(&[format!("{STEPS}={range}").parse().unwrap()], &[]).unwrap();
-        let options = ReflyOptions::default();
-        let report = sweep(&flights, &points, &options, &|_, _| {});
-        report.map_err(|error| format!("{:#}", anyhow::Error::from(error)))
+fn a_whole_number_is_flown_however_it_is_written_and_a_fraction_is_refused() {
+    let recording = MK2.recording();
+    let fly = |given: &str| {
+        let options = ReflyOptions { settings: settings(&[given]), ..ReflyOptions::default() };
+        refly(&recording, &options).map(|report| report.reflown)
     };
-    assert_eq!(fly("10:20:3").unwrap().points, {
-        let mut listed = fly("10,15,20").unwrap().points;
-        for point in &mut listed {
-            point.settings[0] += ".0";
-        }
-        listed
-    });
-    let refusal = fly("10:11:3").unwrap_err();
+    let whole = fly("powered.solver.max_iterations=15").unwrap();
+    assert_eq!(fly("powered.solver.max_iterations=15.0").unwrap(), whole);
+    let refusal = fly("powered.solver.max_iterations=10.5").unwrap_err().to_string();
     assert!(refusal.contains("powered.solver.max_iterations=10.5"), "{refusal}");
 }

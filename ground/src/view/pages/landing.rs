@@ -5,17 +5,14 @@ use std::time::Duration;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 
 use super::flight::{LOST_COLUMNS, both_sides_or_lost, map, side_or_lost};
 use super::{Room, Side, columns, events, framed, rows, table};
-use crate::model::{Act, BodySpeed, Model, RED_AFTER, Sample, words};
+use crate::model::{Act, Model, RED_AFTER, words};
 use crate::view::band::draw_band;
 use crate::view::pictures::height::{draw_height, draw_sink};
-use crate::view::{
-    STALE_MARK, TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked, status_lines,
-    styled, top_lines,
-};
+use crate::view::{TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked};
 
 /// Rows of the six limits with their borders; under pictures with room for more.
 const LIMIT_ROWS: u16 = 8;
@@ -58,71 +55,6 @@ fn sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rec
     let legend = if area.width < 44 { Line::default() } else { bars::flown_legend(theme) };
     let inside = framed("height m over sink", legend, theme, frame, area);
     draw_sink(model, theme, now, frame, inside);
-}
-
-/// The same content as lines, the most important first.
-pub fn landing_lines(
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-    columns: usize,
-    rows: usize,
-) -> Vec<Line<'static>> {
-    let mut lines = vec![motion(model, theme, now)];
-    if panels::is_lost(model, now) {
-        lines = panels::lost_rows(model, theme, now);
-    }
-    // The newest event comes before everything else.
-    lines.extend(newest_event(model, theme));
-    // An abort is shown in the top lines.
-    if let Some(track) = top_lines::open_command(model, now) {
-        lines.push(top_lines::command_facts_short(track, theme, now));
-    }
-    lines.push(lean(model, theme, now));
-    let (title, touchdown) = panels::touchdown_panel(model, theme, now);
-    let mut verdict = theme.line(format!(" {title}: "), TextRole::Label);
-    verdict.spans.extend(touchdown.into_iter().next_back().into_iter().flat_map(styled));
-    lines.push(verdict);
-    lines.extend(panels::controller_rows(model, theme, now).into_iter().take(2));
-    lines.extend(panels::gimbal_rows(model, theme, now));
-    lines.extend(panels::fin_rows(model, theme, now));
-    lines.push(status_lines::link_line(model, theme, now, columns));
-    let room = rows.saturating_sub(lines.len());
-    lines.extend(lists::events(model, theme, columns, room));
-    lines
-}
-
-fn value(
-    theme: Theme,
-    label: &str,
-    sample: Option<Sample<f64>>,
-    decimals: usize,
-    now: Duration,
-) -> Vec<Span<'static>> {
-    let text = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
-    let stale = sample.is_some_and(|sample| sample.is_stale(now));
-    let mark = if stale { STALE_MARK } else { "" };
-    let role = if stale { TextRole::Stale } else { TextRole::Plain };
-    vec![theme.label(format!(" {label} ")), theme.span(format!("{mark}{text}"), role)]
-}
-
-fn motion(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let mut spans = value(theme, "alt", model.vehicle.of_motion(|m| m.altitude_m), 1, now);
-    spans.extend(value(theme, "vz", model.vehicle.of_motion(|m| m.climb_m_s), 1, now));
-    Line::from(spans)
-}
-
-fn lean(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let body = model.vehicle.body_speed();
-    let mut spans = value(theme, "tilt", model.vehicle.tilt_deg(), 1, now);
-    spans.extend(value(theme, "u", body.map(|body| body.map(|b| b.u_m_s)), 1, now));
-    spans.extend(value(theme, "lat", body.map(|body| body.map(BodySpeed::lateral_m_s)), 2, now));
-    Line::from(spans)
-}
-
-fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let event = model.events.newest(1).next()?;
-    Some(theme.line(format!(" {}{}", event.mark().trim_start(), event.text), TextRole::Plain))
 }
 
 // The review page after a flight: verdict, limits, greatest values and timeline.

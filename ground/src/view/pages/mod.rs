@@ -50,18 +50,15 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         },
         Page::Ascent => flight::ascent_lines(model, theme, now),
         Page::Descent => flight::descent_lines(model, theme, now),
-        Page::Landing => landing::landing_lines(model, theme, now, columns, rows),
         Page::Review => landing::review_lines(model, theme, now, columns),
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Parameters => lists::parameters_lines(model, theme, rows),
         Page::Log => lists::log_lines(model, theme, now),
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
-        Page::Path => plots::path_lines(model, theme, now),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
-        Page::Values => plots::values_lines(model, theme, now),
-        Page::Plot => plots::plot_lines(model, theme, now),
+        Page::Landing | Page::Path | Page::Values | Page::Plot => plots::values_lines(model, theme, now),
         Page::Help => lists::help_lines(model, theme, now),
     }
 }
@@ -125,11 +122,6 @@ fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rec
 fn panel(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
     let inside = titled(title, theme, frame, area);
     draw_lines(frame, inside, lines);
-}
-
-/// From this size on a page has room for more than the essentials.
-fn is_roomy(area: Rect) -> bool {
-    area.width >= 120 && area.height >= 24
 }
 
 /// This many lines from a start line on.

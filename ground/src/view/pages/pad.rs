@@ -153,10 +153,11 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
 /// Failing checks first, because a small screen must show them.
 pub fn pad_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // In flight the next event is already shown above.
-    let mut lines: Vec<Line> = match status_lines::next_event_line(model, theme, now) {
-        Some(_) => Vec::new(),
-        None => vec![top_lines::command(model, theme, now)],
-    };
+    let is_said = status_lines::next_event_line(model, theme, now).is_some();
+    let ready = top_lines::readiness(model, now);
+    let ready = ready.map(|(words, role)| theme.line(format!(" {words}"), role));
+    let first = top_lines::message(model, theme, now).or(ready).filter(|_| !is_said);
+    let mut lines: Vec<Line> = first.into_iter().collect();
     let (words, role) = summary(model, now);
     lines.push(theme.line(format!(" {words}"), role));
     let mut checks = checks(model, theme, now);

@@ -6,13 +6,13 @@ use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::symbols::Marker;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
-use super::{is_roomy, panel, titled};
+use super::{panel, titled};
 use crate::model::{
-    Act, Model, Motion, is_on_pad,
-    quantity::{self, ALL, Quantity},
+    Model, is_on_pad,
+    quantity::{ALL, Quantity},
 };
 use crate::view::pictures::map::{self, draw_map};
 use crate::view::pictures::side::{Viewpoint, draw_side_view};
@@ -38,26 +38,14 @@ pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Fr
     draw_plot(quantity, model, theme, now, frame, plot);
 }
 
-/// The present value of every quantity, the chosen one first.
-pub fn plot_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let chosen = model.pages.plotted;
-    std::iter::once(chosen)
-        .chain(ALL.iter().filter(|quantity| *quantity != chosen))
-        .map(|quantity| {
-            row(theme, quantity.name, quantity.read(model, now), quantity.decimals, quantity.unit, now)
-        })
-        .collect()
-}
-
-/// The names around the chosen one, which is marked; pinned ones have a star.
+/// The names around the chosen one, which is marked.
 fn names(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
     let chosen = model.pages.plotted;
     let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
     let line = |quantity: &'static Quantity| {
         let is_chosen = quantity == chosen;
         let (mark, role) = if is_chosen { (">", TextRole::Key) } else { (" ", TextRole::Label) };
-        let pin = if model.pages.pinned.contains(&quantity) { "*" } else { " " };
-        theme.line(format!("{mark}{pin}{}", quantity.name), role)
+        theme.line(format!("{mark} {}", quantity.name), role)
     };
     ALL.iter().skip(start).take(rows).map(line).collect()
 }
@@ -66,13 +54,8 @@ fn present(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> L
     let sample = quantity.read(model, now);
     let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
     let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
-    Line::from(vec![
-        Span::styled(
-            format!("{mark}{value} {}", quantity.unit),
-            theme.style(role).patch(theme.style(TextRole::Title)),
-        ),
-        theme.label(format!("   {} pins it to every page", model.settings.keys.name(Act::Pin))),
-    ])
+    let style = theme.style(role).patch(theme.style(TextRole::Title));
+    Line::styled(format!("{mark}{value} {}", quantity.unit), style)
 }
 
 fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -148,22 +131,6 @@ pub fn draw_path(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     draw_line(frame, legend, comes_down(model, theme, now));
 }
 
-/// The position in numbers, for small screens.
-pub fn path_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let of = |pick| model.vehicle.of_motion(pick);
-    let mut lines = panels::lost_rows(model, theme, now);
-    if lines.is_empty() {
-        lines = vec![
-            row(theme, "height", model.vehicle.height_m(), 1, "m", now),
-            row(theme, "north", of(|motion| motion.x_m), 1, "m", now),
-            row(theme, "east", of(|motion| motion.y_m), 1, "m", now),
-            row(theme, "distance", of(Motion::distance_m), 1, "m", now),
-        ];
-    }
-    lines.push(comes_down(model, theme, now));
-    lines
-}
-
 /// Where it will come down.
 fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let words = match map::comes_down(model, now) {
@@ -183,19 +150,9 @@ fn comes_down(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page of all values: flight, descent, controller with its residuals, actuators, link.
 
-/// The columns of every panel on a larger screen.
-const PANEL_COLUMNS: u16 = 30;
-
-/// Draws three columns of panels; on a larger screen sparklines of every quantity beside them.
+/// Draws three columns of panels.
 pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let roomy = is_roomy(area);
-    let (panels, lines) = if roomy {
-        let [panels, lines] = side_by_side(area, [Length(3 * PANEL_COLUMNS), Fill(1)]);
-        (panels, lines)
-    } else {
-        (area, Rect::default())
-    };
-    let [left, middle, right] = side_by_side(panels, [Fill(1); 3]);
+    let [left, middle, right] = side_by_side(area, [Fill(1); 3]);
     let controller = panels::controller_rows(model, theme, now);
     let half = Length(1 + controller.len() as u16);
     let [flight_area, below_flight] = stacked(left, [half, Fill(1)]);
@@ -206,13 +163,9 @@ pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     panel("Controller (NMPC)", &controller, theme, frame, controller_area);
     panel("Gimbal", &panels::gimbal_rows(model, theme, now), theme, frame, below_controller);
     panel("Descent", &descent_rows(model, theme, now), theme, frame, right);
-    if roomy {
-        let names: Vec<&str> = quantity::ALL.iter().map(|quantity| quantity.name).collect();
-        widgets::draw_sparklines(&names, model, theme, now, frame, lines);
-    }
 }
 
-/// The same as lines.
+/// The same as lines: on small screens also what the pages of pictures show.
 pub fn values_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let mut lines = panels::lost_rows(model, theme, now);
     lines.extend(panels::flight_rows(model, theme, now));

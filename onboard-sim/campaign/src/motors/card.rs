@@ -1,27 +1,29 @@
-//! The landing card: what a team takes to the field for one vehicle and one motor.
+//! The landing card: what a team takes to the field for one mission, as it is loaded.
 //!
-//! It is computed, not looked up: the mass and the height are chosen or checked, the mission is flown in several winds in every way
-//! in which a flight can end, and what cannot land is refused.
+//! It is computed, not looked up: the mission is flown in several winds in every way in which a flight can end, and at other masses.
+//! Another mass or motor is a mission of its own, proposed at the end.
 
-use flight::vehicle::mission::Mission;
+use flight::vehicle::airframe::Mass;
 use flight::vehicle::mission::StartPoint;
-use sim::dispersion::Dispersion;
-use sim::draw::draw;
 use sim::recipe::Recipe;
 
 use super::choice::{Limits, Refusal, Team, choose};
-use super::frame::{Frame, FrameError, start_height_m};
+use super::frame::{Ballast, Changes, Frame, FrameError, changed, start_height_m};
+use super::range_safety::landed;
 use super::ranking::{FlyError, Landing, Progress, RankError, fly};
 use super::sheet;
 use super::source::Candidate;
-use crate::attainable;
 use crate::hazard::{self, Flights, HazardError, Impact, Rule};
+use crate::statistics::Share;
 
 /// What a card is made for.
 pub struct Order<'a> {
     pub team: &'a Team,
+    /// How a vehicle and its station show the mission's text.
+    pub hash: &'a str,
+    /// Of the proposal.
     pub motor: &'a Candidate,
-    /// Mass with the motor full, kg; the best one within the ballast if not given.
+    /// Of the proposal, with the motor full, kg; the best one within the ballast if not given.
     pub mass_kg: Option<f64>,
     /// Mean winds, rising.
     pub winds: &'a [Day],
@@ -34,19 +36,21 @@ pub struct Order<'a> {
 /// A card.
 #[derive(Debug, Clone)]
 pub struct Card {
-    /// With the mission to be loaded.
+    /// With the mission that was given.
     pub recipe: Recipe,
+    pub(super) hash: String,
     /// Where the flights begin: on the pad if the mission has a booster.
     pub(super) start: StartPoint,
-    pub(super) landing: Landing,
-    pub(super) frame: Frame,
     /// The mean winds, rising, m/s, and where the flights in each came down.
     pub flown: Vec<(f64, Vec<Impact>)>,
+    /// Landed on their legs in the least wind, by mass with the motor full, kg, rising.
+    pub masses: Vec<(f64, Share)>,
     pub(super) flights: Flights,
     pub(super) rule: Rule,
     pub(super) wind_from_deg: Option<f64>,
-    /// Command heights of the feet from which a controller that knows everything would land.
-    pub(super) attainable: Option<attainable::Window>,
+    pub(super) proposal: Result<Landing, Refusal>,
+    /// The mission of the proposal, if that is another one.
+    pub proposed: Option<Recipe>,
 }
 
 /// Why there is no card.
@@ -62,10 +66,10 @@ pub enum CardError {
     Mass { mass_kg: f64, frame_kg: f64, motor_kg: f64, least_kg: f64, most_kg: f64 },
     #[error("{motor}: {refusal}; `onboard-sim motors` ranks those that it lands on")]
     NoLanding { motor: String, refusal: Box<Refusal> },
-    /// A landing exists, but no flight landed.
+    /// No flight landed.
     #[error(
-        "a landing exists, but none of {flights} flights of `{set}` landed; most frequent reason: {reason}. A motor or mass with \
-         a larger scatter is wanted: `onboard-sim motors` ranks them"
+        "none of {flights} flights of `{set}` landed; most frequent reason: {reason}. A motor or mass with a larger scatter is \
+         wanted: `onboard-sim motors` ranks them"
     )]
     NoneLanded { flights: u64, set: String, reason: String },
     #[error("no wind is given")]
@@ -82,33 +86,27 @@ impl Card {
     /// Computes a card.
     ///
     /// # Errors
-    /// The vehicle does not land, or the mass cannot be had.
+    /// The vehicle does not land, or what was asked for cannot be had.
     pub fn new(order: &Order<'_>, progress: &(dyn Fn(Progress) + Sync)) -> Result<Self, CardError> {
-        let mission = &order.team.recipe.mission;
-        let frame = Frame::of(mission)?;
-        let limits = order.limits(&frame)?;
-        let choice = choose(mission, &frame, &order.motor.curve, &limits).map_err(|refusal| {
-            let motor = format!("{} ({})", order.motor.name(), order.motor.origin);
-            CardError::NoLanding { motor, refusal: Box::new(refusal) }
-        })?;
-        let landing = Landing { candidate: order.motor.clone(), choice, flown: None };
-        let recipe = landing.recipe(&order.team.recipe)?;
-        let days = order.winds.iter().map(|day| day.flies(&recipe)).collect::<Result<Vec<_>, _>>()?;
+        let recipe = &order.team.recipe;
+        let (proposal, proposed) = order.proposal()?;
+        let days = order.winds.iter().map(|day| day.flies(recipe)).collect::<Result<Vec<_>, _>>()?;
         let calmest = days.first().ok_or(CardError::NoWind)?;
         refuse_without_a_landing(calmest, progress)?;
-        let (start, rule) = (calmest.mission.start.at, Rule::of(&calmest.mission));
         let told = |done, of| progress(Progress::Flights(done, of));
         let impacts = hazard::studies(&days, order.flights, &told)?;
+        let own = impacts.first().map_or_else(|| Share::new(0, 0), |impacts| landed(impacts));
         Ok(Self {
-            attainable: certified_window(&recipe.mission),
-            recipe,
-            start,
-            landing,
-            frame,
+            recipe: recipe.clone(),
+            hash: order.hash.to_owned(),
+            start: calmest.mission.start.at,
             flown: order.winds.iter().map(|day| day.wind_m_s).zip(impacts).collect(),
+            masses: masses(calmest, own, order.flights.survey, progress)?,
             flights: order.flights,
-            rule,
+            rule: Rule::of(&calmest.mission),
             wind_from_deg: order.wind_from_deg,
+            proposal,
+            proposed,
         })
     }
 
@@ -123,18 +121,28 @@ impl Card {
     }
 }
 
-/// What a controller that knows everything could do with the certified vehicle and motor in still air.
-fn certified_window(mission: &Mission) -> Option<attainable::Window> {
-    let drawn = draw(mission, &Dispersion::default(), 0, 0);
-    let mut fell_from = drawn.apogee;
-    if mission.start.at == StartPoint::Drone {
-        fell_from.position_m.z = start_height_m(mission);
-        fell_from.velocity_m_s.z = 0.0;
-    }
-    attainable::window(mission, &drawn, &fell_from)
-}
-
 impl Order<'_> {
+    /// The best mass for the motor, or why there is none, and its mission if it is another one. Only what was asked for is refused.
+    fn proposal(&self) -> Result<(Result<Landing, Refusal>, Option<Recipe>), CardError> {
+        let recipe = &self.team.recipe;
+        let (mission, curve) = (&recipe.mission, &self.motor.curve);
+        let frame = Frame::of(mission)?;
+        let is_other_motor = self.motor.motor != mission.airframe.motor;
+        match choose(mission, &frame, curve, &self.limits(&frame)?) {
+            Ok(choice) => {
+                let is_other = is_other_motor || choice.mass != mission.airframe.mass;
+                let landing = Landing { candidate: self.motor.clone(), choice, flown: None };
+                let proposed = is_other.then(|| landing.recipe(recipe)).transpose()?;
+                Ok((Ok(landing), proposed))
+            }
+            Err(refusal) if is_other_motor || self.mass_kg.is_some() => {
+                let motor = format!("{} ({})", self.motor.name(), self.motor.origin);
+                Err(CardError::NoLanding { motor, refusal: Box::new(refusal) })
+            }
+            Err(refusal) => Ok((Err(refusal), None)),
+        }
+    }
+
     fn limits(&self, frame: &Frame) -> Result<Limits, CardError> {
         let curve = &self.motor.curve;
         let limits = self.team.limits(frame, curve);
@@ -179,15 +187,53 @@ fn refuse_without_a_landing(recipe: &Recipe, progress: &(dyn Fn(Progress) + Sync
     })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The bound with perfect information encloses the height that guidance chooses (16 m, from which 977 of 1,000 land).
-    #[test]
-    fn the_bound_of_a_drop_is_that_of_its_own_height() {
-        let mission = flight::vehicles::mission::builtin("vlr").unwrap().unwrap();
-        let bound = certified_window(&mission).unwrap();
-        assert!(bound.low_m < 18.0 && 18.0 < bound.high_m && bound.high_m < 28.0, "{bound:?}");
+/// How many land at the mission's own mass and at others, on each side up to the first at which fewer than nine of ten do. Ballast is
+/// at the centre of gravity.
+fn masses(
+    recipe: &Recipe,
+    own: Share,
+    flights: u64,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<(f64, Share)>, CardError> {
+    /// Between neighbours, of the own mass, and most of them on each side.
+    const STEP: f64 = 0.02;
+    const STEPS: i32 = 10;
+    let (frame, own_kg) = (Frame::of(&recipe.mission)?, recipe.mission.airframe.mass.loaded_kg);
+    let mut found = vec![(own_kg, own)];
+    for side in [-1, 1] {
+        let mut share = own.share;
+        for step in 1..=STEPS {
+            let ballast_kg = f64::from(side * step) * STEP * own_kg;
+            let ballast = Ballast { mass_kg: ballast_kg, station_m: frame.cg_station_m() };
+            let Ok(mass) = frame.with(&recipe.mission.motor_curve, ballast) else { break };
+            if share < NINE_OF_TEN {
+                break;
+            }
+            let told = |done| progress(Progress::Flights(done, flights as usize));
+            let flown = fly(&[&with_mass(recipe, mass)?], flights, &told)?;
+            share = flown.first().map_or(0.0, |flown| flown.legs.share);
+            found.extend(flown.into_iter().map(|flown| (mass.loaded_kg, flown.legs)));
+        }
     }
+    found.sort_by(|one, two| one.0.total_cmp(&two.0));
+    Ok(found)
+}
+
+/// A mass at which so many land is one to fly with.
+pub(super) const NINE_OF_TEN: f64 = 0.9;
+
+fn with_mass(recipe: &Recipe, mass: Mass) -> Result<Recipe, CardError> {
+    let mission = &recipe.mission;
+    let changes = Changes {
+        name: &mission.name,
+        summary: &mission.summary,
+        motor: &mission.airframe.motor,
+        keeps_lot: true,
+        mass,
+        start_height_m: start_height_m(mission),
+    };
+    let text = changed(&recipe.mission_toml, &changes)
+        .map_err(|source| RankError::Text { origin: mission.name.clone(), source })?;
+    let mission = flight::vehicles::mission::from_toml(&text, &mission.name).map_err(RankError::from)?;
+    Ok(Recipe { mission, mission_toml: text, ..recipe.clone() })
 }

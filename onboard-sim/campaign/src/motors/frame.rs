@@ -85,11 +85,6 @@ impl Frame {
         self.cg_station_m
     }
 
-    /// The airframe with its own motor.
-    pub fn loaded(&self) -> &Airframe {
-        &self.loaded
-    }
-
     /// Diameter of the motor's tube, m: that of the mission's own motor. Thinner motors fit with an adapter, whose mass is
     /// not counted.
     pub fn tube_m(&self) -> f64 {

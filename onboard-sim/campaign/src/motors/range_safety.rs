@@ -2,9 +2,11 @@
 
 use core::fmt::Write as _;
 
-use flight::vehicle::mission::StartPoint;
+use flight::vehicle::launch::Launch;
+use flight::vehicle::mission::{Mission, StartPoint};
 
-use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, widest};
+use super::sheet::words_of;
+use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, lift_off_kg, widest};
 use crate::statistics::Share;
 
 /// A rate or a radius that rests on fewer flights is not told.
@@ -45,9 +47,7 @@ impl Circle {
 pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
     let mut least_m: f64 = 0.0;
     let in_wind = |(wind_m_s, impacts): &(f64, Vec<Impact>)| {
-        let planned = || impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
-        let landed = planned().filter(|impact| impact.landed).count();
-        let landed = Share::new(landed as u64, planned().count() as u64);
+        let landed = landed(impacts);
         let enough = landed.of >= FEWEST;
         let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
         let circle = widest.map(|(way, radius)| {
@@ -57,6 +57,12 @@ pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
         InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
     };
     flown.iter().map(in_wind).collect()
+}
+
+/// On their legs, of the flights as planned.
+pub(super) fn landed(impacts: &[Impact]) -> Share {
+    let planned = || impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+    Share::new(planned().filter(|impact| impact.landed).count() as u64, planned().count() as u64)
 }
 
 fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
@@ -70,47 +76,52 @@ fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
 pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     const KEPT: f64 = 0.9;
     let calmest = winds.first()?.landed?;
+    // Nobody can stand outside of a radius without an upper end.
+    let ends = |circle: Circle| circle.keep_out_m.is_finite() && circle.radius.high_m.is_some();
     let may_fly = |wind: &&InWind| {
-        wind.circle.is_some_and(|circle| circle.keep_out_m.is_finite())
+        wind.circle.is_some_and(ends)
             && wind.landed.is_some_and(|landed| landed.share >= KEPT * calmest.share)
     };
     winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
 }
 
-/// What an abort does: when, and what happens. The words are those of SAFETY.md.
-pub const ABORTS: [[&str; 2]; 7] = [
-    ["on the pad, in the countdown", "disarmed, both motors inhibited; keep away for 60 s"],
-    ["below a drone", "inhibited; it stays on the drone"],
-    [
-        "commanded to light, before the lift-off",
-        "the ascent motor's igniter is switched off, disarmed, both motors inhibited; keep away for 60 s, because it had current. \
-         A disarm does the same. If the motor has lit, or lights late, the next row",
-    ],
-    [
-        "under the ascent motor, and coasting",
-        "the ascent motor cannot be stopped; the landing motor is inhibited, and the parachute opens at apogee",
-    ],
-    ["falling, with room for the parachute (80 to 120 m for mk2)", "landing motor inhibited, parachute"],
-    [
-        "falling, below that height",
-        "its motor lights at the chosen height if every check for the ignition passes, and it lands on \
-         the ground below; else inhibited with open fins: an impact",
-    ],
-    [
-        "landing motor lit",
-        "it cannot be stopped, and there is never a parachute under thrust: the vehicle lands on the ground below it instead of \
-         at the pad",
-    ],
-];
+/// Mean thrust of the first half second over the weight, at the lift-off.
+pub fn thrust_to_weight(mission: &Mission, launch: &Launch) -> f64 {
+    const FIRST_S: f64 = 0.5;
+    let weight_n = lift_off_kg(mission, Some(launch)) * mission.gravity_m_s2;
+    launch.booster.motor_curve.mean_thrust_n(0.0, FIRST_S) / weight_n
+}
 
-/// The rows of [`ABORTS`] for flights that begin so.
-pub fn aborts(start: StartPoint) -> Vec<[&'static str; 2]> {
-    let before: &[usize] = match start {
-        StartPoint::Pad => &[0, 2, 3],
-        StartPoint::Apogee => &[0],
-        StartPoint::Drone => &[1],
+/// How far the stack's centre of pressure lies behind its centre of gravity at the lift-off, in diameters of the body.
+pub fn calibres(mission: &Mission, launch: &Launch) -> f64 {
+    let (booster, mass, body) = (&launch.booster, &mission.airframe.mass, &mission.airframe.body);
+    let propellant_kg = booster.motor_curve.propellant_mass_kg();
+    let centre = |of: &[(f64, f64)]| {
+        of.iter().map(|(weight, at_m)| weight * at_m).sum::<f64>()
+            / of.iter().map(|(weight, _)| weight).sum::<f64>()
     };
-    before.iter().chain(&[4, 5, 6]).map(|row| ABORTS[*row]).collect()
+    let gravity_m = centre(&[
+        (mass.loaded_kg, mass.loaded_cg_station_m),
+        (booster.dry_kg, booster.cg_station_m),
+        (propellant_kg, booster.propellant_station_m),
+    ]);
+    let pressure_m =
+        centre(&[booster.nose, booster.fins].map(|force| (force.slope_per_rad, force.station_m)));
+    (gravity_m - pressure_m) / body.diameter_m
+}
+
+/// What an abort does, when and what, of flights that begin so, or of all; with the height of the feet from which a parachute opens.
+pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
+    let only = |of: &[StartPoint]| start.is_none_or(|start| of.contains(&start)).then(String::new);
+    words_of(
+        "aborts",
+        &[
+            ("ground", only(&[StartPoint::Pad, StartPoint::Apogee])),
+            ("drone", only(&[StartPoint::Drone])),
+            ("rail", only(&[StartPoint::Pad])),
+            ("chute", Some(height.to_owned())),
+        ],
+    )
 }
 
 /// Half the width and half the height of the plan, how far the farthest crew stands in it, and the length of its line, in its own

@@ -3,13 +3,18 @@
 
 use core::fmt::{self, Write};
 
+use flight::rules::phase::{HOLD_LIMIT_S, MISFIRE_WAIT_S, MOTOR_HOT_S, PAD_ABORT_WAIT_S};
 use flight::vehicle::atmosphere::Air;
+use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::StartPoint;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::dispersion::may_be_kinder;
 
-use super::card::Card;
-use super::range_safety::{Circle, FEWEST, InWind, aborts, in_winds, limit_m_s, plan};
-use crate::hazard::Rule;
+use super::card::{Card, NINE_OF_TEN};
+use super::range_safety::{
+    Circle, FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
+};
+use crate::hazard::{Impact, Rule, Way, lift_off_kg};
 
 /// One side of a sheet.
 pub(super) struct Side {
@@ -35,17 +40,46 @@ enum Content {
     Blanks(&'static [&'static [&'static str]]),
 }
 
-/// What, its value, and a remark.
-fn row(what: &str, value: String, remark: impl Into<String>) -> Vec<String> {
-    vec![what.to_owned(), value, remark.into()]
+/// The cells of each line of a part of the card's words, with values by their names. A line with a value that is `None` is left out.
+pub(super) fn words_of(part: &str, values: &[(&str, Option<String>)]) -> Vec<Vec<String>> {
+    const WORDS: &str = include_str!("card_words.txt");
+    let lines = WORDS.split("\n# ").find_map(|text| text.strip_prefix(part)).unwrap_or_default();
+    let filled = |line: &str| {
+        let filled = values.iter().try_fold(line.to_owned(), |line, (name, value)| {
+            let name = format!("{{{name}}}");
+            if line.contains(&name) { Some(line.replace(&name, value.as_ref()?)) } else { Some(line) }
+        });
+        Some(filled?.split(" | ").map(str::to_owned).collect())
+    };
+    lines.lines().filter(|line| !line.is_empty()).filter_map(filled).collect()
 }
 
 fn rows(title: &'static str, rows: Vec<Vec<String>>) -> Section {
     Section { title, content: Content::Table(&[], rows) }
 }
 
+/// A value that people ask for, and whether it is its usual least.
+fn judged(value: f64, least: f64) -> String {
+    format!("{value:.1}: {}", if value < least { "TOO LOW" } else { "good" })
+}
+
+/// Least and greatest of what flights tell.
+fn told<'a>(
+    flights: impl Iterator<Item = &'a Impact>,
+    of: impl Fn(&Impact) -> Option<f64>,
+) -> Option<[f64; 2]> {
+    flights.filter_map(of).fold(None, |found, value| {
+        let [low, high] = found.unwrap_or([value; 2]);
+        Some([f64::min(low, value), f64::max(high, value)])
+    })
+}
+
+fn span([low, high]: [f64; 2]) -> String {
+    format!("{low:.0} to {high:.0} m")
+}
+
 /// Who signs on the day.
-const PEOPLE: [&str; 3] = ["range safety", "flight", "pad: has the pin"];
+const PEOPLE: [&str; 4] = ["range safety: decides", "flight", "pad: has the pin", "fire: extinguisher"];
 
 /// What is written down on the day. A book's end is a number and eight groups.
 const DAY: &[&[&str]] = &[
@@ -64,41 +98,119 @@ impl Card {
     }
 
     fn front(&self, winds: &[InWind]) -> Side {
-        let aborts = aborts(self.start).into_iter().map(|row| row.map(str::to_owned).to_vec()).collect();
-        let people = PEOPLE.map(|who| [vec![who.to_owned()], vec![String::new(); 6]].concat());
+        let set = &self.recipe.dispersion_name;
         Side {
-            title: format!("Range safety: {}", self.recipe.mission.name),
+            title: format!("Range safety: {}", self.named()),
             subtitle: format!(
-                "{}, {:.3} kg, from {}. Simulated, not flown: set {}{}, seed {}.",
-                self.landing.candidate.name(),
-                self.landing.choice.mass.loaded_kg,
+                "From {}. Simulated, not flown: set {set}{}, seed {}.",
                 self.begins(),
-                self.recipe.dispersion_name,
-                if may_be_kinder(&self.recipe.dispersion_name) {
-                    " (which may be kinder than real)"
-                } else {
-                    ""
-                },
+                if may_be_kinder(set) { " (which may be kinder than real)" } else { "" },
                 self.recipe.seed
             ),
             sections: vec![
                 wind_table(winds),
+                rows("What a range officer asks", words_of("asked", &self.values(winds))),
                 self.places(winds),
-                Section {
-                    title: "What an abort does: Ctrl-X, then Enter, at any station; one person is enough",
-                    content: Content::Table(&[], aborts),
-                },
+                rows(
+                    "What an abort does: Ctrl-X, then Enter, at any station; one person is enough",
+                    self.aborts(winds),
+                ),
                 Section { title: "On the day", content: Content::Blanks(DAY) },
-                Section {
-                    title: "Who holds which key",
-                    content: Content::Table(
-                        &["role", "name", "key file", "link", "asks, confirms, taps", "time", "signature"],
-                        people.to_vec(),
-                    ),
-                },
             ],
             notes: Vec::new(),
         }
+    }
+
+    /// The mission and what tells it from others.
+    fn named(&self) -> String {
+        format!("{}, mission {}", self.recipe.mission.name, self.hash)
+    }
+
+    /// The flights in the winds to fly in, or in all.
+    fn flights<'a>(&'a self, winds: &[InWind]) -> impl Iterator<Item = &'a Impact> {
+        let most_m_s = limit_m_s(winds).unwrap_or(f64::INFINITY);
+        self.flown.iter().filter(move |(wind_m_s, _)| *wind_m_s <= most_m_s).flat_map(|(_, impacts)| impacts)
+    }
+
+    fn as_planned(&self, winds: &[InWind], of: impl Fn(&Impact) -> Option<f64>) -> Option<[f64; 2]> {
+        told(self.flights(winds).filter(|impact| impact.way == Way::AsPlanned), of)
+    }
+
+    fn launch(&self) -> Option<&Launch> {
+        self.recipe.mission.launch.as_ref().filter(|_| self.start == StartPoint::Pad)
+    }
+
+    /// What the words of the card are filled with.
+    fn values(&self, winds: &[InWind]) -> Vec<(&'static str, Option<String>)> {
+        let (mission, launch) = (&self.recipe.mission, self.launch());
+        let (airframe, mass, chute) =
+            (&mission.airframe, &mission.airframe.mass, &mission.airframe.parachute);
+        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
+        let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
+        let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
+        let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
+        let motor = |curve: &ThrustCurve| format!("{}, {:.0} N s", curve.name(), curve.total_impulse_n_s());
+        let burns = mission.lot.as_ref().filter(|lot| lot.burns > 0);
+        let upwind_s = launch.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0);
+        let highest_m = |impact: &Impact| Some(impact.course.highest_m);
+        let calm = self.flown.iter().take(1).flat_map(|(_, impacts)| impacts);
+        let whole = |value: f64| format!("{value:.0}");
+        let if_so = |is_so: bool| is_so.then(String::new);
+        vec![
+            ("rail", if_so(launch.is_some())),
+            ("no rail", if_so(launch.is_none())),
+            ("name", Some(mission.name.clone())),
+            ("hash", Some(self.hash.clone())),
+            ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),
+            ("landing", Some(motor(&mission.motor_curve))),
+            ("both_n_s", Some(whole(self.rule.impulse_n_s))),
+            ("lift_kg", launch.map(|launch| format!("{:.2}", lift_off_kg(mission, Some(launch))))),
+            ("thrust_to_weight", launch.map(|launch| judged(thrust_to_weight(mission, launch), 5.0))),
+            (
+                "rail_m_s",
+                self.as_planned(winds, |impact| impact.course.rail_m_s).map(|[least, _]| judged(least, 15.0)),
+            ),
+            ("calibres", launch.map(|launch| judged(calibres(mission, launch), 1.0))),
+            ("highest_m", told(self.flights(winds), highest_m).map(|[_, most]| whole(most))),
+            ("apogee", told(calm.filter(|impact| impact.way == Way::AsPlanned), highest_m).map(span)),
+            (
+                "canopy_s",
+                told(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| whole(most)),
+            ),
+            ("lying", Some(self.lying(winds))),
+            ("lit", self.as_planned(winds, |impact| impact.course.lit_at_m).map(span)),
+            ("hold_s", Some(whole(HOLD_LIMIT_S))),
+            ("pad_s", Some(whole(PAD_ABORT_WAIT_S))),
+            ("misfire_s", Some(whole(MISFIRE_WAIT_S))),
+            ("hot_s", Some(whole(MOTOR_HOT_S))),
+            ("kg", Some(format!("{:.3}", mass.loaded_kg))),
+            ("nine_of_ten", Some(self.nine_of_ten())),
+            ("cg_mm", Some(whole(1e3 * mass.loaded_cg_station_m))),
+            ("stroke_mm", airframe.legs.crush.map(|crush| whole(1e3 * crush.stroke_m))),
+            ("motor", Some(mission.motor_curve.name().to_owned())),
+            ("confirmed", burns.map(|lot| format!("confirmed by {} burns of lot {}", lot.burns, lot.name))),
+            ("unconfirmed", if_so(burns.is_none())),
+            ("igniters", Some(igniters.to_owned())),
+            ("chute_m_s", Some(format!("{chute_m_s:.1}"))),
+            ("upwind_s", upwind_s.map(whole)),
+        ]
+    }
+
+    /// How vehicles lie that came down under the parachute without having lit the landing motor.
+    fn lying(&self, winds: &[InWind]) -> String {
+        let hung = |impact: &&Impact| impact.course.canopy_s.is_some() && impact.course.lit_at_m.is_none();
+        let (of, lie) = self
+            .flights(winds)
+            .filter(hung)
+            .fold((0, 0), |(of, lie), impact| (of + 1, lie + u64::from(impact.course.lies)));
+        format!("{lie} of {of} end on their side, all of them with a live motor")
+    }
+
+    /// With the heights of these flights.
+    fn aborts(&self, winds: &[InWind]) -> Vec<Vec<String>> {
+        let down_to = self.as_planned(winds, |impact| impact.course.chute_down_to_m);
+        let height = down_to.map_or_else(|| "never".to_owned(), |m| format!("feet above {}", span(m)));
+        aborts(Some(self.start), &height)
     }
 
     fn begins(&self) -> &'static str {
@@ -120,14 +232,7 @@ impl Card {
                  ground; held at 2 m, times 1.3. Between two rows the stronger wind counts."
             )],
         };
-        words.extend([
-            "Everybody stands outside of the circle, the launch crew too, and nobody stands downwind.".to_owned(),
-            "The launch crew stands upwind and launches by radio over the distance in the table, not by a cable. The range test (U) \
-             is passed at that place before the pin is pulled."
-                .to_owned(),
-            "Whoever pulls the pin walks out (minutes in the table, at 1 m/s) before anybody arms.".to_owned(),
-            "If the wind turns, so does the line: look again before the arming.".to_owned(),
-        ]);
+        words.extend(words_of("places", &[]).concat());
         let plan = plan(winds, self.wind_from_deg);
         if plan.is_some() {
             words.push(self.wind_from_deg.map_or_else(
@@ -145,15 +250,13 @@ impl Card {
 
     /// What the numbers of the front rest on.
     fn sources(&self, winds: &[InWind]) -> String {
-        let open = winds.iter().filter_map(|wind| wind.circle).any(|circle| circle.radius.high_m.is_none());
         format!(
             "Front. Nobody within: the largest of what holds 99 % of the flights of the way of ending that reaches farthest (upper end), of the rows \
-             above, and of {} ({}); rounded up to 10 m.{} On their legs: of the flights as planned, Wilson's interval. Fewer than {FEWEST} flights tell \
+             above, and of {} ({}); rounded up to 10 m; without an upper end nobody flies. On their legs: of the flights as planned, Wilson's interval. Fewer than {FEWEST} flights tell \
              neither. The fence of the mission ({:.0} m) only decides whether the landing motor may light. The same flights again: \
              onboard-sim hazard --profile mission.toml --dispersion {} --wind {} --seed {} --flights {} --hazard-flights {}",
             self.rule,
             Rule::SOURCE,
-            if open { " At least: there are too few flights for an upper end." } else { "" },
             self.recipe.mission.gate.fence_radius_m,
             self.recipe.dispersion_name,
             winds.iter().map(|wind| wind.wind_m_s.to_string()).collect::<Vec<_>>().join(","),
@@ -164,197 +267,68 @@ impl Card {
     }
 
     fn back(&self, winds: &[InWind]) -> Side {
-        let candidate = &self.landing.candidate;
-        let curve = &candidate.curve;
+        let values = &self.values(winds);
+        let people = PEOPLE.map(|who| [vec![who.to_owned()], vec![String::new(); 6]].concat());
         Side {
-            title: format!("Landing card: {}", self.recipe.mission.name),
-            subtitle: format!("{}, {:.3} kg.", candidate.name(), self.landing.choice.mass.loaded_kg),
+            title: format!("Landing card: {}", self.named()),
+            subtitle: format!(
+                "For whoever prepares the vehicle, and for what nobody wants. From {}.",
+                self.begins()
+            ),
             sections: vec![
-                self.vehicle(),
-                self.heights(),
-                self.margins(),
-                Section { title: "Check", content: Content::Checks(self.checks()) },
-            ],
-            notes: vec![
-                format!(
-                    "Motor: {}, {:.1} N s in {:.2} s, peak {:.1} N; {:.1} g of propellant in {:.1} g, {:.0} x {:.0} mm; data: {}.",
-                    candidate.name(),
-                    curve.total_impulse_n_s(),
-                    curve.burn_time_s(),
-                    curve.peak_thrust_n(),
-                    1e3 * curve.propellant_mass_kg(),
-                    1e3 * curve.total_mass_kg(),
-                    1e3 * curve.diameter_m(),
-                    1e3 * curve.length_m(),
-                    candidate.origin
-                ),
-                self.sources(winds),
-            ],
-        }
-    }
-
-    fn vehicle(&self) -> Section {
-        let choice = &self.landing.choice;
-        let (mass, ballast) = (&choice.mass, &choice.ballast);
-        let motor_kg = self.landing.candidate.curve.total_mass_kg();
-        let empty_kg = mass.loaded_kg - motor_kg;
-        let empty_cg_m =
-            (mass.loaded_kg * mass.loaded_cg_station_m - motor_kg * mass.propellant_station_m) / empty_kg;
-        let ballast_words = match ballast.mass_kg {
-            0.0 => "none".to_owned(),
-            mass_kg if mass_kg < 0.0 => format!("take out {:.3} kg", -mass_kg),
-            mass_kg => format!("add {mass_kg:.3} kg"),
-        };
-        rows(
-            "Set before the flight",
-            vec![
-                row(
-                    "Mass, motor in",
-                    format!("{:.3} kg", mass.loaded_kg),
-                    format!("{empty_kg:.3} kg without the motor"),
-                ),
-                row(
-                    "Balance, motor in",
-                    format!("{:.0} mm above the nozzle", 1e3 * mass.loaded_cg_station_m),
-                    format!("centre of gravity; {:.0} mm without the motor", 1e3 * empty_cg_m),
-                ),
-                row(
-                    "Ballast",
-                    ballast_words,
-                    format!(
-                        "at {:.0} mm; the airframe without motor and ballast is {:.3} kg",
-                        1e3 * ballast.station_m,
-                        self.frame.mass_kg()
+                rows("If it goes otherwise", words_of("otherwise", values)),
+                Section {
+                    title: "Who holds which key, and who goes",
+                    content: Content::Table(
+                        &["role", "name", "key file", "link", "asks, confirms, taps", "time", "signature"],
+                        people.to_vec(),
                     ),
-                ),
-                row("Load", "mission.toml".to_owned(), format!("mission {}", self.recipe.mission.name)),
+                },
+                rows("Set before the flight", words_of("set", values)),
+                Section { title: "Check", content: Content::Checks(words_of("checks", values).concat()) },
             ],
-        )
-    }
-
-    fn heights(&self) -> Section {
-        let choice = &self.landing.choice;
-        let window = &choice.window;
-        let command_m = window.onset_m + self.recipe.mission.ignition.delay_s * window.speed_m_s;
-        let mut rows = vec![
-            row(
-                "Apogee or drop",
-                format!("{:.0} m above the pad", choice.start_height_m),
-                "height of the centre of gravity at rest",
-            ),
-            row(
-                "Ignition command, about",
-                format!("{command_m:.0} m above the ground"),
-                format!("height of the feet, falling at {:.1} m/s; the computer decides", window.speed_m_s),
-            ),
-            row(
-                "Thrust begins, about",
-                format!("{:.0} m", window.onset_m),
-                format!(
-                    "a landing exists from {:.1} to {:.1} m",
-                    window.heights.low_m, window.heights.high_m
-                ),
-            ),
-        ];
-        if let Some(bound) = self.attainable {
-            rows.push(row(
-                "No controller lands it",
-                format!("below {:.1} or above {:.1} m", bound.low_m, bound.high_m),
-                "ignition command, certified motor, still air",
-            ));
-        }
-        self::rows("Heights", rows)
-    }
-
-    fn margins(&self) -> Section {
-        let choice = &self.landing.choice;
-        let window = &choice.window;
-        let impulse_n_s = self.landing.candidate.curve.total_impulse_n_s();
-        let [low, high] = window.impulse_scales;
-        rows(
-            "What may differ",
-            vec![
-                self.confirmed(),
-                row(
-                    "Impulse of the motor",
-                    format!("{:+.1} to {:+.1} %", 100.0 * (low - 1.0), 100.0 * (high - 1.0)),
-                    format!(
-                        "{:.1} to {:.1} N s, all else as in the data",
-                        low * impulse_n_s,
-                        high * impulse_n_s
-                    ),
-                ),
-                row(
-                    "Mass, certified motor",
-                    format!("{:.3} to {:.3} kg", choice.landing_kg[0], choice.landing_kg[1]),
-                    "outside no landing exists; the flights of the front differ by what their set says",
-                ),
-                row(
-                    "Scatter it stands",
-                    format!("{:.2}", window.scatter),
-                    "impulse, burn time and igniter at once, over what the mission plans for; 1 and more is good",
-                ),
-            ],
-        )
-    }
-
-    /// Whether burns of its lot confirm the motor's curve.
-    fn confirmed(&self) -> Vec<String> {
-        match &self.recipe.mission.lot {
-            Some(lot) if lot.burns > 0 => row(
-                "Motor confirmed by",
-                format!("{} burns of lot {}", lot.burns, lot.name),
-                "the mission expects what they had; another lot is unconfirmed",
-            ),
-            _ => row(
-                "Motor",
-                "UNCONFIRMED".to_owned(),
-                "no burn of its lot confirms the certified curve; arming asks for the word UNTESTED",
-            ),
+            notes: vec![self.proposed(), self.sources(winds)],
         }
     }
 
-    fn checks(&self) -> Vec<String> {
-        let choice = &self.landing.choice;
-        let (mission, airframe) = (&self.recipe.mission, &self.recipe.mission.airframe);
-        let chute = &airframe.parachute;
-        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
-        let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
-        let chute_m_s = libm::sqrt(2.0 * choice.mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
-        let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
-        let mut checks = vec![
-            format!("Weigh the vehicle with its motor: {:.3} kg, to 5 g.", choice.mass.loaded_kg),
-            format!(
-                "Balance it on an edge: {:.0} mm above the nozzle, to 3 mm.",
-                1e3 * choice.mass.loaded_cg_station_m
-            ),
-            format!(
-                "Read the label of the motor: {}. No other delay grain, no ejection charge.",
-                self.landing.candidate.name()
-            ),
-            format!("Measure the continuity of {igniters}; the pin stays in until the pad is clear."),
-            "Move fins and gimbal through their travel; each returns to its mark.".to_owned(),
-            "Measure the wind for ten minutes; the front says who stands where in it.".to_owned(),
-            "Load mission.toml; the ground station shows its name and no failed self-test.".to_owned(),
-            format!("Parachute packed: {chute_m_s:.1} m/s under the canopy at this mass."),
-            "After the flight: a motor that was not lit is live. Nobody approaches for 60 s; then the pin first."
-                .to_owned(),
-        ];
-        let on_rail = mission.launch.as_ref().filter(|_| self.start == StartPoint::Pad);
-        if let Some(upwind_s) = on_rail.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0)
-        {
-            checks.insert(6, format!(
-                "Lay the landing pad downwind of the rail: {upwind_s:.0} m for each m/s of that wind. Write where the rail then stands, from \
-                 the middle of the pad, into mission.toml, [launch.rail]: x_m to the north, y_m to the west.",
-            ));
+    /// The masses at which nine of ten land.
+    fn nine_of_ten(&self) -> String {
+        let enough = self.masses.iter().all(|(_, landed)| landed.of >= FEWEST);
+        let mut good =
+            self.masses.iter().filter(|(_, landed)| landed.share >= NINE_OF_TEN).map(|(kg, _)| *kg);
+        let own = self.masses.first().map(|(_, landed)| landed);
+        match (good.next(), own) {
+            _ if !enough => "too few flights to say at which masses nine of ten land".to_owned(),
+            (Some(least_kg), _) => {
+                let most_kg = good.next_back().unwrap_or(least_kg);
+                format!("nine of ten land at {least_kg:.2} to {most_kg:.2} kg in the least wind")
+            }
+            (None, own) => {
+                let landed = own.map_or_else(String::new, |own| format!("{} of {}", own.count, own.of));
+                format!("fewer than nine of ten land: {landed} in the least wind")
+            }
         }
-        if let Some(crush) = airframe.legs.crush {
-            checks.insert(2, format!(
-                "Each leg: its block new and unmarked, its foot free to rise by {:.0} mm. A block that has given way is replaced.",
-                1e3 * crush.stroke_m
-            ));
+    }
+
+    /// Another mass or motor, which is another mission.
+    fn proposed(&self) -> String {
+        match (&self.proposal, &self.proposed) {
+            (Ok(landing), Some(proposed)) => format!(
+                "Proposal, not this card's vehicle: {:.3} kg ({:+.3} kg at {:.0} mm) with {} from {:.0} m stands {:.2} times the scatter that the mission \
+                 plans for. It is proposal.toml, mission {}, and needs a card of its own.",
+                landing.choice.mass.loaded_kg,
+                landing.choice.ballast.mass_kg,
+                1e3 * landing.choice.ballast.station_m,
+                landing.candidate.name(),
+                landing.choice.start_height_m,
+                landing.choice.window.scatter,
+                proposed.mission.name
+            ),
+            (Ok(_), None) => {
+                "Proposal: none; no mass within the ballast stands more scatter of its motor.".to_owned()
+            }
+            (Err(refusal), _) => format!("Proposal: none; {refusal}."),
         }
-        checks
     }
 }
 
@@ -384,12 +358,8 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
         if !may_fly {
             return ["DO NOT FLY".to_owned(), "-".to_owned()];
         }
-        let at_least = if circle.radius.high_m.is_none() { "at least " } else { "" };
         let [keep_out_m, crew_m] = [circle.keep_out_m, circle.crew_m()];
-        [
-            format!("{at_least}{keep_out_m:.0} m"),
-            format!("{at_least}{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0)),
-        ]
+        [format!("{keep_out_m:.0} m"), format!("{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0))]
     };
     let [people, crew] = wind.circle.map_or_else(|| ["none".to_owned(), "-".to_owned()], people);
     vec![
@@ -414,18 +384,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
     ]
 }
 
-/// One sheet of A4 with two sides, in black and white, readable in the sun.
-const STYLE: &str = "@page{size:A4;margin:10mm}body{font:12px/1.25 sans-serif;max-width:190mm;margin:0 auto;color:#000}\
-section+section{break-before:page}h1{font-size:20px;margin:0}p{margin:2px 0}h2{font-size:14px;margin:7px 0 2px}\
-table{border-collapse:collapse;width:100%}td,th{padding:2px 6px;vertical-align:top;text-align:left;border:1px solid #000}\
-.c2 td:first-child{font-weight:bold;width:34%}.c3 td:first-child{width:25%}.c3 td:nth-child(2){font-weight:bold;width:29%}\
-.c6 td{font-size:11px}.c6 td:nth-child(-n+3){font-weight:bold;font-size:14px}.c6{table-layout:fixed}.c6 th{font-size:11px;width:15%}.c6 th:first-child{width:9%}\
-.c6 th:nth-child(3){width:17%}.c6 th:nth-child(5){width:28%}.c7{table-layout:fixed}.c7 th:first-child{width:17%}.c7 th:nth-child(4),.c7 th:nth-child(6){width:7%}.c7 th:nth-child(5){width:21%}.c7 td{height:22px}\
-ul{list-style:none;padding:0;margin:2px 0}li:before{content:'\\2610\\00a0'}small{display:block;margin-top:5px;overflow-wrap:anywhere}\
-.plan{display:flex;gap:5mm;align-items:center}.plan p{margin:3px 0}svg{flex:0 0 82mm;height:57mm}\
-circle,line{fill:none;stroke:#000;stroke-width:.7}.downwind{stroke-width:2}.crew{fill:#000}\
-text{font-size:9px;paint-order:stroke;stroke:#fff;stroke-width:2px}\
-.b{display:flex;gap:4px;align-items:end;height:22px}.b i{flex:1;border-bottom:1px solid #000}";
+const STYLE: &str = include_str!("card.css");
 
 pub(super) fn text(sides: &[Side]) -> String {
     let mut out = String::new();

@@ -92,7 +92,7 @@ const GIMBALS: usize = 2;
 const SURFACE_NAMES: [&str; SURFACES] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
 
 /// Something that went wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     pub sign: Sign,
     /// When it began, s since the release.
@@ -103,14 +103,14 @@ pub struct Finding {
     pub value: f64,
     /// What it stands against, or a second number.
     pub beside: f64,
-    /// A word that belongs to it.
-    pub detail: &'static str,
+    /// Words that belong to it.
+    pub detail: String,
 }
 
 impl Finding {
     /// The finding as a short sentence, without its time.
     pub fn words(&self) -> String {
-        let Self { value, beside, detail, held_s, .. } = *self;
+        let Self { value, beside, ref detail, held_s, .. } = *self;
         match self.sign {
             Sign::Restart => format!("flight computer away for {value:.2} s"),
             Sign::Gnss => format!("GNSS lost for {value:.1} s"),
@@ -202,6 +202,8 @@ impl Findings {
             }
             let &mut place = watch.found.get_or_insert_with(|| {
                 let Seen { value, beside, detail, .. } = seen;
+                let gave_up = computer.pilot().gave_up().filter(|_| sign == Sign::Gate);
+                let detail = gave_up.unwrap_or(detail).to_string();
                 self.found.push(Finding {
                     sign,
                     since_s,
@@ -285,8 +287,6 @@ struct Watcher {
     astray: bool,
     /// A foot has touched the ground: nothing after it was the flight's.
     down: bool,
-    /// The gate check that failed when the gate was given up.
-    gate: Option<&'static str>,
 }
 
 impl Watcher {
@@ -303,7 +303,6 @@ impl Watcher {
             must_see_s: None,
             astray: false,
             down: false,
-            gate: None,
         }
     }
 
@@ -335,9 +334,6 @@ impl Watcher {
             if commands.outputs.is_on(line) {
                 since_s.get_or_insert(time_s);
             }
-        }
-        if self.gate.is_none() && computer.latch() == Some(Latch::Gate) {
-            self.gate = computer.pilot().gate_check_that_fails(computer.mode(), flown);
         }
         let nose_up = estimate.state.nose_in_world().z;
         let near = has_sensors(flown)
@@ -371,7 +367,7 @@ impl Watcher {
             }
             Sign::Barometer => silent(barometer_s, BAROMETER_LOST_S),
             Sign::Gate | Sign::Latched => {
-                let detail = latched(computer.latch()?, sign, self.gate)?;
+                let detail = latched(computer.latch()?, sign)?;
                 Some(Seen { detail, ..now(0.0, 0.0) })
             }
             _ if in_air => seen_in_flight(self, sign, computer, flown, estimate),
@@ -482,10 +478,10 @@ fn seen_in_flight(
     }
 }
 
-/// What latched, in words: for a gate that was given up the check that failed then.
-fn latched(latch: Latch, sign: Sign, gate: Option<&'static str>) -> Option<&'static str> {
+/// What latched, in words; the pilot knows why a gate was given up.
+fn latched(latch: Latch, sign: Sign) -> Option<&'static str> {
     let words = match latch {
-        Latch::Gate => gate.unwrap_or(""),
+        Latch::Gate => "",
         Latch::Commanded => "abort of the crew",
         Latch::UncommandedLiftOff => "lifted off although nobody had armed it",
         Latch::UncommandedRelease => "released although nobody had cleared it",

@@ -152,7 +152,7 @@ impl Computer {
         if self.release.is_none() {
             return Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
         }
-        self.pilot.abort_event(self.table.mode(), self.flown().as_ref())
+        self.pilot.abort_event(self.table.mode(), self.flown().as_ref(), &self.sensors)
     }
 
     /// Whether a landing under thrust can be planned; true until the first attempt.

@@ -3,6 +3,12 @@
 //! They use measured and predicted values of this moment. The latches (armed, not inhibited, no abort) are in the
 //! [phase table](crate::rules::phase). Loss of the radio link neither fires nor blocks the motor, so it is not checked
 //! here.
+//!
+//! One list serves all: what keeps the gate shut now, what gives the landing up because it will not go away, and what the crew is
+//! told of both.
+
+use alloc::format;
+use alloc::string::String;
 
 use crate::vehicle::mission::GateLimits;
 
@@ -20,6 +26,8 @@ pub struct GateInput {
     pub height_disagreement_m: f64,
     /// The height at the onset of thrust is inside the feasible band.
     pub landing_feasible: bool,
+    /// The certified motor lands from here or from farther down.
+    pub lands_ahead: bool,
     /// Horizontal distance of the predicted touchdown from the pad, m.
     pub predicted_touchdown_x_m: f64,
     /// All fins have reached their deployed angle.
@@ -28,33 +36,95 @@ pub struct GateInput {
     /// The igniter has continuity.
     pub igniter_continuity: bool,
     pub estimator_healthy: bool,
+    /// The inertial unit speaks, and of the three vertical speeds no two contradict the estimate.
+    pub sensors_agree: bool,
 }
 
-/// The first check that keeps the gate shut; `None` if it is open. A value that is not a number keeps it shut.
-pub fn shut_by(limits: &GateLimits, input: &GateInput) -> Option<&'static str> {
-    let within = |found: f64, most: f64| found.abs() <= most;
-    let tilt_deg = input.tilt_rad.to_degrees();
-    let pitch_rate_deg_s = input.pitch_rate_rad_s.to_degrees();
+/// One check of the gate, with what it has found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateCheck {
+    pub name: &'static str,
+    /// In the unit; NaN for a condition.
+    pub found: f64,
+    /// At most this; NaN for a condition.
+    pub limit: f64,
+    pub unit: &'static str,
+    /// It keeps the gate shut now. A value that is not a number does.
+    pub shut: bool,
+    /// It will keep it shut: it seldom goes away again.
+    pub lasts: bool,
+}
+
+/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
+/// them: such a vehicle tumbles, or does not know where it is.
+const FAR_BEYOND: f64 = 2.0;
+
+/// How many checks the gate has.
+pub const GATE_CHECKS: usize = 13;
+
+/// The checks of the gate, in the order in which they are told.
+///
+/// The fence needs no margin: steering does not bring the vehicle back. From the commit height to ignition it has half a
+/// second, and the wind carries the predicted touchdown 0.3 to 1.8 m further out (1000 `harsh` flights).
+pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS] {
+    let value = |name, found: f64, limit: f64, unit, beyond: f64| GateCheck {
+        name,
+        found: found.abs(),
+        limit,
+        unit,
+        shut: !(found.abs() <= limit),
+        lasts: found.abs() > beyond * limit,
+    };
+    let condition = |name, holds: bool, lasts: bool| GateCheck {
+        name,
+        found: f64::NAN,
+        limit: f64::NAN,
+        unit: "",
+        shut: !holds,
+        lasts: !holds && lasts,
+    };
     let speed_error = (input.speed_m_s - input.predicted_speed_m_s) / input.predicted_speed_m_s;
-    let checks = [
-        ("descending", input.vertical_speed_m_s < 0.0),
-        ("tilt from vertical", within(tilt_deg, limits.tilt_max_deg)),
-        ("pitch rate", within(pitch_rate_deg_s, limits.pitch_rate_max_deg_s)),
-        ("speed error", within(speed_error, limits.speed_error_max_fraction)),
-        ("height disagreement", within(input.height_disagreement_m, limits.height_disagreement_max_m)),
-        ("landing plan", input.landing_feasible),
-        ("predicted touchdown", within(input.predicted_touchdown_x_m, limits.fence_radius_m)),
-        ("fins", input.fins_confirmed),
-        ("parachute", input.parachute_stowed),
-        ("igniter continuity", input.igniter_continuity),
-        ("estimator", input.estimator_healthy),
-    ];
-    checks.iter().find(|(_, passed)| !passed).map(|(name, _)| *name)
+    [
+        condition("sensors contradict the estimate", input.sensors_agree, true),
+        condition("estimator in doubt", input.estimator_healthy, true),
+        condition("igniter continuity lost", input.igniter_continuity, true),
+        condition("a fin does not follow", input.fins_confirmed, true),
+        value("touchdown beyond the fence", input.predicted_touchdown_x_m, limits.fence_radius_m, "m", 1.0),
+        condition("no landing ahead", input.lands_ahead, true),
+        value("tilt", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg", FAR_BEYOND),
+        value(
+            "pitch rate",
+            input.pitch_rate_rad_s.to_degrees(),
+            limits.pitch_rate_max_deg_s,
+            "deg/s",
+            FAR_BEYOND,
+        ),
+        value("speed error", 100.0 * speed_error, 100.0 * limits.speed_error_max_fraction, "%", FAR_BEYOND),
+        value(
+            "heights disagree",
+            input.height_disagreement_m,
+            limits.height_disagreement_max_m,
+            "m",
+            FAR_BEYOND,
+        ),
+        condition("no landing plan", input.landing_feasible, false),
+        condition("not descending", input.vertical_speed_m_s < 0.0, false),
+        condition("parachute not stowed", input.parachute_stowed, false),
+    ]
+}
+
+impl GateCheck {
+    /// The check with what it has found, in words.
+    pub fn words(&self) -> String {
+        let Self { name, found, limit, unit, .. } = self;
+        if limit.is_nan() { (*name).into() } else { format!("{name} {found:.0} {unit}, limit {limit:.0}") }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use alloc::vec::Vec;
 
     fn good() -> GateInput {
         GateInput {
@@ -65,24 +135,27 @@ mod tests {
             predicted_speed_m_s: 5.0,
             height_disagreement_m: 0.5,
             landing_feasible: true,
+            lands_ahead: true,
             predicted_touchdown_x_m: 0.3,
             fins_confirmed: true,
             parachute_stowed: true,
             igniter_continuity: true,
             estimator_healthy: true,
+            sensors_agree: true,
         }
     }
 
-    fn shut_after(spoil: impl FnOnce(&mut GateInput)) -> Option<&'static str> {
+    /// The checks that keep the gate shut.
+    fn shut_after(spoil: impl FnOnce(&mut GateInput)) -> Vec<GateCheck> {
         let limits = crate::vehicles::mission::builtin("mk2").unwrap().unwrap().gate;
         let mut input = good();
         spoil(&mut input);
-        shut_by(&limits, &input)
+        checks(&limits, &input).into_iter().filter(|check| check.shut).collect()
     }
 
     #[test]
     fn the_nominal_start_opens_the_gate() {
-        assert_eq!(shut_after(|_| {}), None);
+        assert_eq!(shut_after(|_| {}), []);
     }
 
     /// A wrong input, and the check that must close the gate.
@@ -90,11 +163,11 @@ mod tests {
 
     #[test]
     fn each_check_closes_the_gate_alone() {
-        let spoilings: [Spoiling; 12] = [
-            ("descending", |input| {
+        let spoilings: [Spoiling; 14] = [
+            ("not descending", |input| {
                 input.vertical_speed_m_s = 0.0;
             }),
-            ("tilt from vertical", |input| {
+            ("tilt", |input| {
                 input.tilt_rad = -0.36;
             }),
             ("pitch rate", |input| {
@@ -106,30 +179,51 @@ mod tests {
             ("speed error", |input| {
                 input.predicted_speed_m_s = 0.0;
             }),
-            ("height disagreement", |input| {
+            ("heights disagree", |input| {
                 input.height_disagreement_m = f64::NAN;
             }),
-            ("landing plan", |input| {
+            ("no landing plan", |input| {
                 input.landing_feasible = false;
             }),
-            ("predicted touchdown", |input| {
+            ("touchdown beyond the fence", |input| {
                 input.predicted_touchdown_x_m = -121.0;
             }),
-            ("fins", |input| {
+            ("a fin does not follow", |input| {
                 input.fins_confirmed = false;
             }),
-            ("parachute", |input| {
+            ("parachute not stowed", |input| {
                 input.parachute_stowed = false;
             }),
-            ("igniter continuity", |input| {
+            ("igniter continuity lost", |input| {
                 input.igniter_continuity = false;
             }),
-            ("estimator", |input| {
+            ("no landing ahead", |input| {
+                input.lands_ahead = false;
+            }),
+            ("sensors contradict the estimate", |input| {
+                input.sensors_agree = false;
+            }),
+            ("estimator in doubt", |input| {
                 input.estimator_healthy = false;
             }),
         ];
         for (name, spoil) in spoilings {
-            assert_eq!(shut_after(spoil), Some(name));
+            let shut = shut_after(spoil);
+            assert_eq!(shut.iter().map(|check| check.name).collect::<Vec<_>>(), [name]);
         }
+    }
+
+    /// What is a little beyond its limit comes back; what is far beyond it, or out of the fence, does not.
+    #[test]
+    fn what_lasts_is_far_beyond_its_limit_and_is_told_with_values() {
+        for (tilt_deg, lasts) in [(25.0_f64, false), (41.0, true)] {
+            let shut = shut_after(|input| input.tilt_rad = tilt_deg.to_radians());
+            assert_eq!(shut[0].lasts, lasts);
+            assert_eq!(shut[0].words(), format!("tilt {tilt_deg:.0} deg, limit 20"));
+        }
+        let shut = shut_after(|input| input.predicted_touchdown_x_m = 131.0);
+        assert!(shut[0].lasts);
+        assert_eq!(shut[0].words(), "touchdown beyond the fence 131 m, limit 120");
+        assert_eq!(shut_after(|input| input.lands_ahead = false)[0].words(), "no landing ahead");
     }
 }

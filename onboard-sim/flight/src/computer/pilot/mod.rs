@@ -11,6 +11,7 @@ mod vehicle_model;
 mod vertical_speed;
 
 use alloc::boxed::Box;
+use alloc::string::String;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +26,7 @@ use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::baseline::{Baseline, Law};
 use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
+use crate::rules::gate::GATE_CHECKS;
 use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::dynamics::PlanarState;
@@ -80,8 +82,12 @@ pub struct Pilot {
     fin_watch: FinWatch,
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
-    /// Since when a lasting reason has kept the gate shut, s.
+    /// Since when a lasting reason has kept the gate shut, s, and each of its checks.
     gate_shut_since_s: Option<f64>,
+    shut_since_s: [Option<f64>; GATE_CHECKS],
+    /// Why no landing is tried any more. It decides nothing.
+    #[serde(skip)]
+    gave_up: Option<String>,
 }
 
 impl Pilot {
@@ -128,6 +134,8 @@ impl Pilot {
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
             gate_shut_since_s: None,
+            shut_since_s: [None; GATE_CHECKS],
+            gave_up: None,
             model,
         }
     }
@@ -219,6 +227,11 @@ impl Pilot {
     /// When the landing motor was commanded to light, s.
     pub fn ignited_at_s(&self) -> Option<f64> {
         self.ignited_at_s
+    }
+
+    /// Why no landing is tried any more, with the values found.
+    pub fn gave_up(&self) -> Option<&str> {
+        self.gave_up.as_deref()
     }
 
     /// The gate check that failed at the last evaluation, if any.

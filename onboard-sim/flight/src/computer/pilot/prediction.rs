@@ -1,5 +1,8 @@
 //! The pilot's forecast for the next seconds, and the parachute if it shows that no landing will be possible.
 
+use alloc::format;
+use alloc::string::String;
+
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
@@ -9,7 +12,7 @@ use crate::estimation::estimator::Estimate;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::ignition::IgnitionPrediction;
 use crate::guidance::vertical::fall_ends_m_s;
-use crate::rules::gate::GateInput;
+use crate::rules::gate::{GATE_CHECKS, GateCheck};
 use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
@@ -117,12 +120,9 @@ const LASTS_S: f64 = 0.5;
 const BEFORE_S: f64 = 0.1;
 /// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a slow offset.
 const HEIGHTS_APART_M: f64 = 8.0;
-/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
-/// them: such a vehicle tumbles, or does not know where it is.
-const FAR_BEYOND: f64 = 2.0;
 
 impl Pilot {
-    /// The event that the gate will not open any more, as soon as waiting gains nothing.
+    /// The event that the gate will not open any more, as soon as waiting gains nothing, and why.
     ///
     /// Above the commit height: the gate has been shut for a lasting reason, and this is the last chance for the parachute
     /// with its margin. Below: ignition is due and refused, or no landing is possible from here any more. The motor must
@@ -133,17 +133,12 @@ impl Pilot {
         input: &Input<'_>,
         estimate: &Estimate,
         sensors: &SensorWatch,
-    ) -> Option<Event> {
-        // What is felt carries the estimate: without it nobody knows the attitude, and the pressure alone knows the height. The same
-        // where two of three speeds contradict the estimate.
-        let astray = sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate();
-        if mode.phase.in_descent() && astray {
-            let fills_m = self.prediction.filling_height_m();
-            let parachute_fills = sensors.pressure_altitude_m().is_none_or(|height_m| height_m > fills_m);
-            return Some(Event::GateShutForGood { parachute_fills });
+    ) -> Option<(Event, String)> {
+        let checks = self.gate_checks(mode, input, estimate, sensors);
+        for (check, since_s) in checks.iter().zip(&mut self.shut_since_s) {
+            *since_s = check.shut.then(|| since_s.unwrap_or(input.time_s));
         }
-        let found = self.gate_input(mode, input, estimate);
-        if mode.phase.in_descent() && self.is_shut_by_what_lasts(&found) {
+        if mode.phase.in_descent() && checks.iter().any(|check| check.lasts) {
             self.gate_shut_since_s.get_or_insert(input.time_s);
         } else {
             self.gate_shut_since_s = None;
@@ -170,8 +165,8 @@ impl Pilot {
         } else {
             let last_room = feet_m - filling_m < decided_m;
             let overdue_s = self.ignition_overdue_s(estimate);
-            let refused = overdue_s.is_some() && self.gate_shut_by(&found).is_some();
-            let outside = found.predicted_touchdown_x_m > self.model.mission.gate.fence_radius_m;
+            let refused = overdue_s.is_some() && checks.iter().any(|check| check.shut);
+            let outside = self.prediction.touchdown_distance_m > self.model.mission.gate.fence_radius_m;
             let too_low =
                 self.prediction.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
             (lasts && (refused || last_room))
@@ -183,25 +178,37 @@ impl Pilot {
         // Any lower, the parachute reaches the ground before it is ejected.
         let ejected =
             feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
-        (hopeless && ejected).then_some(Event::GateShutForGood { parachute_fills: feet_m > filling_m })
+        if self.is_astray(sensors) {
+            // Nobody knows the attitude, and the pressure alone knows the height: nothing is gained by waiting.
+            let parachute_fills = pressure_m.is_none_or(|pressure_m| pressure_m > filling_m);
+            return Some((
+                Event::GateShutForGood { parachute_fills },
+                self.why_given_up(&checks, input.time_s),
+            ));
+        }
+        (hopeless && ejected).then(|| {
+            let event = Event::GateShutForGood { parachute_fills: feet_m > filling_m };
+            (event, self.why_given_up(&checks, input.time_s))
+        })
     }
 
-    /// Whether a reason that usually lasts keeps the gate shut.
-    ///
-    /// The fence needs no margin: steering does not bring the vehicle back. From the commit height to ignition it has half a
-    /// second, and the wind carries the predicted touchdown 0.3 to 1.8 m further out (1000 `harsh` flights).
-    fn is_shut_by_what_lasts(&self, found: &GateInput) -> bool {
-        let limits = &self.model.mission.gate;
-        let speed_error_m_s = (found.speed_m_s - found.predicted_speed_m_s).abs();
-        !found.fins_confirmed
-            || !found.estimator_healthy
-            || !found.igniter_continuity
-            || found.tilt_rad > FAR_BEYOND * limits.tilt_max_deg.to_radians()
-            || found.pitch_rate_rad_s > FAR_BEYOND * limits.pitch_rate_max_deg_s.to_radians()
-            || found.predicted_touchdown_x_m > limits.fence_radius_m
-            || found.height_disagreement_m > FAR_BEYOND * limits.height_disagreement_max_m
-            || speed_error_m_s > FAR_BEYOND * limits.speed_error_max_fraction * found.predicted_speed_m_s
-            || !self.prediction.lands_ahead
+    /// Without what is felt, or with an estimate that two of three speeds contradict, no landing is tried.
+    pub(super) fn is_astray(&self, sensors: &SensorWatch) -> bool {
+        sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate()
+    }
+
+    /// All that decided, with values, and for how long: what lasts, or else what keeps the gate shut now.
+    fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
+        let any_lasts = checks.iter().any(|check| check.lasts);
+        let mut told = String::new();
+        for (check, since_s) in checks.iter().zip(&self.shut_since_s) {
+            if check.lasts || (check.shut && !any_lasts) {
+                let for_s = since_s.map_or(0.0, |since_s| time_s - since_s);
+                let comma = if told.is_empty() { "" } else { "; " };
+                told += &format!("{comma}{}, for {for_s:.1} s", check.words());
+            }
+        }
+        if told.is_empty() { "too low for the landing motor".into() } else { told }
     }
 }
 
@@ -221,7 +228,7 @@ mod tests {
         pilot.estimate_state(table.mode().phase, input);
         pilot.predict(table, input);
         if abort {
-            let event = pilot.abort_event(table.mode(), Some(input));
+            let event = pilot.abort_event(table.mode(), Some(input), &SensorWatch::default());
             pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
         }
         pilot.decide(table, input, &SensorWatch::default());
@@ -322,6 +329,12 @@ mod tests {
     fn a_fall_with_nothing_wrong_ends_with_the_ignition() {
         let ended = fall(NOTHING, NO_ABORT_M);
         assert!(matches!(ended, Ended::Ignition(at_m) if (60.0..80.0).contains(&at_m)), "{ended:?}");
+    }
+
+    #[test]
+    fn a_foot_s_switch_that_closes_high_up_ends_no_flight() {
+        let ended = fall(|height_m, _, input| input.contact = height_m > 100.0, NO_ABORT_M);
+        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! One frame of the flight.
 
+use alloc::format;
+
 use nalgebra::Vector3;
 
 use super::ascent::{AscentReadings, axial_m_s2, words_of_ascent};
@@ -8,6 +10,7 @@ use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction, Sensed};
 use crate::computer::Input;
+use crate::computer::news::Severity;
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
@@ -16,7 +19,7 @@ use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
 use crate::guidance::powered::ControlLevel;
-use crate::rules::gate::{self, GateInput};
+use crate::rules::gate::{self, GATE_CHECKS, GateCheck, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::atmosphere::Air;
@@ -27,6 +30,8 @@ use crate::vehicle::mission::StartPoint;
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// A fin farther than this from its command has not reached it, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
+/// Heights of a landing, m: a field's slope, the pressure's errors and the weather of a day.
+const NEAR_GROUND_M: f64 = 15.0;
 /// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
@@ -322,8 +327,11 @@ impl Pilot {
         let Some(estimate) = self.estimate else { return };
         let estimate = &estimate;
         let time_s = input.time_s;
-        if let Some(hopeless) = self.gate_will_not_open(table.mode(), input, estimate, sensors) {
-            self.happen(table, hopeless, time_s);
+        if let Some((hopeless, why)) = self.gate_will_not_open(table.mode(), input, estimate, sensors)
+            && self.told(table, hopeless, time_s).is_ok()
+        {
+            table.say(Severity::Critical, format!("no landing: {why}"));
+            self.gave_up = Some(why);
         }
         match table.mode().phase {
             Phase::Deploy if self.fins_are_out(&input.fins_rad) => {
@@ -339,7 +347,7 @@ impl Pilot {
                     self.happen(table, Event::LandArm, time_s);
                 }
             }
-            Phase::LandArmed => self.consider_ignition(table, input, estimate),
+            Phase::LandArmed => self.consider_ignition(table, input, estimate, sensors),
             Phase::Ignition => {
                 if self.model.burning_s(time_s).is_some() {
                     self.happen(table, Event::ThrustConfirmed, time_s);
@@ -351,7 +359,11 @@ impl Pilot {
             }
             _ => {}
         }
-        if input.contact && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed) {
+        let under_parachute = table.mode().phase == Phase::Chute;
+        if input.contact
+            && !matches!(table.mode().phase, Phase::Touchdown | Phase::Safed)
+            && (under_parachute || self.is_near_the_ground(estimate, time_s, sensors))
+        {
             let (thrust_n, weight_n) = self.thrust_and_weight_n(time_s);
             let thrust_below_weight = thrust_n < weight_n;
             self.happen(table, Event::Contact { thrust_below_weight }, time_s);
@@ -361,6 +373,14 @@ impl Pilot {
         }
     }
 
+    /// Whether any height is that of a landing: a foot's switch alone ends no flight.
+    fn is_near_the_ground(&self, estimate: &Estimate, time_s: f64, sensors: &SensorWatch) -> bool {
+        let below_cg_m = estimate.state.position_m.z - self.feet_height_m(estimate);
+        self.feet_height_m(estimate) <= NEAR_GROUND_M
+            || self.speeds.altitude_m(time_s).is_some_and(|height_m| height_m - below_cg_m <= NEAR_GROUND_M)
+            || sensors.lidar_range_m().is_some_and(|range_m| range_m <= NEAR_GROUND_M)
+    }
+
     /// The motor's thrust as estimated, and the weight, N.
     pub(in crate::computer) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
         let burning_s = self.model.burning_s(time_s);
@@ -368,9 +388,17 @@ impl Pilot {
         (thrust_n, self.model.mass_now(burning_s).mass_kg * self.model.mission.gravity_m_s2)
     }
 
-    fn consider_ignition(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
+    fn consider_ignition(
+        &mut self,
+        table: &mut PhaseTable,
+        input: &Input<'_>,
+        estimate: &Estimate,
+        sensors: &SensorWatch,
+    ) {
         if self.ignition_overdue_s(estimate).is_some() {
-            let open = self.gate_open(table.mode(), input, estimate);
+            let checks = self.gate_checks(table.mode(), input, estimate, sensors);
+            self.gate_refusal = checks.iter().find(|check| check.shut).map(|check| check.name);
+            let open = self.gate_refusal.is_none();
             self.happen(table, Event::IgnitionGate { open }, input.time_s);
         }
     }
@@ -390,10 +418,10 @@ impl Pilot {
     }
 
     /// The event that an abort is now, from the findings of the last frame, if there was one.
-    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&Input<'_>>) -> Event {
+    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&Input<'_>>, sensors: &SensorWatch) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open = found.is_some_and(|(input, estimate)| {
-            self.gate_shut_by(&self.gate_input(mode, input, estimate)).is_none()
+            !self.gate_checks(mode, input, estimate, sensors).iter().any(|check| check.shut)
         });
         Event::AbortRequested {
             lifted_off: self.has_lifted_off(),
@@ -409,22 +437,17 @@ impl Pilot {
         prediction.height_m > enough_m
     }
 
-    /// The first gate check that fails now, if the gate was asked.
-    pub fn gate_check_that_fails(&self, mode: &Mode, input: &Input<'_>) -> Option<&'static str> {
-        // The parachute that was thrown out because of it is no reason.
-        let asked = Mode { phase: Phase::LandArmed, ..*mode };
-        self.estimate.and_then(|estimate| self.gate_shut_by(&self.gate_input(&asked, input, &estimate)))
-    }
-
-    fn gate_open(&mut self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> bool {
-        self.gate_refusal = self.gate_shut_by(&self.gate_input(mode, input, estimate));
-        self.gate_refusal.is_none()
-    }
-
-    pub(super) fn gate_input(&self, mode: &Mode, input: &Input<'_>, estimate: &Estimate) -> GateInput {
+    /// The checks of the gate with what they find now.
+    pub(super) fn gate_checks(
+        &self,
+        mode: &Mode,
+        input: &Input<'_>,
+        estimate: &Estimate,
+        sensors: &SensorWatch,
+    ) -> [GateCheck; GATE_CHECKS] {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
-        GateInput {
+        let found = GateInput {
             tilt_rad: state.tilt_rad(),
             vertical_speed_m_s: state.velocity_m_s.z,
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
@@ -439,12 +462,10 @@ impl Pilot {
             parachute_stowed: mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
             estimator_healthy: estimate.health.is_good(),
-        }
-    }
-
-    /// The first check that keeps the gate shut.
-    pub(super) fn gate_shut_by(&self, found: &GateInput) -> Option<&'static str> {
-        gate::shut_by(&self.model.mission.gate, found)
+            lands_ahead: self.prediction.lands_ahead,
+            sensors_agree: !self.is_astray(sensors),
+        };
+        gate::checks(&self.model.mission.gate, &found)
     }
 
     /// The fins have left their closed stop and stand where they are commanded to. In the frame that enters DEPLOY they still

@@ -1,0 +1,147 @@
+//! What a crew types by mistake: it does nothing, and is told why.
+
+use ground::key::Key;
+use ground::model::Page;
+use protocol::dialect::{TdInterlock, TdLatch, TdPhase};
+
+use crate::keys::ladder;
+use crate::rig::{Rig, is_abort, settings, typed};
+use crate::screens::{armed, descending, on_the_pad};
+
+#[test]
+fn a_letter_of_another_keyboard_layout_is_told() {
+    for letter in ['Ф', 'А', 'ф', 'あ', 'ä'] {
+        let mut rig = on_the_pad();
+        rig.key(Key::Char(letter));
+        let words = format!("KEYBOARD LAYOUT: {letter} is no key here");
+        assert!(rig.events().contains(&words), "{}", rig.events());
+        assert!(rig.screen(80, 24).contains("KEYBOARD LAYOUT"), "{}", rig.screen(80, 24));
+    }
+    // In the middle of a word it is none of its letters.
+    let mut rig = on_the_pad();
+    rig.keys(&typed("AAЯ"));
+    assert!(
+        rig.events().contains("arming: cancelled; KEYBOARD LAYOUT: Я is no key here"),
+        "{}",
+        rig.events()
+    );
+    assert_eq!(rig.model.dialog, None);
+    // With caps lock the key of a ladder is a small letter.
+    rig.key(Key::Char('a'));
+    assert!(rig.events().contains("capital letters: A arms, S starts, D disarms (caps lock?)"));
+}
+
+#[test]
+fn an_enter_after_the_question_of_an_abort_has_run_out_is_told_that_nothing_was_sent() {
+    let mut rig = descending();
+    rig.key(Key::CtrlX);
+    rig.run(2.3);
+    rig.key(Key::Enter);
+    assert!(!rig.take_commands().iter().any(is_abort));
+    assert!(rig.events().contains("too late for the abort"), "{}", rig.events());
+    assert!(rig.screen(80, 24).contains("ABORT Ctrl-X Enter"));
+    // Once, and not for an Enter that means something else.
+    let said = |rig: &Rig| rig.events().matches("too late for the abort").count();
+    rig.key(Key::Enter);
+    assert_eq!(said(&rig), 1);
+    rig.key(Key::CtrlX);
+    rig.run(2.3);
+    rig.keys(&[Key::Char('5'), Key::Enter]);
+    rig.key(Key::CtrlX);
+    rig.run(15.0);
+    rig.key(Key::Enter);
+    assert_eq!(said(&rig), 1);
+    rig.abort();
+    assert!(rig.take_commands().iter().any(is_abort));
+}
+
+/// The key is refused, and the crew types on, slowly: no letter of it acts as a key.
+#[test]
+fn the_rest_of_a_refused_word_is_swallowed_until_enter() {
+    for word in ["ARM", "CONFIRM"] {
+        let mut rig = Rig::crewed();
+        rig.hears = false;
+        rig.run(4.0);
+        rig.key(Key::Char('A'));
+        assert!(rig.events().contains("cannot arm"), "{}", rig.events());
+        let before = (rig.model.page(), rig.model.pages.held);
+        rig.run(0.5);
+        for letter in typed(word) {
+            rig.key(letter);
+            rig.run(1.5);
+        }
+        assert_eq!((rig.model.page(), rig.model.pages.held), before, "{word}");
+        assert_eq!((rig.model.dialog.clone(), rig.model.pages.entry.clone()), (None, None), "{word}");
+        rig.key(Key::Enter);
+        assert_eq!(rig.events().matches("cannot arm").count(), 2, "it is said again: {}", rig.events());
+        rig.key(Key::Char('f'));
+        assert_eq!(rig.model.page(), Page::Find, "{word}: after Enter the keys act again");
+    }
+    // Typed after the key of a take-over, whose letter it begins with.
+    let mut rig = Rig::crewed();
+    rig.keys(&typed("CONFIRM"));
+    assert_ne!(rig.model.page(), Page::Find);
+}
+
+/// A motor that was commanded to light may not have lit.
+#[test]
+fn nothing_says_lift_off_before_the_vehicle_has_moved() {
+    let mut rig = armed();
+    (rig.phase, rig.countdown_ms) = (TdPhase::TD_PHASE_BOOST, -600);
+    rig.run(0.5);
+    for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
+        let screen = rig.screen(columns, rows);
+        assert!(screen.contains("Told to light") && screen.contains("commanded to light"), "{screen}");
+        assert!(!screen.contains("Rising") && !screen.contains("●lift-off"), "{screen}");
+    }
+    // A motor that did not light: disarmed again, on the pad.
+    let mut misfired = armed();
+    (misfired.phase, misfired.countdown_ms) = (TdPhase::TD_PHASE_BOOST, -600);
+    misfired.run(0.5);
+    (misfired.phase, misfired.countdown_ms, misfired.armed) = (TdPhase::TD_PHASE_PAD_IDLE, i32::MAX, false);
+    misfired.approach_wait_s = 58;
+    misfired.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    // After that the row of the commands is free.
+    misfired.run(12.0);
+    for _ in 0..5 {
+        misfired.key(Key::Char(' '));
+    }
+    let screen = misfired.screen(120, 36);
+    assert!(screen.contains("●commanded to light") && !screen.contains("lift-off"), "{screen}");
+    rig.run(10.0);
+    rig.state(0.0, 2.0, 0.0, 12.0, 90.0);
+    rig.run(0.1);
+    rig.key(Key::Char(' '));
+    let screen = rig.screen(120, 36);
+    assert!(screen.contains("Rising") && screen.contains("●lift-off"), "{screen}");
+}
+
+/// The vehicle gives the gate up by itself.
+#[test]
+fn the_alarm_of_a_gate_that_stayed_shut_says_which_check_kept_it_shut() {
+    let mut rig = descending();
+    rig.text("ignition gate closed: tilt from vertical");
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    rig.latch = TdLatch::TD_LATCH_GATE;
+    rig.run(0.2);
+    let line = |rig: &Rig| rig.screen(120, 36).lines().rev().nth(1).unwrap_or_default().to_owned();
+    assert!(line(&rig).contains("MOTOR INHIBITED: gate stayed shut: tilt from vertical"), "{}", line(&rig));
+    rig.finding(0, 1, 12.0, "ignition gate stayed shut: tilt from vertical, 31 of 20 deg");
+    rig.run(0.2);
+    assert!(line(&rig).contains("gate stayed shut: tilt from vertical, 31 of 20"), "{}", line(&rig));
+}
+
+#[test]
+fn a_demonstration_says_on_every_page_that_no_vehicle_is_real() {
+    let mut settings = settings(false, true);
+    settings.demonstration = true;
+    let mut rig = Rig::new(settings);
+    rig.run(1.0);
+    for digit in "123456789".chars() {
+        rig.key(Key::Char(digit));
+        let screen = rig.screen(80, 24);
+        assert!(screen.lines().next().is_some_and(|row| row.contains(" DEMO, NOT REAL ")), "{screen}");
+    }
+    rig.keys(&ladder());
+    assert!(rig.screen(20, 5).contains("DEMO"));
+}

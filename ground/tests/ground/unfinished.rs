@@ -1,0 +1,229 @@
+//! What must not be forgotten: an abort that was not sent or not confirmed, and that people must keep away.
+
+use std::time::Duration;
+
+use ground::key::Key;
+use ground::model::{
+    Action, AlarmKind, CommandKind, Danger, KeepAway, Prompt, Role, Seat, Settings, Unfinished,
+};
+use ground::update::{Msg, Request};
+use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
+
+use crate::keys::ladder;
+use crate::rig::{Rig, settings};
+use crate::screens::counting;
+
+const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
+
+/// What was kept last.
+fn kept(rig: &Rig) -> Option<Unfinished> {
+    rig.actions.iter().rev().find_map(|action| match action {
+        Action::KeepUnfinished(kept) => Some(kept.clone()),
+        _ => None,
+    })
+}
+
+/// The vehicle has aborted on its pad.
+fn latched(rig: &mut Rig) {
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
+    rig.approach_wait_s = 58;
+    rig.run(1.0);
+}
+
+fn live(wait_s: u16) -> KeepAway {
+    KeepAway { danger: Danger::Live, wait_s: Some(wait_s) }
+}
+
+#[test]
+fn an_abort_and_its_wait_are_kept_until_it_is_confirmed_and_people_may_approach() {
+    let mut rig = counting();
+    assert_eq!(kept(&rig), None, "nothing is unfinished");
+    rig.abort();
+    rig.run(0.2);
+    let asked = kept(&rig).and_then(|kept| kept.abort).expect("it is not confirmed");
+    assert!(asked.contains("UTC"), "{asked}");
+    rig.answer(ABORT, 0);
+    latched(&mut rig);
+    assert_eq!(kept(&rig), Some(Unfinished { abort: None, away: Some(live(58)) }));
+    rig.actions.clear();
+    for _ in 0..10 {
+        rig.approach_wait_s -= 1;
+        rig.run(1.0);
+    }
+    assert_eq!(kept(&rig).map(|kept| kept.away), None, "a time that passes is not kept anew");
+    rig.approach_wait_s = 0;
+    rig.run(0.2);
+    let waited = KeepAway { danger: Danger::LiveWaited, wait_s: Some(0) };
+    assert_eq!(kept(&rig).and_then(|kept| kept.away), Some(waited));
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(0.2);
+    assert_eq!(kept(&rig), Some(Unfinished::default()));
+}
+
+#[test]
+fn an_abort_that_was_refused_for_good_is_not_kept() {
+    let mut rig = counting();
+    rig.abort();
+    rig.run(0.2);
+    assert!(kept(&rig).is_some_and(|kept| kept.abort.is_some()));
+    rig.answer(ABORT, 4);
+    rig.run(0.2);
+    assert_eq!(kept(&rig), Some(Unfinished::default()));
+}
+
+#[test]
+fn a_demonstration_and_an_attached_screen_keep_nothing() {
+    for change in [
+        |settings: &mut Settings| settings.demonstration = true,
+        |settings: &mut Settings| settings.role = Role::Attached,
+    ] {
+        let mut settings = settings(false, true);
+        change(&mut settings);
+        let mut rig = Rig::new(settings);
+        latched(&mut rig);
+        assert_eq!(kept(&rig), None);
+    }
+}
+
+/// The station was quit during the wait, and vehicle and station were switched on again.
+#[test]
+fn a_station_that_is_started_again_goes_on_with_the_wait_and_then_asks_for_the_pin() {
+    let mut rig = Rig::new(settings(false, true));
+    let before = Unfinished { abort: None, away: Some(live(57)) }.after(5);
+    rig.msg(Msg::Unfinished(Box::new(before)));
+    let screen = |rig: &Rig| rig.screen(80, 24);
+    assert!(screen(&rig).contains("do not approach for 52 s: LIVE MOTOR"), "unheard: {}", screen(&rig));
+    rig.run(2.0);
+    assert!(screen(&rig).contains("do not approach for 50 s: LIVE MOTOR"), "{}", screen(&rig));
+    rig.keys(&ladder());
+    assert_eq!(rig.take_commands(), []);
+    assert!(rig.events().contains("cannot arm: do not approach for 5"), "{}", rig.events());
+    rig.run(52.0);
+    assert!(screen(&rig).contains("one person: pin in: the motor is LIVE"), "{}", screen(&rig));
+    // It is kept for the next start, too.
+    assert_eq!(kept(&rig).and_then(|kept| kept.away).map(|away| away.danger), Some(Danger::LiveWaited));
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(1.0);
+    rig.motor = TdMotor::TD_MOTOR_LIVE;
+    rig.run(1.0);
+    assert!(!screen(&rig).contains("one person"), "{}", screen(&rig));
+    assert_eq!(kept(&rig), Some(Unfinished::default()));
+}
+
+/// A motor that was burnt out is no live one.
+#[test]
+fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
+    let mut rig = Rig::new(settings(false, true));
+    let hot = KeepAway { danger: Danger::Hot, wait_s: Some(20) };
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, away: Some(hot) })));
+    rig.run(2.0);
+    assert!(rig.screen(80, 24).contains("do not approach for 18 s: MOTOR HOT"), "{}", rig.screen(80, 24));
+    rig.run(20.0);
+    let screen = rig.screen(80, 24);
+    assert!(!screen.contains("approach") && !screen.contains("pin in"), "{screen}");
+}
+
+#[test]
+fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
+    let mut rig = Rig::new(settings(false, true));
+    let asked = Some("12:03:05 UTC (screen 2, Ann)".to_owned());
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked.clone(), away: None })));
+    rig.run(1.0);
+    let words = "ABORT asked at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
+    assert!(rig.screen(120, 36).contains(words), "{}", rig.screen(120, 36));
+    assert!(rig.events().contains("an ABORT was asked for at 12:03:05 UTC (screen 2, Ann)"));
+    assert!(rig.take_commands().is_empty(), "nothing is sent by itself");
+    // It ends when somebody has seen it, or with another abort.
+    rig.key(Key::Char(' '));
+    rig.run(0.2);
+    let is_open =
+        |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.kind == AlarmKind::AbortBefore);
+    assert!(!is_open(&rig));
+    assert_eq!(kept(&rig), Some(Unfinished::default()));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked, away: None })));
+    rig.run(0.1);
+    assert!(is_open(&rig));
+    rig.abort();
+    rig.run(0.2);
+    rig.key(Key::Char(' '));
+    assert!(!is_open(&rig));
+}
+
+/// Whoever ends the station takes the words away.
+#[test]
+fn quitting_takes_the_word_while_people_must_keep_away() {
+    for key in ['q', 'Q'] {
+        let mut rig = counting();
+        latched(&mut rig);
+        rig.key(Key::Char(key));
+        rig.run(0.2);
+        assert_eq!(rig.model.dialog.as_ref().map(|dialog| dialog.prompt), Some(Prompt::Quit), "{key}");
+        assert!(rig.screen(80, 24).contains("people must keep away, DO NOT APPROACH"), "{key}");
+        assert!(!rig.wants_to_quit());
+        rig.keys(&[crate::rig::typed("QUIT"), vec![Key::Enter]].concat());
+        assert!(rig.actions.contains(&Action::LeaveScreen) && !rig.wants_to_quit(), "the station goes on");
+    }
+    let mut rig = counting();
+    rig.model.settings.demonstration = true;
+    latched(&mut rig);
+    rig.key(Key::Char('q'));
+    rig.run(0.2);
+    assert!(rig.wants_to_quit(), "nobody stands near the vehicle of a demonstration");
+}
+
+/// An attached screen whose station hangs.
+fn hung() -> Rig {
+    let mut rig = Rig::new(Settings { role: Role::Attached, ..settings(false, true) });
+    rig.run(2.0);
+    rig.model.history_ends();
+    rig.run(1.0);
+    rig
+}
+
+fn hangs(rig: &mut Rig, seconds: u64) {
+    for _ in 0..10 * seconds {
+        rig.now += Duration::from_millis(100);
+        rig.msg(Msg::ScreenTick);
+    }
+}
+
+/// What the run loop notes when the station's socket has taken the request.
+fn asks(rig: &mut Rig) {
+    rig.actions.clear();
+    rig.abort();
+    assert!(rig.actions.contains(&Action::Request(Request::Command(CommandKind::Abort))));
+    rig.model.link.abort_asked_at = Some(rig.now);
+}
+
+#[test]
+fn an_abort_that_a_hung_station_has_not_sent_is_the_largest_word_of_every_page() {
+    let mut before = hung();
+    hangs(&mut before, 3);
+    assert!(before.screen(80, 24).contains("abort now: NOT SENT while the station hangs"));
+    asks(&mut before);
+    // It may be asked for before the silence is long enough to be one.
+    let mut after = hung();
+    asks(&mut after);
+    assert!(after.screen(80, 24).contains("ABORT asked, not yet taken by the station"));
+    hangs(&mut after, 3);
+    for mut rig in [before, after] {
+        for digit in "123456789".chars() {
+            rig.key(Key::Char(digit));
+            let screen = rig.screen(80, 24);
+            let words = " ABORT NOT SENT: the station hangs; it sends it when it goes on";
+            assert!(screen.lines().nth(2).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
+            assert!(screen.lines().nth(3).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
+            assert!(screen.lines().nth(4).is_some_and(|row| row.contains('▀')), "{digit} large: {screen}");
+        }
+        hangs(&mut rig, 1);
+        assert!(rig.screen(120, 36).contains("ALARM ABORT NOT SENT: the station hangs"));
+        // The station goes on, and takes it.
+        rig.run(0.1);
+        rig.msg(Msg::command(CommandKind::Abort, Seat::new(2, "Ann")));
+        rig.run(0.1);
+        let screen = rig.screen(80, 24);
+        assert!(!screen.contains(" ABORT NOT SENT: the station hangs; it sends"), "{screen}");
+        assert!(screen.contains(" ABORT x") || screen.contains(" ABORT  commanded"), "{screen}");
+    }
+}

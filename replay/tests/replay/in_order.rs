@@ -1,0 +1,81 @@
+//! Tests logs whose messages are not in order of time, which MCAP allows: they are called that, and can be sorted.
+
+use std::path::Path;
+
+use replay::info::info;
+use replay::recover::recover;
+use replay::verify::{Verification, verify, verify_strictly};
+
+use crate::command_line::{replay, run};
+use crate::flown::only;
+use crate::from_apogee::LANDED;
+use crate::simulated::{MK2, WITH_FRAMES};
+use crate::tampered::Held;
+
+/// The orders that other programs write: one topic after the other, from either end, and a later part first.
+fn in_other_orders(held: &Held) -> [Held; 3] {
+    let (mut by_topic, mut from_z, mut second_half_first) = (held.clone(), held.clone(), held.clone());
+    by_topic.messages.sort_by(|a, b| a.topic.cmp(&b.topic));
+    from_z.messages.sort_by(|a, b| b.topic.cmp(&a.topic));
+    let half = held.messages.len() / 2;
+    second_half_first.messages.rotate_left(half);
+    [by_topic, from_z, second_half_first]
+}
+
+fn assert_refused_as_unordered(log: &Path, directory: &Path) {
+    let (page, csv) = (directory.join("page.html"), directory.join("csv"));
+    let [page, csv] = [&page, &csv].map(|path| path.to_str().unwrap());
+    let questions: [&[&str]; 6] = [
+        &["info"],
+        &["verify", "--strict"],
+        &["evaluate"],
+        &["refly"],
+        &["report", "--output", page],
+        &["export", "--to", "csv", "--output", csv],
+    ];
+    for question in questions {
+        let (code, stdout, stderr) = run(replay(question[0], log).args(&question[1..]));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{question:?}: {stderr}");
+        let words = ["is not in order of time", "`replay recover` sorts it"];
+        assert!(words.iter().all(|words| stderr.contains(words)), "{question:?}: {stderr}");
+    }
+}
+
+#[test]
+fn a_log_in_another_order_is_called_that_and_is_whole_again_once_sorted() {
+    let directory = tempfile::tempdir().unwrap();
+    let [log, sorted] = ["log.mcap", "sorted.mcap"].map(|name| directory.path().join(name));
+    for original in [&MK2.log, &LANDED.log, &WITH_FRAMES.log] {
+        let held = Held::read(original);
+        for other in in_other_orders(&held) {
+            other.write(&log);
+            assert_refused_as_unordered(&log, directory.path());
+            let recovery = recover(&log, &sorted).unwrap();
+            assert!(recovery.sorted && recovery.was_whole(), "{recovery:?}");
+            let again = Held::read(&sorted);
+            assert!(again.messages.is_sorted_by_key(|message| message.log_time_ns));
+            assert_eq!(again.facts(), held.facts());
+            let complete = |log| info(log).unwrap().completeness.complete;
+            assert_eq!(complete(&sorted), complete(original), "{original:?}");
+            assert_eq!(only(verify(&sorted).unwrap()).outcome, Verification::Identical);
+            let strictly = |log| only(verify_strictly(log).unwrap()).is_all_compared();
+            assert_eq!(strictly(&sorted), strictly(original));
+            std::fs::remove_file(&sorted).unwrap();
+        }
+    }
+}
+
+/// Writers of several threads swap records, which changes nothing.
+#[test]
+fn records_that_come_a_little_late_are_no_other_order() {
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("log.mcap");
+    let mut held = Held::read(&LANDED.log);
+    let late = held.messages.iter().position(|message| message.topic == "/events").unwrap();
+    let behind = (late + 20).min(held.messages.len() - 1);
+    held.messages[late..=behind].rotate_left(1);
+    held.write(&log);
+    assert_eq!(only(verify(&log).unwrap()).outcome, Verification::Identical);
+    let recovery = recover(&log, &directory.path().join("again.mcap")).unwrap();
+    assert!(!recovery.sorted && recovery.was_whole(), "{recovery:?}");
+}
