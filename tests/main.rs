@@ -17,6 +17,7 @@ mod outside_clients;
 mod pad_check;
 mod pages;
 mod pages_run;
+mod pin;
 mod rocket;
 mod signed;
 mod terminal;

@@ -57,6 +57,7 @@ impl DemoOptions {
 /// A running simulator.
 pub struct Demo {
     stop: watch::Sender<bool>,
+    pin_out: watch::Sender<bool>,
     ended: Option<oneshot::Receiver<Option<String>>>,
     thread: JoinHandle<()>,
 }
@@ -72,6 +73,7 @@ impl Demo {
         recorder: Option<Recorder>,
         log_clock: LogClock,
     ) -> io::Result<Self> {
+        let (pin_out, pin) = watch::channel(true);
         let fly_options = FlyOptions {
             flight: options.flight.clone(),
             system_id: options.system_id,
@@ -84,6 +86,8 @@ impl Demo {
             auto_start: false,
             exit_when_safed: false,
             board: None,
+            pin_out: Some(pin),
+            abort_file: None,
             log_clock: Some(log_clock),
         };
         let (stop, stopped) = watch::channel(false);
@@ -94,7 +98,13 @@ impl Demo {
             // Fails only if the ground station itself has ended.
             let _ = tell.send(failure.map(|error| error.to_string()));
         })?;
-        Ok(Self { stop, ended: Some(ended), thread })
+        Ok(Self { stop, pin_out, ended: Some(ended), thread })
+    }
+
+    /// Moves the pin, as a person at the vehicle does.
+    pub fn move_pin(&self, out: bool) {
+        // Fails only if it has already ended.
+        let _ = self.pin_out.send(out);
     }
 
     /// Waits until the simulator ends by itself and returns why, if it failed. After that it waits for ever.

@@ -47,6 +47,8 @@ fn start_vehicle(
         auto_start: true,
         exit_when_safed: true,
         board: None,
+        pin_out: None,
+        abort_file: None,
         log_clock: None,
     };
     let fly = move || -> Result<(), Failure> {

@@ -80,6 +80,10 @@ impl RecordedComputer {
         } else {
             (computer, None)
         };
+        let computer = match start.aborted_before_s {
+            Some(at_s) => computer.aborted_before(at_s),
+            None => computer,
+        };
         Self { computer, next, rehearsed: false }
     }
 

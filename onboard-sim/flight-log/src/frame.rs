@@ -57,6 +57,7 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         rail_m: mission.launched().map(|launch| launch.rail.foot_m().to_log()),
         released,
+        aborted_before_s: computer.mode().aborted_before_s,
     }
 }
 

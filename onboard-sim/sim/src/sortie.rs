@@ -131,6 +131,12 @@ impl Sortie {
         Self { rehearsal: None, ..self }
     }
 
+    /// The same flight of a vehicle that was aborted on its pad in an earlier power-up, at this vehicle time, s: before zero.
+    #[must_use]
+    pub fn aborted_before(self, at_s: f64) -> Self {
+        Self { computer: self.computer.aborted_before(at_s), ..self }
+    }
+
     /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
         let drawn = falling_as(mission, drawn)?;

@@ -1,6 +1,6 @@
 //! `onboard-sim fly`: one flight, over MAVLink links or without them.
 
-use std::io::Write as _;
+use std::io::{BufRead as _, Write as _};
 use std::num::{NonZeroU16, NonZeroU32};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -13,6 +13,9 @@ use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDG
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
 use protocol::transport::LinkAddress;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::getpgrp;
+use rustix::termios::tcgetpgrp;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::{TimedFault, how_to_write};
 use simulated_vehicle::fly::{
@@ -42,6 +45,11 @@ fn log_choice(given: &str) -> Result<LogChoice, String> {
 }
 
 #[derive(Args)]
+#[command(
+    after_help = "With --mavlink, type `pin in` or `pin out` and Enter: the pin that a crew moves by hand. It is out at first.\n\
+    An abort on the pad is kept beside FILE of --uid-file, else of --key, else of --log (FILE.aborted): switched off and on, the\n\
+    vehicle refuses arming until 60 s have passed, and asks for the pin."
+)]
 pub(crate) struct FlyArguments {
     /// Built-in mission or TOML file.
     #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
@@ -170,6 +178,14 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         network_bytes_s: arguments.network_budget,
         serial_bytes_s: arguments.serial_budget,
     };
+    let moved_by_hand = !arguments.auto && !arguments.mavlink.is_empty();
+    // Beside the first of these that the vehicle has: they make it the same vehicle when it is switched on again.
+    let log = match &arguments.log {
+        Some(LogChoice::File(path)) => Some(path),
+        None | Some(LogChoice::None) => None,
+    };
+    let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
+    let abort_file = own.map(|file| file.with_added_extension("aborted"));
     let options = FlyOptions {
         on_the_wire,
         flight,
@@ -182,6 +198,8 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         speed: arguments.speed,
         exit_when_safed: !arguments.stay,
         board: arguments.board,
+        pin_out: moved_by_hand.then(pin_as_typed).transpose()?,
+        abort_file,
         log_clock: None,
     };
     let (stop, stopped) = watch::channel(false);
@@ -257,6 +275,43 @@ fn kept_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
             Ok(drawn)
         }
         Err(why) => Err(why).with_context(|| format!("{name} cannot be read")),
+    }
+}
+
+/// Receives where the pin is, as somebody types it at this program.
+fn pin_as_typed() -> std::io::Result<watch::Receiver<bool>> {
+    let (pin, moved) = watch::channel(true);
+    std::thread::Builder::new().name("pin".to_owned()).spawn(move || read_pin(&pin))?;
+    Ok(moved)
+}
+
+/// Until the end of standard input. That of a background job is left alone: reading it would stop the job.
+fn read_pin(pin: &watch::Sender<bool>) {
+    let stdin = std::io::stdin();
+    let mut typed = Vec::new();
+    loop {
+        // Fails only for a signal.
+        let _ = poll(&mut [PollFd::new(&stdin, PollFlags::IN)], None);
+        if tcgetpgrp(&stdin).is_ok_and(|front| front != getpgrp()) {
+            let _ = poll(&mut [], Some(&Timespec { tv_sec: 1, tv_nsec: 0 }));
+            continue;
+        }
+        let mut input = stdin.lock();
+        let Ok(chunk @ [_, ..]) = input.fill_buf() else { return };
+        typed.extend_from_slice(chunk);
+        let length = chunk.len();
+        input.consume(length);
+        while let Some(end) = typed.iter().position(|byte| *byte == b'\n') {
+            let line: Vec<u8> = typed.drain(..=end).collect();
+            let words = String::from_utf8_lossy(&line).to_lowercase();
+            match words.split_whitespace().collect::<Vec<_>>()[..] {
+                ["pin", "in"] => _ = pin.send(false),
+                ["pin", "out"] => _ = pin.send(true),
+                _ => _ = writeln!(std::io::stdout(), "type `pin in` or `pin out`, and Enter"),
+            }
+        }
+        // No line is so long.
+        typed.truncate(100);
     }
 }
 

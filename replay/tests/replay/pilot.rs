@@ -90,6 +90,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         fixed_ignition_height_m: mission.ignition.fixed_height_m,
         gyro_bias_rad_s: None,
         rail_m: None,
+        aborted_before_s: None,
     };
     Fall { start, frames }
 });

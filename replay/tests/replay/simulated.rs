@@ -64,6 +64,8 @@ pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simul
         auto_start: true,
         exit_when_safed: true,
         board: None,
+        pin_out: None,
+        abort_file: None,
         log_clock: None,
         key_file: None,
         crew: None,

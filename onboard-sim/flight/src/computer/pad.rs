@@ -267,6 +267,7 @@ impl Computer {
         let input = ArmingInput {
             pin_out: locks.pin_out,
             abort_latched: locks.abort_latched,
+            pad_wait_s: self.table.mode().pad_wait_remaining_s(self.table.time_s()),
             tilt_rad: stance.tilt_rad,
             rotation_rad_s: stance.rotation_rad_s,
             speed_m_s: stance.speed_m_s,

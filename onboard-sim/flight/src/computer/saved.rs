@@ -154,6 +154,7 @@ impl Computer {
         let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = saved.mode.interlocks;
         let mut mode = Mode::power_up(time_s);
         mode.interlocks = Interlocks { landing_motor_inhibited, abort_latched, ..mode.interlocks };
+        mode.aborted_before_s = saved.mode.aborted_before_s;
         self.table.go_on(mode, saved.latch);
         let (severity, words) = if armed {
             (Severity::Warning, "the flight computer has restarted: DISARMED")
@@ -215,6 +216,14 @@ impl Computer {
             release: None,
             level: ControlLevel::Idle,
         }
+    }
+
+    /// The same computer if the vehicle was aborted on its pad in an earlier power-up, at this vehicle time, s: before zero.
+    #[must_use]
+    pub fn aborted_before(mut self, at_s: f64) -> Self {
+        let mode = Mode { aborted_before_s: Some(at_s), ..*self.table.mode() };
+        self.table.go_on(mode, self.table.latch());
+        self
     }
 
     /// The same computer after it has found its state and the bias of its gyro, body, rad/s, on its rail.

@@ -43,6 +43,8 @@ pub struct ArmingInput {
     /// The physical pin has been pulled.
     pub pin_out: bool,
     pub abort_latched: bool,
+    /// Time until the pad may be approached after an abort, also of an earlier power-up, s.
+    pub pad_wait_s: Option<f64>,
     /// Tilt from the vertical, rad.
     pub tilt_rad: f64,
     /// Rotation rate, rad/s.
@@ -82,7 +84,15 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
     let mut checks = vec![
-        Check::condition("abort latch", !input.abort_latched, "clear", "latched: restart to clear it"),
+        Check::condition(
+            "abort latch",
+            !input.abort_latched && input.pad_wait_s.is_none(),
+            "clear",
+            &match input.pad_wait_s.filter(|_| !input.abort_latched) {
+                Some(wait_s) => format!("keep away for {wait_s:.0} s"),
+                None => "latched: restart to clear it".to_owned(),
+            },
+        ),
         Check::condition("pin", input.pin_out, "out", "in"),
         Check::condition(
             "self-test",
@@ -246,6 +256,7 @@ mod tests {
         ArmingInput {
             pin_out: true,
             abort_latched: false,
+            pad_wait_s: None,
             tilt_rad: 0.01,
             rotation_rad_s: 0.0,
             speed_m_s: 0.0,
@@ -281,9 +292,12 @@ mod tests {
 
     #[test]
     fn each_check_alone_refuses_and_reports_its_name_and_value() {
-        let spoilings: [Spoiling; 22] = [
+        let spoilings: [Spoiling; 23] = [
             ("abort latch: found latched", |input| {
                 input.abort_latched = true;
+            }),
+            ("abort latch: found keep away for 43 s", |input| {
+                input.pad_wait_s = Some(43.2);
             }),
             ("pin: found in, required out", |input| {
                 input.pin_out = false;

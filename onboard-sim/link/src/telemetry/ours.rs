@@ -6,7 +6,7 @@ use flight::computer::findings::Findings;
 use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
 use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::operator::{Operator, Role};
-use flight::rules::phase::{HoldCause, Interlocks, Latch, MotorStatus, Phase};
+use flight::rules::phase::{HoldCause, Latch, Mode, MotorStatus, Phase};
 use flight::rules::two_person::Act;
 use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::StartPoint;
@@ -33,7 +33,7 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
     MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
         time_boot_ms: boot_ms(time_s),
         countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
-        interlocks: interlocks(mode.interlocks),
+        interlocks: interlocks(mode),
         checks_failed: TdCheck::from_bits_truncate(state.checks_failed()),
         approach_wait_s: mode.approach_wait_s(time_s).map_or(u16::MAX, |s| libm::ceil(s) as u16),
         motor: td_motor(mode.motor_status(time_s)),
@@ -74,13 +74,15 @@ fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
     }
 }
 
-fn interlocks(locks: Interlocks) -> TdInterlock {
+fn interlocks(mode: &Mode) -> TdInterlock {
+    let locks = mode.interlocks;
     let mut bits = TdInterlock::empty();
     bits.set(TdInterlock::TD_INTERLOCK_PIN_OUT, locks.pin_out);
     bits.set(TdInterlock::TD_INTERLOCK_ARMED, locks.armed);
     bits.set(TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED, locks.landing_motor_inhibited);
     bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
     bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
+    bits.set(TdInterlock::TD_INTERLOCK_PIN_DUE, mode.aborted_before_s.is_some());
     bits
 }
 

@@ -1,6 +1,7 @@
 //! The run loop: a vehicle, its clock, its links and its log.
 
 mod board;
+mod kept_abort;
 mod links;
 mod load;
 mod pace;
@@ -12,6 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use ::board::stream::OnTheAir;
 use flight::computer::FRAME_S;
+use flight::computer::news::Severity;
 use flight::rules::phase::Phase;
 pub use flight::vehicle::mission::StartPoint;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
@@ -24,6 +26,7 @@ use tokio::sync::watch;
 
 use self::board::OnBoard;
 pub use self::board::{BoardError, OnTheWire};
+use self::kept_abort::KeptAbort;
 pub(crate) use self::links::Delayed;
 use self::links::{Links, Received, operators_of, people_of};
 use self::load::OwnStart;
@@ -85,6 +88,10 @@ pub struct FlyOptions {
     /// Folder with the pipes of a board whose flight computer decides every frame, too, and that hears the crew on its own
     /// radio; then there are no links and no start by itself.
     pub board: Option<PathBuf>,
+    /// Where the pin is, each time that somebody moves it; it is out at first.
+    pub pin_out: Option<watch::Receiver<bool>>,
+    /// Keeps an abort on the pad through a power cycle.
+    pub abort_file: Option<PathBuf>,
     /// Receives the vehicle's time every frame, for other writers of the same log.
     pub log_clock: Option<LogClock>,
 }
@@ -229,6 +236,18 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
     Ok(vehicle)
 }
 
+/// Moves the pin as it was asked, and says why not: nobody reaches it in flight.
+fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) -> Option<&'static str> {
+    let pin_out = pin_out.filter(|pin| pin.has_changed().unwrap_or(false))?;
+    let out = *pin_out.borrow_and_update();
+    let on_the_ground =
+        vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed);
+    if on_the_ground {
+        vehicle.set_pin_out(out);
+    }
+    (!on_the_ground).then_some("the pin was not moved: nobody reaches it in flight")
+}
+
 fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
     let recipe = &options.flight.recipe;
     let on_the_air = OnTheAir {
@@ -262,11 +281,15 @@ fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> Flig
 /// # Errors
 /// The flight cannot be simulated, or a link cannot be opened.
 pub async fn fly_observed(
-    options: FlyOptions,
+    mut options: FlyOptions,
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
     let mut vehicle = vehicle_of(&options)?;
+    let (mut kept_abort, aborted_s_ago) = KeptAbort::open(options.abort_file.take());
+    if let Some(ago_s) = aborted_s_ago {
+        vehicle = vehicle.aborted_before(-ago_s);
+    }
     let mut links = Links::open(
         &options.links,
         options.key_file.as_deref(),
@@ -290,6 +313,12 @@ pub async fn fly_observed(
         if vehicle.time_s() >= log_state_due_s {
             vehicle.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
+        }
+        if let Some(words) = move_pin(options.pin_out.as_mut(), &mut vehicle) {
+            observe(
+                vehicle.time_s(),
+                &VehicleEvent::Text { severity: Severity::Warning, text: words.into() },
+            );
         }
         let arrived = links.receive(vehicle.time_s());
         for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
@@ -320,6 +349,11 @@ pub async fn fly_observed(
         if let Some(recorder) = &options.recorder {
             record(recorder, &vehicle, &events);
             offer.step(recorder, &vehicle, &mut endpoint);
+        }
+        if let Err(why) = kept_abort.keep(&vehicle) {
+            let text = format!("a power cycle forgets the wait: it cannot be written: {why}");
+            note(options.recorder.as_ref(), time_s, &text);
+            observe(time_s, &VehicleEvent::Text { severity: Severity::Error, text });
         }
         let leaving = endpoint.poll(&vehicle.state());
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {

@@ -131,6 +131,12 @@ impl Vehicle {
         Self { people: Some(people), operators, ..self }
     }
 
+    /// Sets when it was aborted on its pad before this power-up, vehicle time, s: before zero.
+    #[must_use]
+    pub fn aborted_before(self, at_s: f64) -> Self {
+        Self { sortie: self.sortie.aborted_before(at_s), ..self }
+    }
+
     /// Which mission it flies.
     pub fn mission(&self) -> &MissionName {
         &self.mission

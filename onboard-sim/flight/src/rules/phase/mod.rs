@@ -160,6 +160,9 @@ pub struct Mode {
     pub hold: Option<Hold>,
     /// The state of the landing motor.
     pub motor: Motor,
+    /// When an abort on the pad of an earlier power-up was, vehicle time, s: before zero. Nobody approaches and nothing arms before
+    /// its wait is over, and the pin is due until it was put in and is pulled again.
+    pub aborted_before_s: Option<f64>,
 }
 
 impl Mode {
@@ -172,6 +175,7 @@ impl Mode {
             countdown_end_s: None,
             hold: None,
             motor: Motor::Unlit,
+            aborted_before_s: None,
         }
     }
 
@@ -186,6 +190,7 @@ impl Mode {
                 Motor::BurntOut { at_s } => Motor::BurntOut { at_s: at_s + ahead_s },
                 motor => motor,
             },
+            aborted_before_s: self.aborted_before_s.map(|at_s| at_s + ahead_s),
             ..*self
         }
     }
@@ -197,11 +202,20 @@ impl Mode {
 
     /// Time until the pad may be approached after an abort there, s; `None` unless that wait is running.
     pub fn pad_wait_remaining_s(&self, time_s: f64) -> Option<f64> {
-        if !(self.interlocks.abort_latched && self.phase.on_pad()) {
-            return None;
-        }
-        let remaining_s = self.entered_at_s + PAD_ABORT_WAIT_S - time_s;
+        let remaining_s = self.aborted_on_the_pad_s()? + PAD_ABORT_WAIT_S - time_s;
         (remaining_s > 0.0).then_some(remaining_s)
+    }
+
+    /// When it was aborted on the pad, in this power-up or before it, vehicle time, s.
+    fn aborted_on_the_pad_s(&self) -> Option<f64> {
+        let now_s = (self.interlocks.abort_latched && self.phase.on_pad()).then_some(self.entered_at_s);
+        now_s.or(self.aborted_before_s)
+    }
+
+    /// The abort that a power cycle must not wipe out: until its wait is over and the pin is in. When it was, vehicle time, s.
+    pub fn abort_to_keep_s(&self, time_s: f64) -> Option<f64> {
+        let is_over = self.pad_wait_remaining_s(time_s).is_none() && !self.interlocks.pin_out;
+        self.aborted_on_the_pad_s().filter(|_| !is_over)
     }
 }
 

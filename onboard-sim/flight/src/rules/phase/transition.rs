@@ -64,7 +64,11 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::SelfTestPassed) => wrong("pass the self-test", "only SAFE waits for it"),
 
         (P::Safe | P::PadIdle | P::PadArmed, E::PinPulled) => {
-            Row::Go(latch(Interlocks { pin_out: true, ..locks }), phase, Effects::NONE)
+            // A pin that is out at power-up was not put in after the wait.
+            let was_in = phase == P::PadIdle && mode.pad_wait_remaining_s(time_s).is_none();
+            let aborted_before_s = mode.aborted_before_s.filter(|_| !was_in);
+            let pulled = Mode { aborted_before_s, ..latch(Interlocks { pin_out: true, ..locks }) };
+            Row::Go(pulled, phase, Effects::NONE)
         }
         (P::Safe | P::PadIdle, E::PinInserted) => {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)

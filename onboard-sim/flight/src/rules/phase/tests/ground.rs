@@ -320,3 +320,32 @@ proptest! {
         }
     }
 }
+
+/// An abort 20 s before a power-up with the pin out, and in.
+#[test]
+fn an_abort_before_the_power_up_keeps_people_away_and_the_pin_due_until_it_was_put_in() {
+    let mut mode = Mode { aborted_before_s: Some(-20.0), ..Mode::power_up(0.0) };
+    let mut happen = |event, time_s| {
+        let answer = transition(&mode, event, time_s);
+        assert_eq!(answer.refusal, None, "{event:?}");
+        mode = answer.mode;
+        (mode.approach_wait_s(time_s), mode.abort_to_keep_s(time_s), mode.aborted_before_s)
+    };
+    let (kept, due) = (Some(-20.0), Some(-20.0));
+    assert_eq!(happen(Event::PinPulled, 0.0), (Some(40.0), kept, due), "it was out at power-up");
+    assert_eq!(happen(Event::SelfTestPassed, 2.0), (Some(38.0), kept, due));
+    // Put in too soon, and pulled too soon.
+    assert_eq!(happen(Event::PinInserted, 10.0), (Some(30.0), kept, due));
+    assert_eq!(happen(Event::PinPulled, 39.0), (Some(1.0), kept, due));
+    assert_eq!(happen(Event::PinInserted, 41.0), (Some(0.0), None, due), "a power cycle forgets it now");
+    assert_eq!(happen(Event::PinPulled, 50.0), (Some(0.0), None, None));
+}
+
+#[test]
+fn an_abort_on_the_pad_is_kept_until_its_wait_is_over_and_the_pin_is_in() {
+    let aborted = transition(&in_order(Phase::PadArmed), ABORT, 100.0).mode;
+    assert_eq!(aborted.abort_to_keep_s(500.0), Some(100.0));
+    let pinned = transition(&aborted, Event::PinInserted, 120.0).mode;
+    assert_eq!((pinned.abort_to_keep_s(159.0), pinned.abort_to_keep_s(160.0)), (Some(100.0), None));
+    assert_eq!(in_order(Phase::PadIdle).abort_to_keep_s(1.0), None);
+}

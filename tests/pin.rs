@@ -1,0 +1,94 @@
+//! The pin of a simulated vehicle, which somebody moves by hand, and an abort on the pad that outlives the power switch.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::ChildStdin;
+
+use e2e::{ABORT, ACCEPTED, ARM, BareGround, Bound, Program, Running, Signal, Terminal, program, vehicle};
+use protocol::dialect::{TdInterlock, TdMotor, TdPhase};
+
+const SIZE: (u16, u16) = (120, 30);
+
+fn type_line(input: &mut ChildStdin, words: &str) {
+    writeln!(input, "{words}").expect("a program that reads its input");
+}
+
+/// A flight that ends under its parachute with a motor that was not lit; in the air, and after it, its time runs faster.
+#[test]
+fn a_crew_practises_from_the_start_to_may_be_approached_with_the_pin_in_its_hand() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = program(Program::Ground);
+    command.args(["--connect", "udpin:127.0.0.1:0", "--log", "none"]).current_dir(folder.path());
+    command.envs([("XDG_RUNTIME_DIR", folder.path()), ("XDG_CONFIG_HOME", folder.path())]);
+    let mut screen = Terminal::start(&command, SIZE, false);
+    let link = format!("udpout:127.0.0.1:{}", screen.bound_port(Bound::Udp));
+    let mut command = vehicle(folder.path(), &[&link]);
+    command.args(["--stay", "--profile", "mk2", "--start", "pad", "--dispersion", "none"]);
+    command.args(["--speed", "8", "--fault", "abort@descent"]);
+    let (mut hand, mut vehicle) = Running::start_with_input(&mut command);
+    screen.wait_for("every arming check passes");
+    type_line(&mut hand, "pin  IN");
+    screen.wait_for("pin");
+    screen.wait_until("no GO with the pin in", |window| window.shows("NO-GO: ").then_some(()));
+    type_line(&mut hand, "pull the pin");
+    vehicle.wait_for_line("type `pin in` or `pin out`");
+    type_line(&mut hand, "pin out");
+    screen.wait_for("every arming check passes");
+    screen.type_until(b"0AARM\r", " ARMED ");
+    screen.type_until(b"0SSTART\r", "START  commanded");
+    screen.wait_for("do not approach for");
+    screen.wait_for("one person: pin in");
+    type_line(&mut hand, "pin in");
+    screen.wait_for("may be approached: the pin is in");
+    vehicle.wait_for_line("TOUCHDOWN to SAFED");
+}
+
+/// The vehicle of this folder, switched on.
+fn switched_on(folder: &Path, ground: &BareGround) -> (ChildStdin, Running) {
+    Running::start_with_input(vehicle(folder, &[&ground.link()]).args(["--stay", "--dispersion", "none"]))
+}
+
+fn is_due(interlocks: TdInterlock) -> bool {
+    interlocks.contains(TdInterlock::TD_INTERLOCK_PIN_DUE)
+}
+
+#[test]
+fn a_wait_on_the_pad_goes_on_while_the_vehicle_is_off_and_the_pin_is_due_until_it_was_put_in() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kept = folder.path().join("vehicle.mcap.aborted");
+    let mut ground = BareGround::new();
+    let (_hand, vehicle) = switched_on(folder.path(), &ground);
+    ground.wait_until_ready();
+    assert_eq!(ground.command(ABORT, 1.0), ACCEPTED);
+    ground.wait_for_status("the latch", |status| status.approach_wait_s > 0);
+    vehicle.signal(Signal::SIGKILL);
+    vehicle.wait();
+
+    // Off and on.
+    let mut ground = BareGround::new();
+    let (_hand, mut vehicle) = switched_on(folder.path(), &ground);
+    vehicle.wait_for_line("not ready: abort latch: found keep away for");
+    let status = ground.wait_for_status("the wait", |status| status.phase == TdPhase::TD_PHASE_PAD_IDLE);
+    assert!(is_due(status.interlocks) && (1..60).contains(&status.approach_wait_s), "{status:?}");
+    assert_ne!(ground.command(ARM, 1.0), ACCEPTED);
+    vehicle.wait_for_line("arm refused: abort latch: found keep away for");
+    vehicle.signal(Signal::SIGKILL);
+    vehicle.wait();
+
+    // The minute has passed.
+    let at_s: f64 = std::fs::read_to_string(&kept).expect("the abort").trim().parse().expect("a time");
+    std::fs::write(&kept, format!("{}", at_s - 61.0)).expect("a file");
+    let mut ground = BareGround::new();
+    let (mut hand, vehicle) = switched_on(folder.path(), &ground);
+    ground.wait_until_ready();
+    let status = ground.wait_for_status("no wait", |status| status.motor == TdMotor::TD_MOTOR_LIVE);
+    assert!(is_due(status.interlocks) && status.approach_wait_s == 0, "{status:?}");
+    type_line(&mut hand, "pin in");
+    ground.wait_for_status("the pin", |status| status.motor == TdMotor::TD_MOTOR_PIN_IN);
+    assert!(!kept.exists(), "whoever put the pin in has ended it");
+    type_line(&mut hand, "pin out");
+    ground.wait_for_status("a vehicle that is prepared", |status| !is_due(status.interlocks));
+    ground.wait_until_ready();
+    assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
+    vehicle.signal(Signal::SIGTERM);
+}
