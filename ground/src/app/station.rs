@@ -347,6 +347,7 @@ impl Station {
                 Action::ReplayFlight => self.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
                 Action::FetchLog => self.fetch_log(model, now),
+                Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
                 Action::Tell(request) => {

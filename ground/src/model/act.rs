@@ -45,6 +45,8 @@ pub enum Act {
     Report,
     /// Fetch the vehicle's own log.
     Download,
+    /// Move the pin of the demonstration's vehicle.
+    MovePin,
     /// Open the dialog that signs the chosen step of the checklist.
     SignStep,
     /// Open the dialog that takes the signature of the chosen step back.
@@ -73,7 +75,7 @@ const fn define(act: Act, name: &'static str, usual: char, words: &'static str) 
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 39] = [
+pub const DEFINITIONS: [Definition; 40] = [
     define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -115,6 +117,7 @@ pub const DEFINITIONS: [Definition; 39] = [
     define(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     define(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     define(Act::Download, "download", 'L', "fetch the vehicle's own log; disarmed on the ground"),
+    define(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
     define(Act::AskParameters, "ask", 'r', "ask the vehicle for its parameters again"),
     Definition { act: Act::Redraw, name: "redraw", usual: Key::CtrlL, words: "draw the screen again" },
     define(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
@@ -156,6 +159,10 @@ impl Act {
             Self::ReplayFlight => flown_here(model),
             Self::Report => commands && flown_here(model),
             Self::Download => commands && is_down(model),
+            Self::MovePin => {
+                let is_ours = model.settings.demonstration && model.settings.role == Role::Station;
+                is_ours && !model.vehicle.in_flight() && model.vehicle.interlocks().is_some()
+            }
             Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
             Self::Show(_)
             | Self::Hold

@@ -434,6 +434,8 @@ pub enum Action {
     WriteReport,
     /// Fetch the vehicle's own log.
     FetchLog,
+    /// Move the pin of the demonstration's vehicle: out, or in.
+    MovePin(bool),
     /// Enter this into the book.
     Enter(BookLine),
     /// Write the log to disk now.

@@ -270,8 +270,8 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
         TdPhase::TD_PHASE_PAD_ARMED => false,
         // Before a flight the motor is inhibited as planned.
         phase if is_on_pad(phase) => {
-            let latched = status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
-            latched || status.approach_wait_s > 0
+            let aborted = TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_PIN_DUE;
+            status.interlocks.intersects(aborted) || status.approach_wait_s > 0
         }
         _ => status.interlocks.intersects(amiss),
     }

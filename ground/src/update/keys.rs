@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdAct};
+use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdAct, TdInterlock};
 use protocol::log::record::EventLevel;
 
 use super::{Action, Request, commands, on_request, pad};
@@ -349,6 +349,19 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::ReplayFlight => update::replay_flight(model, now),
         Act::Report => update::write_report(model, now),
         Act::Download => update::fetch_log(model, now),
+        Act::MovePin if act.works(model, now) => {
+            let is_out = model
+                .vehicle
+                .interlocks()
+                .is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
+            model.info(now, if is_out { "somebody puts the pin in" } else { "somebody pulls the pin" });
+            model.outbox.push(Action::MovePin(!is_out));
+        }
+        Act::MovePin => {
+            let why =
+                "only a demonstration's pin is moved here, on the ground; `onboard-sim fly` takes `pin in`";
+            model.info(now, why);
+        }
         Act::SignStep => pad::open_sign_dialog(model, false, now),
         Act::VoidStep => pad::open_sign_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),

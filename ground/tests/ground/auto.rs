@@ -2,7 +2,9 @@
 
 use crate::rig::{Rig, is_arm, settings};
 use ground::exit::{Exit, decide};
+use ground::key::Key;
 use ground::model::Settings;
+use ground::update::Action;
 use protocol::dialect::{MavCmd, TdHold, TdPhase};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -166,4 +168,21 @@ fn the_automatic_mode_is_refused_with_a_live_vehicle() {
     half.hil = false;
     half.run(2.0);
     assert!(half.take_commands().is_empty() && half.events().contains("automatic mode refused"));
+}
+
+#[test]
+fn only_a_demonstration_s_pin_is_moved_here_and_not_in_flight() {
+    for (demonstration, phase, moved) in [
+        (true, TdPhase::TD_PHASE_PAD_IDLE, Some(Action::MovePin(false))),
+        (true, TdPhase::TD_PHASE_TOUCHDOWN, Some(Action::MovePin(false))),
+        (true, TdPhase::TD_PHASE_CHUTE, None),
+        (false, TdPhase::TD_PHASE_PAD_IDLE, None),
+    ] {
+        let mut rig = Rig::new(Settings { demonstration, ..settings(false, true) });
+        rig.phase = phase;
+        rig.run(1.0);
+        rig.key(Key::Char('I'));
+        let found = rig.actions.iter().find(|action| matches!(action, Action::MovePin(_)));
+        assert_eq!(found.cloned(), moved, "{phase:?}");
+    }
 }

@@ -169,6 +169,23 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
     }
 }
 
+/// The station has not heard the abort: the vehicle says that the pin is due.
+#[test]
+fn the_pin_is_due_on_every_page_after_a_power_cycle_until_it_was_put_in() {
+    let mut rig = Rig::crewed();
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_PIN_DUE;
+    rig.approach_wait_s = 43;
+    rig.run(0.1);
+    stands_on_every_page(&mut rig, "DO NOT APPROACH", "do not approach for 43 s: LIVE MOTOR");
+    rig.approach_wait_s = 0;
+    rig.run(0.1);
+    let live = "one person: pin in: the motor is LIVE, and the waiting time is over";
+    stands_on_every_page(&mut rig, "ONE PERSON: PIN IN", live);
+    rig.motor = TdMotor::TD_MOTOR_PIN_IN;
+    rig.run(0.1);
+    stands_on_every_page(&mut rig, "MAY BE APPROACHED", "may be approached: the pin is in");
+}
+
 #[test]
 fn each_state_of_the_motor_has_its_warning() {
     let none = TdInterlock::empty();

@@ -326,7 +326,7 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
 /// Why a check fails.
 fn failure(check: TdCheck) -> &'static str {
     match check {
-        TdCheck::TD_CHECK_ABORT_LATCH => "power cycle",
+        TdCheck::TD_CHECK_ABORT_LATCH => "keep away",
         TdCheck::TD_CHECK_PIN => "pull the pin",
         TdCheck::TD_CHECK_SELF_TEST => "not passed",
         TdCheck::TD_CHECK_ACCELEROMETER
