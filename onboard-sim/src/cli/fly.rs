@@ -178,14 +178,15 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         network_bytes_s: arguments.network_budget,
         serial_bytes_s: arguments.serial_budget,
     };
-    let moved_by_hand = !arguments.auto && !arguments.mavlink.is_empty();
+    // People stand at it: a flight by itself keeps nobody away.
+    let crewed = !arguments.auto && !arguments.mavlink.is_empty();
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is switched on again.
     let log = match &arguments.log {
         Some(LogChoice::File(path)) => Some(path),
         None | Some(LogChoice::None) => None,
     };
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
-    let abort_file = own.map(|file| file.with_added_extension("aborted"));
+    let abort_file = own.filter(|_| crewed).map(|file| file.with_added_extension("aborted"));
     let options = FlyOptions {
         on_the_wire,
         flight,
@@ -198,7 +199,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
         speed: arguments.speed,
         exit_when_safed: !arguments.stay,
         board: arguments.board,
-        pin_out: moved_by_hand.then(pin_as_typed).transpose()?,
+        pin_out: crewed.then(pin_as_typed).transpose()?,
         abort_file,
         log_clock: None,
     };
@@ -307,6 +308,7 @@ fn read_pin(pin: &watch::Sender<bool>) {
             match words.split_whitespace().collect::<Vec<_>>()[..] {
                 ["pin", "in"] => _ = pin.send(false),
                 ["pin", "out"] => _ = pin.send(true),
+                [] => {}
                 _ => _ = writeln!(std::io::stdout(), "type `pin in` or `pin out`, and Enter"),
             }
         }

@@ -1,7 +1,6 @@
 //! An abort on the pad outlives the vehicle's power switch, in a small file: when it was, by the wall clock.
 
 use std::fs;
-use std::io;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -21,17 +20,18 @@ impl KeptAbort {
         (Self { kept: ago_s.is_some(), file }, ago_s)
     }
 
-    /// Writes the abort of this vehicle, or forgets it when people may have approached.
-    pub(super) fn keep(&mut self, vehicle: &Vehicle) -> io::Result<()> {
+    /// Writes the abort of this vehicle, or forgets it when people may have approached. Says if that fails.
+    pub(super) fn keep(&mut self, vehicle: &Vehicle) -> Option<String> {
         let abort_s = vehicle.mode().abort_to_keep_s(vehicle.time_s());
-        let Some(file) = self.file.as_ref().filter(|_| abort_s.is_some() != self.kept) else { return Ok(()) };
+        let file = self.file.as_ref().filter(|_| abort_s.is_some() != self.kept)?;
         self.kept = abort_s.is_some();
-        let Some(abort_s) = abort_s else { return fs::remove_file(file) };
-        let at_s = unix_s() - (vehicle.time_s() - abort_s);
         // Complete or absent.
         let beside = file.with_added_extension("new");
-        fs::write(&beside, format!("{at_s:.1}\n"))?;
-        fs::rename(&beside, file)
+        let written = match abort_s.map(|abort_s| unix_s() - (vehicle.time_s() - abort_s)) {
+            Some(at_s) => fs::write(&beside, format!("{at_s:.1}\n")).and_then(|()| fs::rename(&beside, file)),
+            None => fs::remove_file(file),
+        };
+        written.err().map(|why| format!("the wait after an abort is not kept: {}: {why}", file.display()))
     }
 }
 
@@ -55,9 +55,9 @@ mod tests {
 
     #[test]
     fn an_abort_is_as_old_as_the_clock_says_and_was_just_now_if_the_file_or_the_clock_is_wrong() {
-        assert_eq!(ago_s("980.0\n", 1_000.0), 20.0);
-        for wrong in ["", "nonsense", "NaN", "inf", "1000.1"] {
-            assert_eq!(ago_s(wrong, 1_000.0), 0.0, "{wrong}");
+        let cases = [("980.0\n", 20), ("", 0), ("nonsense", 0), ("NaN", 0), ("inf", 0), ("1000.1", 0)];
+        for (text, expected) in cases {
+            assert_eq!(ago_s(text, 1_000.0) as u32, expected, "{text}");
         }
     }
 }

@@ -219,8 +219,11 @@ fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
 }
 
 /// The vehicle, powered up, with its crew and with its pin out.
-fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
+fn vehicle_of(options: &FlyOptions, aborted_s_ago: Option<f64>) -> Result<Vehicle, FlyError> {
     let mut vehicle = options.flight.vehicle()?;
+    if let Some(ago_s) = aborted_s_ago {
+        vehicle = vehicle.aborted_before(-ago_s);
+    }
     if let Some(crew) = &options.crew {
         if options.key_file.is_none() {
             return Err(FlyError::CrewWithoutKey);
@@ -236,8 +239,16 @@ fn vehicle_of(options: &FlyOptions) -> Result<Vehicle, FlyError> {
     Ok(vehicle)
 }
 
+fn hear(endpoint: &mut VehicleEndpoint, heard: Received, vehicle: &Vehicle) {
+    match heard {
+        Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle.state()),
+        Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle.state()),
+        Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
+    }
+}
+
 /// Moves the pin as it was asked, and says why not: nobody reaches it in flight.
-fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) -> Option<&'static str> {
+fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) -> Option<String> {
     let pin_out = pin_out.filter(|pin| pin.has_changed().unwrap_or(false))?;
     let out = *pin_out.borrow_and_update();
     let on_the_ground =
@@ -245,7 +256,7 @@ fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) 
     if on_the_ground {
         vehicle.set_pin_out(out);
     }
-    (!on_the_ground).then_some("the pin was not moved: nobody reaches it in flight")
+    (!on_the_ground).then(|| "the pin was not moved: nobody reaches it in flight".to_owned())
 }
 
 fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
@@ -275,8 +286,8 @@ fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> Flig
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
-/// The outcome depends only on the flight and the frames that arrive on the links, not on the speed, the
-/// machine or the clock.
+/// The outcome depends only on the flight, an abort before it, and what arrives on the links and at the pin, not on the speed,
+/// the machine or the clock.
 ///
 /// # Errors
 /// The flight cannot be simulated, or a link cannot be opened.
@@ -285,11 +296,8 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let mut vehicle = vehicle_of(&options)?;
     let (mut kept_abort, aborted_s_ago) = KeptAbort::open(options.abort_file.take());
-    if let Some(ago_s) = aborted_s_ago {
-        vehicle = vehicle.aborted_before(-ago_s);
-    }
+    let mut vehicle = vehicle_of(&options, aborted_s_ago)?;
     let mut links = Links::open(
         &options.links,
         options.key_file.as_deref(),
@@ -314,19 +322,13 @@ pub async fn fly_observed(
             vehicle.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
         }
-        if let Some(words) = move_pin(options.pin_out.as_mut(), &mut vehicle) {
-            observe(
-                vehicle.time_s(),
-                &VehicleEvent::Text { severity: Severity::Warning, text: words.into() },
-            );
+        let told = [move_pin(options.pin_out.as_mut(), &mut vehicle), kept_abort.keep(&vehicle)];
+        for text in told.into_iter().flatten() {
+            observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
         }
         let arrived = links.receive(vehicle.time_s());
         for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
-            match heard {
-                Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle.state()),
-                Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle.state()),
-                Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
-            }
+            hear(&mut endpoint, heard, &vehicle);
         }
         let own = own_start.requests(&vehicle);
         let stopwatch = pace.clock();
@@ -349,11 +351,6 @@ pub async fn fly_observed(
         if let Some(recorder) = &options.recorder {
             record(recorder, &vehicle, &events);
             offer.step(recorder, &vehicle, &mut endpoint);
-        }
-        if let Err(why) = kept_abort.keep(&vehicle) {
-            let text = format!("a power cycle forgets the wait: it cannot be written: {why}");
-            note(options.recorder.as_ref(), time_s, &text);
-            observe(time_s, &VehicleEvent::Text { severity: Severity::Error, text });
         }
         let leaving = endpoint.poll(&vehicle.state());
         for outgoing in sent.pass(leaving, time_s, vehicle.radio()) {
