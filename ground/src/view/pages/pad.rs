@@ -192,6 +192,7 @@ fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
         let name = words::check(name);
         let found = found(&model.vehicle, bit);
+        let reason = if found.starts_with("--") && !reason.is_empty() { "not known" } else { reason };
         Line::from(vec![
             theme.span(word, if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm }),
             theme.plain(format!("{mark}{name:<19.19}")),
