@@ -209,10 +209,10 @@ impl SensorWatch {
         }
         let time_s = self.time_s;
         let silent = |name: &str, silent_s: f64, longest_s: f64| {
-            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.0} s"))
+            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.1} s"))
         };
         let repeats = |name: &str, for_s: Option<f64>| {
-            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.0} s"))
+            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.1} s"))
         };
         let felt_m_s2 = self.felt_m_s2.norm();
         let accelerometer = silent("accelerometer", self.accelerometer.silent_s(time_s), IMU_LOST_S)
@@ -236,7 +236,7 @@ impl SensorWatch {
             });
         let gnss_silent_s = self.gnss.silent_s(time_s);
         let gnss = (gnss_silent_s > GNSS_LOST_S)
-            .then(|| format!("no GNSS fix for {gnss_silent_s:.0} s"))
+            .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
             .or_else(|| repeats("GNSS", self.gnss.repeats_for_s(FROZEN_FIXES, time_s)))
             .or_else(|| {
                 let off_m = (self.fixed_m - place_m?).norm();
