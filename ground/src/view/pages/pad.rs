@@ -325,7 +325,6 @@ fn failure(check: TdCheck) -> &'static str {
         | TdCheck::TD_CHECK_BAROMETER
         | TdCheck::TD_CHECK_LIDAR => "no data",
         TdCheck::TD_CHECK_GNSS => "no fix",
-        TdCheck::TD_CHECK_HEIGHT => "too low",
         TdCheck::TD_CHECK_TILT => "not upright",
         TdCheck::TD_CHECK_ROTATION => "turning",
         TdCheck::TD_CHECK_SPEED => "moving",
@@ -337,7 +336,7 @@ fn failure(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
         TdCheck::TD_CHECK_UPLINK => "not heard",
-        TdCheck::TD_CHECK_BATTERY => "too low",
+        TdCheck::TD_CHECK_HEIGHT | TdCheck::TD_CHECK_BATTERY => "too low",
         _ => "",
     }
 }

@@ -66,7 +66,7 @@ impl<const N: usize> Voice<N> {
             self.spoke_at_s = time_s;
         }
         let Some(said) = said.filter(|said| said.iter().all(|value| value.is_finite())) else { return };
-        let again = self.spoke && said == self.last.data.0[0];
+        let again = self.spoke && said.map(f64::to_bits) == self.last.data.0[0].map(f64::to_bits);
         if !again {
             self.same_since_s = time_s;
         }
@@ -85,7 +85,7 @@ impl<const N: usize> Voice<N> {
     }
 
     fn repeats_for_s(&self, frozen: u32, time_s: f64) -> Option<f64> {
-        (self.same >= frozen).then(|| time_s - self.same_since_s)
+        (self.same >= frozen).then_some(time_s - self.same_since_s)
     }
 }
 
