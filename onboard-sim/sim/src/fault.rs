@@ -136,8 +136,11 @@ fn how(defect: Defect) -> (&'static str, Option<f64>) {
     let same = |known: Defect| core::mem::discriminant(&known) == core::mem::discriminant(&defect);
     let silent = SILENT.iter().find(|(_, known)| same(*known)).map(|(name, _)| (*name, None));
     let value = match defect {
-        Defect::Step(value) | Defect::Ramp(value) | Defect::Spike(value) => value,
-        Defect::Noise(value) | Defect::Blocked(value) => value,
+        Defect::Step(value)
+        | Defect::Ramp(value)
+        | Defect::Spike(value)
+        | Defect::Noise(value)
+        | Defect::Blocked(value) => value,
         Defect::Out | Defect::Dead | Defect::Stuck | Defect::NotANumber => f64::NAN,
     };
     let wrong = || WRONG.iter().find(|(_, of)| same(of(value))).map_or("?", |(name, _)| *name);

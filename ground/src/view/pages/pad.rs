@@ -346,7 +346,7 @@ fn failure(check: TdCheck) -> &'static str {
         TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
         TdCheck::TD_CHECK_UPLINK => "not heard",
-        TdCheck::TD_CHECK_BATTERY | TdCheck::TD_CHECK_HEIGHT => "too low",
+        TdCheck::TD_CHECK_HEIGHT | TdCheck::TD_CHECK_BATTERY => "too low",
         _ => "",
     }
 }

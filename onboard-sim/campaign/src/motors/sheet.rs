@@ -37,7 +37,7 @@ enum Content {
     /// A plan, if there is one, as SVG, and what it says in words.
     Plan(Option<String>, Vec<String>),
     /// To be filled in behind these words, row by row.
-    Blanks(&'static [&'static [&'static str]]),
+    Blanks(Vec<Vec<String>>),
 }
 
 /// The cells of each line of a part of the card's words, with values by their names. A line with a value that is `None` is left out.
@@ -78,18 +78,6 @@ fn span([low, high]: [f64; 2]) -> String {
     format!("{low:.0} to {high:.0} m")
 }
 
-/// Who signs on the day.
-const PEOPLE: [&str; 4] = ["range safety: decides", "flight", "pad: has the pin", "fire: extinguisher"];
-
-/// What is written down on the day. A book's end is a number and eight groups.
-const DAY: &[&[&str]] = &[
-    &["Date", "Place", "Vehicle, its boot"],
-    &["Wind, mean of 10 min, m/s", "from, \u{b0}", "at", "so nobody within, m"],
-    &["Circle clear", "Armed", "Lift-off", "Down", "Approached"],
-    &["Book of station 1", ":", "-", "-", "-", "-", "-", "-", "-"],
-    &["Book of station 2", ":", "-", "-", "-", "-", "-", "-", "-"],
-];
-
 impl Card {
     /// The front and the back.
     pub(super) fn sides(&self) -> [Side; 2] {
@@ -115,7 +103,7 @@ impl Card {
                     "What an abort does: Ctrl-X, then Enter, at any station; one person is enough",
                     self.aborts(winds),
                 ),
-                Section { title: "On the day", content: Content::Blanks(DAY) },
+                Section { title: "On the day", content: Content::Blanks(words_of("day", &[])) },
             ],
             notes: Vec::new(),
         }
@@ -222,53 +210,45 @@ impl Card {
     }
 
     fn places(&self, winds: &[InWind]) -> Section {
-        let mut words = match limit_m_s(winds) {
-            None => vec![format!(
-                "Fewer than {FEWEST} flights were flown in each wind, or one did not come down: no radius, no rate and no wind to \
-                 fly in. Do not fly by this card."
-            )],
-            Some(most_m_s) => vec![format!(
-                "Do not fly above {most_m_s} m/s: fewer land, or it is not known. The wind is the mean of ten minutes, 10 m above the \
-                 ground; held at 2 m, times 1.3. Between two rows the stronger wind counts."
-            )],
-        };
-        words.extend(words_of("places", &[]).concat());
         let plan = plan(winds, self.wind_from_deg);
-        if plan.is_some() {
-            words.push(self.wind_from_deg.map_or_else(
-                || "Hold the plan so that its arrow points downwind.".to_owned(),
-                |from_deg| {
-                    let to_deg = (from_deg + 180.0) % 360.0;
-                    format!(
-                        "The plan has north up: wind from {from_deg:.0}\u{b0}, downwind {to_deg:.0}\u{b0}."
-                    )
-                },
-            ));
-        }
-        Section { title: "Who stands where", content: Content::Plan(plan, words) }
+        let limit_m_s = limit_m_s(winds);
+        let degrees = |turned_deg: f64| {
+            self.wind_from_deg.map(|from_deg| format!("{:.0}", (from_deg + turned_deg) % 360.0))
+        };
+        let words = words_of(
+            "places",
+            &[
+                ("no_limit", limit_m_s.is_none().then(String::new)),
+                ("limit_m_s", limit_m_s.map(|limit_m_s| limit_m_s.to_string())),
+                ("fewest", Some(FEWEST.to_string())),
+                ("plan", plan.as_ref().map(|_| String::new())),
+                ("no_from", self.wind_from_deg.is_none().then(String::new)),
+                ("from_deg", degrees(0.0)),
+                ("to_deg", degrees(180.0)),
+            ],
+        );
+        Section { title: "Who stands where", content: Content::Plan(plan, words.concat()) }
     }
 
     /// What the numbers of the front rest on.
     fn sources(&self, winds: &[InWind]) -> String {
-        format!(
-            "Front. Nobody within: the largest of what holds 99 % of the flights of the way of ending that reaches farthest (upper end), of the rows \
-             above, and of {} ({}); rounded up to 10 m; without an upper end nobody flies. On their legs: of the flights as planned, Wilson's interval. Fewer than {FEWEST} flights tell \
-             neither. The fence of the mission ({:.0} m) only decides whether the landing motor may light. The same flights again: \
-             onboard-sim hazard --profile mission.toml --dispersion {} --wind {} --seed {} --flights {} --hazard-flights {}",
-            self.rule,
-            Rule::SOURCE,
-            self.recipe.mission.gate.fence_radius_m,
-            self.recipe.dispersion_name,
-            winds.iter().map(|wind| wind.wind_m_s.to_string()).collect::<Vec<_>>().join(","),
-            self.recipe.seed,
-            self.flights.survey,
-            self.flights.of_widest
-        )
+        let winds: Vec<String> = winds.iter().map(|wind| wind.wind_m_s.to_string()).collect();
+        let values = [
+            ("rule", format!("{} ({})", self.rule, Rule::SOURCE)),
+            ("fewest", FEWEST.to_string()),
+            ("fence_m", format!("{:.0}", self.recipe.mission.gate.fence_radius_m)),
+            ("set", self.recipe.dispersion_name.clone()),
+            ("winds", winds.join(",")),
+            ("seed", self.recipe.seed.to_string()),
+            ("survey", self.flights.survey.to_string()),
+            ("widest", self.flights.of_widest.to_string()),
+        ];
+        words_of("sources", &values.map(|(name, value)| (name, Some(value)))).concat().concat()
     }
 
     fn back(&self, winds: &[InWind]) -> Side {
         let values = &self.values(winds);
-        let people = PEOPLE.map(|who| [vec![who.to_owned()], vec![String::new(); 6]].concat());
+        let people = words_of("people", &[]).into_iter().map(|who| [who, vec![String::new(); 6]].concat());
         Side {
             title: format!("Landing card: {}", self.named()),
             subtitle: format!(
@@ -281,7 +261,7 @@ impl Card {
                     title: "Who holds which key, and who goes",
                     content: Content::Table(
                         &["role", "name", "key file", "link", "asks, confirms, taps", "time", "signature"],
-                        people.to_vec(),
+                        people.collect(),
                     ),
                 },
                 rows("Set before the flight", words_of("set", values)),
@@ -486,7 +466,7 @@ fn write_content(content: &Content, out: &mut String) -> fmt::Result {
         }
         Content::Blanks(rows) => rows.iter().try_for_each(|row| {
             write!(out, "<div class=\"b\">")?;
-            write_each(out, ["<span>", "</span><i></i>"], row.iter().copied())?;
+            write_each(out, ["<span>", "</span><i></i>"], row.iter().map(String::as_str))?;
             writeln!(out, "</div>")
         }),
     }

@@ -134,7 +134,7 @@ impl Finding {
             Sign::Tumbles => format!("nose below the horizon in the burn: tilt {value:.0} deg"),
             Sign::Gate if detail.is_empty() => "ignition gate stayed shut".to_string(),
             Sign::Gate => format!("ignition gate stayed shut: {detail}"),
-            Sign::Latched => detail.to_string(),
+            Sign::Latched => detail.clone(),
         }
     }
 }

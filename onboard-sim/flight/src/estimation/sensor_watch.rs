@@ -66,7 +66,7 @@ impl<const N: usize> Voice<N> {
             self.spoke_at_s = time_s;
         }
         let Some(said) = said.filter(|said| said.iter().all(|value| value.is_finite())) else { return };
-        let again = self.spoke && said == self.last.data.0[0];
+        let again = self.spoke && said.map(f64::to_bits) == self.last.data.0[0].map(f64::to_bits);
         if !again {
             self.same_since_s = time_s;
         }
@@ -85,7 +85,7 @@ impl<const N: usize> Voice<N> {
     }
 
     fn repeats_for_s(&self, frozen: u32, time_s: f64) -> Option<f64> {
-        (self.same >= frozen).then(|| time_s - self.same_since_s)
+        (self.same >= frozen).then_some(time_s - self.same_since_s)
     }
 }
 
@@ -209,10 +209,10 @@ impl SensorWatch {
         }
         let time_s = self.time_s;
         let silent = |name: &str, silent_s: f64, longest_s: f64| {
-            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.0} s"))
+            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.1} s"))
         };
         let repeats = |name: &str, for_s: Option<f64>| {
-            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.0} s"))
+            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.1} s"))
         };
         let felt_m_s2 = self.felt_m_s2.norm();
         let accelerometer = silent("accelerometer", self.accelerometer.silent_s(time_s), IMU_LOST_S)
@@ -236,7 +236,7 @@ impl SensorWatch {
             });
         let gnss_silent_s = self.gnss.silent_s(time_s);
         let gnss = (gnss_silent_s > GNSS_LOST_S)
-            .then(|| format!("no GNSS fix for {gnss_silent_s:.0} s"))
+            .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
             .or_else(|| repeats("GNSS", self.gnss.repeats_for_s(FROZEN_FIXES, time_s)))
             .or_else(|| {
                 let off_m = (self.fixed_m - place_m?).norm();

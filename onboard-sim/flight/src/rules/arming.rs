@@ -106,7 +106,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         SENSOR_CHECKS
             .into_iter()
             .zip(&input.sensor_defects)
-            .map(|(name, defect)| Check::sensor(name, defect)),
+            .map(|(name, defect)| Check::sensor(name, defect.as_ref())),
     );
     checks.extend([
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
@@ -219,8 +219,8 @@ impl Check {
     }
 
     /// A check of a sensor, which names itself in its defect.
-    fn sensor(name: &'static str, defect: &Option<String>) -> Self {
-        let found = defect.clone().unwrap_or_else(|| "speaks".to_owned());
+    fn sensor(name: &'static str, defect: Option<&String>) -> Self {
+        let found = defect.cloned().unwrap_or_else(|| "speaks".to_owned());
         Self { name, passed: defect.is_none(), found, required: String::new() }
     }
 

@@ -72,7 +72,7 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
         found: found.abs(),
         limit,
         unit,
-        shut: !(found.abs() <= limit),
+        shut: found.is_nan() || found.abs() > limit,
         lasts: found.abs() > beyond * limit,
     };
     let condition = |name, holds: bool, lasts: bool| GateCheck {

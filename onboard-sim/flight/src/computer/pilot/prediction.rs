@@ -2,6 +2,7 @@
 
 use alloc::format;
 use alloc::string::String;
+use alloc::vec::Vec;
 
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
@@ -200,15 +201,16 @@ impl Pilot {
     /// All that decided, with values, and for how long: what lasts, or else what keeps the gate shut now.
     fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
         let any_lasts = checks.iter().any(|check| check.lasts);
-        let mut told = String::new();
-        for (check, since_s) in checks.iter().zip(&self.shut_since_s) {
-            if check.lasts || (check.shut && !any_lasts) {
+        let told: Vec<String> = checks
+            .iter()
+            .zip(&self.shut_since_s)
+            .filter(|(check, _)| check.lasts || (check.shut && !any_lasts))
+            .map(|(check, since_s)| {
                 let for_s = since_s.map_or(0.0, |since_s| time_s - since_s);
-                let comma = if told.is_empty() { "" } else { "; " };
-                told += &format!("{comma}{}, for {for_s:.1} s", check.words());
-            }
-        }
-        if told.is_empty() { "too low for the landing motor".into() } else { told }
+                format!("{}, for {for_s:.1} s", check.words())
+            })
+            .collect();
+        if told.is_empty() { "too low for the landing motor".into() } else { told.join("; ") }
     }
 }
 
