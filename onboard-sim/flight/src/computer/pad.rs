@@ -103,8 +103,12 @@ impl PadWatch {
             at_rest: over.alignment.finish(0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
-            // Without a fix this is zero by zero: NaN, which passes no check.
-            velocity_m_s: over.velocity_sum_m_s / f64::from(over.fixes),
+            // A second without a fix tells no speed; that there is none is a check of its own. Before the first fix this is zero by
+            // zero: NaN, which passes no check.
+            velocity_m_s: match over.found.filter(|_| over.fixes == 0) {
+                Some(before) => before.velocity_m_s,
+                None => over.velocity_sum_m_s / f64::from(over.fixes),
+            },
         });
     }
 
