@@ -164,11 +164,6 @@ impl SensorWatch {
         self.barometer.fresh(self.time_s, BAROMETER_LOST_S).map(|[height_m]| height_m)
     }
 
-    /// The vertical velocity of the last fix, m/s, if it is not older than this, s.
-    pub fn gnss_vertical_m_s(&self, within_s: f64) -> Option<f64> {
-        self.gnss.fresh(self.time_s, within_s).map(|[.., vertical_m_s]| vertical_m_s)
-    }
-
     /// The lidar's range, m, unless it sees nothing.
     pub fn lidar_range_m(&self) -> Option<f64> {
         self.lidar.fresh(self.time_s, LIDAR_LOST_S).map(|[range_m]| range_m)
@@ -188,11 +183,9 @@ impl SensorWatch {
     /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.
     pub fn feels_nothing_for_s(&self) -> f64 {
         let lost_s = |frozen_s: Option<f64>, silent_s: f64| frozen_s.unwrap_or(0.0).max(silent_s);
+        let felt_s = lost_s(self.accelerometer_frozen_s(), self.accelerometer.silent_s(self.time_s));
         let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s);
-        let [felt_s, turned_s] = [
-            lost_s(self.accelerometer_frozen_s(), self.accelerometer.silent_s(self.time_s)),
-            lost_s(gyro_s, self.gyro.silent_s(self.time_s)),
-        ];
+        let turned_s = lost_s(gyro_s, self.gyro.silent_s(self.time_s));
         if self.measures { felt_s.max(turned_s) } else { 0.0 }
     }
 

@@ -200,17 +200,20 @@ impl Pilot {
 
     /// All that decided, with values, and for how long: what lasts, or else what keeps the gate shut now.
     fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
-        let any_lasts = checks.iter().any(|check| check.lasts);
-        let told: Vec<String> = checks
-            .iter()
-            .zip(&self.shut_since_s)
-            .filter(|(check, _)| check.lasts || (check.shut && !any_lasts))
-            .map(|(check, since_s)| {
-                let for_s = since_s.map_or(0.0, |since_s| time_s - since_s);
-                format!("{}, for {for_s:.1} s", check.words())
-            })
-            .collect();
-        if told.is_empty() { "too low for the landing motor".into() } else { told.join("; ") }
+        let for_s = |since_s: &Option<f64>| since_s.map_or(0.0, |since_s| time_s - since_s);
+        // A fin on its way fails for a moment and decides nothing beside what has lasted.
+        let keeps: [fn(&GateCheck, f64) -> bool; 3] =
+            [|check, for_s| check.lasts && for_s >= LASTS_S, |check, _| check.lasts, |check, _| check.shut];
+        let told = keeps.iter().map(|keep| {
+            let kept =
+                checks.iter().zip(&self.shut_since_s).filter(|(check, since_s)| keep(check, for_s(since_s)));
+            let words =
+                kept.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
+            words.collect::<Vec<_>>().join("; ")
+        });
+        told.into_iter()
+            .find(|told| !told.is_empty())
+            .unwrap_or_else(|| "too low for the landing motor".into())
     }
 }
 
