@@ -68,14 +68,20 @@ fn a_reset_in_the_countdown_is_an_alarm_and_hides_go_until_somebody_has_seen_it(
     rig.terminal.wait_for_end();
 }
 
-#[test]
-fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
+/// A countdown that was aborted: people must keep away.
+fn aborted() -> Rig {
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
     rig.abort();
     rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     rig.terminal.wait_for("do not approach for");
+    rig
+}
+
+#[test]
+fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
+    let mut rig = aborted();
     rig.reboot_vehicle();
     rig.terminal.wait_for("the vehicle has REBOOTED");
     rig.terminal.wait_until("a vehicle that is new and must not be approached", |window| {
@@ -90,12 +96,7 @@ fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
 /// Vehicle and station are both switched off during the wait, and started again by the same commands.
 #[test]
 fn the_wait_after_an_abort_goes_on_when_vehicle_and_station_are_started_again() {
-    let mut rig = Rig::new("mk2");
-    rig.arm();
-    rig.start();
-    rig.abort();
-    rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
-    rig.terminal.wait_for("do not approach for");
+    let mut rig = aborted();
     rig.terminal.type_by_hand(b"q");
     rig.terminal.wait_for("people must keep away, DO NOT APPROACH");
     rig.type_until(b"qquit\r", "the screen was quit; people must keep away, so the station");

@@ -260,7 +260,7 @@ impl Vehicle {
         known.then(|| Sample::new(f64::from(status.value.countdown_ms) / 1_000.0, status.received_at))
     }
 
-    /// The time before the release, s, from which on nothing holds the countdown; `None` if the vehicle does not tell it.
+    /// The time before the release, s, from which on no key and no silence holds the countdown; `None` if the vehicle does not tell it.
     pub fn last_hold_s(&self) -> Option<f64> {
         let told_ds = self.status.as_ref()?.value.last_hold_ds;
         (told_ds > 0).then(|| f64::from(told_ds) / 10.0)
