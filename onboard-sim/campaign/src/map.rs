@@ -9,7 +9,6 @@ use std::fmt;
 use std::io::{self, Write};
 use std::str::FromStr;
 
-use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
 use sim::draw::{Draw, draw};
 use sim::recipe::Recipe;
@@ -346,7 +345,7 @@ fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Ce
     for (quantity, value) in values() {
         put_into_draw(quantity, value, &mut drawn);
     }
-    let mut flight = Sortie::drawn_as(&mission, &dispersion, &drawn, Law::of(recipe.controller, &mission))?;
+    let mut flight = Sortie::drawn_as(&mission, &dispersion, &drawn)?;
     if by == By::PerfectInformation {
         let window = onset_window(&mission, flight.drawn(), flight.fell_from());
         // Without a height on an axis the best one is chosen.

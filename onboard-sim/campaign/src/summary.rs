@@ -311,13 +311,8 @@ fn others(attainable: &Attainable) -> String {
 }
 
 fn what(manifest: &Manifest) -> String {
-    let mut what = format!(
-        "{}, dispersion {}, seed {}, controller {}",
-        manifest.mission, manifest.dispersion, manifest.seed, manifest.controller
-    );
-    if !manifest.steered {
-        what.push_str(", passive descent");
-    }
+    let mut what =
+        format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
     if manifest.shard != Shard::WHOLE {
         what = format!("{what}, shard {}", manifest.shard);
     }

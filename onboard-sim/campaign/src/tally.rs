@@ -2,13 +2,9 @@
 //! laws before the flight.
 
 use flight::computer::pilot::FRAMES_PER_PLAN;
-use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
 use nmpc::SolveStatus;
-use sim::dispersion::Dispersion;
-use sim::draw::draw;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
@@ -16,7 +12,6 @@ use sim::world::{RestOutcome, Touchdown};
 
 use crate::attainable;
 use crate::row::Row;
-use crate::statistics::golden_section;
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
@@ -242,30 +237,4 @@ fn rest_name(rest: RestOutcome) -> &'static str {
         RestOutcome::TippedOver => "tipped over",
         RestOutcome::BodyStrike => "body strike",
     }
-}
-
-/// Search range on either side of the first guess, as a fraction of it.
-const SPAN_SHARE: f64 = 0.08;
-/// Flights of the search; they give the height to a centimetre or two.
-const FLIGHTS: usize = 14;
-
-/// The ignition height, m, from which a baseline touches down most slowly with nominal data, found by simulated
-/// flights. `None` for the pilot, which decides in flight.
-///
-/// # Errors
-/// The mission cannot be flown.
-pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Option<f64>, SetUpError> {
-    let law = Law::of(controller, mission);
-    let Some(guess_m) = law.ignition_height_m() else { return Ok(None) };
-    let certain = Dispersion::default();
-    let speed_m_s = |height_m: f64| -> Result<f64, SetUpError> {
-        let mut timed = mission.clone();
-        timed.ignition.fixed_height_m = Some(height_m);
-        let draw = draw(&timed, &certain, 0, 0);
-        let mut flight = Sortie::drawn_as(&timed, &certain, &draw, law.clone())?;
-        let outcome = flight.run();
-        Ok(outcome.touchdown.map_or(f64::INFINITY, |touchdown| touchdown.vertical_m_s.abs()))
-    };
-    let range_m = [guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE)];
-    golden_section(range_m, FLIGHTS, speed_m_s).map(Some)
 }

@@ -14,12 +14,11 @@ use sim::recipe::Recipe;
 
 const FLIGHTS: u64 = 23;
 
-/// Passive descents from a low height, which are quick to simulate.
+/// Flights from a low height, which are quick to simulate.
 fn order(seed: u64) -> Order {
     let (name, text) = flight::vehicles::mission::BUILTIN[0];
     let low = text.replace("height_m = 300.0", "height_m = 60.0");
-    let mut recipe = Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap();
-    recipe.mission.steered = false;
+    let recipe = Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap();
     Order { recipe: Recipe { seed, ..recipe }, flights: FLIGHTS }
 }
 

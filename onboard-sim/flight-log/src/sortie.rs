@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use flight::computer::{Computer, Input, Output};
-use flight::guidance::baseline::Controller;
 use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::LandingVerdict;
@@ -34,7 +33,6 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
         ("dispersion", recipe.dispersion_name.clone()),
         ("seed", recipe.seed.to_string()),
         ("flight", number.to_string()),
-        ("controller", recipe.controller.name().to_owned()),
         ("faults", faults),
         ("start_unix_ns", start_unix_ns.to_string()),
     ];
@@ -220,9 +218,4 @@ fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
         passed: result.passed,
     });
     limits.collect()
-}
-
-/// The controller that flew the landing burn of a recorded flight; the pilot itself if the log does not say.
-pub fn controller_of(run: &BTreeMap<String, String>) -> Option<Controller> {
-    run.get("controller").map_or(Some(Controller::Nmpc), |name| name.parse().ok())
 }

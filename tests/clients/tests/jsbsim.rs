@@ -6,7 +6,6 @@
 use clients::{JSBSIM, file};
 use e2e::{Ended, Program, Running, program};
 use flight::estimation::estimator::StartUncertainty;
-use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::rigid::RigidState;
@@ -152,7 +151,7 @@ fn fly(mission: &Mission, wind_m_s: f64, flights: u64) -> Flown {
         theirs.extend(told.map(|line| judged(mission, &serde_json::from_str(line).unwrap())));
     }
     assert_eq!(theirs.len(), draws.len());
-    let in_our_world = |drawn: &Draw| Sortie::drawn_as(mission, &dispersion, drawn, Law::Nmpc).unwrap().run();
+    let in_our_world = |drawn: &Draw| Sortie::drawn_as(mission, &dispersion, drawn).unwrap().run();
     let ours = draws.iter().map(in_our_world).collect();
     let anew = |drawn: &Draw| in_our_world(&Draw { flight_seed: drawn.flight_seed ^ 1, ..*drawn });
     Flown { theirs, ours, again: draws.iter().map(anew).collect() }

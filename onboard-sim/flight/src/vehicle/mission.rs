@@ -251,8 +251,6 @@ pub struct Mission {
     /// Position of the pad on the Earth.
     #[serde(default)]
     pub site: Site,
-    /// Whether the fins steer; otherwise they stay open at equal angles (passive descent).
-    pub steered: bool,
     /// Position of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
     #[serde(default)]

@@ -60,8 +60,8 @@ fn an_unknown_airframe_or_key_is_named_in_the_error() {
 #[test]
 fn a_named_airframe_keeps_the_line_numbers_in_errors() {
     let (name, text) = BUILTIN[0];
-    let wrong = text.replace("steered = true", "steered = 1");
-    let line = 1 + text.lines().position(|line| line == "steered = true").unwrap();
+    let wrong = text.replace("airframe = \"mk2\"", "airframe = 1");
+    let line = 1 + text.lines().position(|line| line == "airframe = \"mk2\"").unwrap();
     let message = from_toml(&wrong, name).unwrap_err().to_string();
     assert!(message.contains(&format!("at line {line},")), "{message}");
 }

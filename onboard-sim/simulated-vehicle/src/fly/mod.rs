@@ -268,7 +268,7 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
         budget_bytes_s: options.on_the_wire.serial_bytes_s,
         uid: options.on_the_wire.uid.get().into(),
     };
-    Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
+    Ok(OnBoard::open(folder, &recipe.mission_toml, on_the_air)?)
 }
 
 /// How a flight has ended.

@@ -24,7 +24,6 @@ use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
-use crate::guidance::baseline::{Baseline, Law};
 use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
 use crate::rules::phase::Mode;
@@ -74,8 +73,6 @@ pub struct Pilot {
     ignited_at_s: Option<f64>,
     prediction: Prediction,
     powered: PoweredGuidance,
-    /// The law that flies the landing burn instead of a plan, if any.
-    baseline: Option<Baseline>,
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
@@ -126,7 +123,6 @@ impl Pilot {
             ignited_at_s: None,
             prediction: Prediction::default(),
             powered: model.guidance(),
-            baseline: None,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
@@ -160,14 +156,6 @@ impl Pilot {
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
     pub(super) fn detects_lift_off(&mut self, sensed: &Sensed) -> bool {
         self.ascent.detects_lift_off(axial_m_s2(sensed), self.model.mission.estimator.frame_s)
-    }
-
-    /// Sets the law that flies the landing burn from now on.
-    pub(crate) fn set_law(&mut self, law: Law) {
-        self.baseline = match law {
-            Law::Nmpc => None,
-            Law::Baseline(baseline) => Some(baseline),
-        };
     }
 
     /// The estimate of the last frame.
@@ -394,14 +382,13 @@ pub(super) mod sample {
     use crate::computer::table::PhaseTable;
     use crate::computer::{Computer, Input, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
-    use crate::guidance::baseline::Law;
     use crate::rules::arming::Uplink;
     use crate::vehicle::rigid::RigidState;
 
     /// A phase table as it is right after the release.
     pub(super) fn released() -> PhaseTable {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
-        let computer = Computer::at_power_up(&mission, Law::Nmpc, &RigidState::upright(300.0));
+        let computer = Computer::at_power_up(&mission, &RigidState::upright(300.0));
         computer.released(0).into_table()
     }
 
