@@ -1,8 +1,7 @@
 //! How a landing ended, in four words that every program says alike, and the limits that two of them are judged by.
 
 use alloc::borrow::ToOwned as _;
-use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -113,6 +112,13 @@ pub struct LimitResult {
     pub passed: bool,
 }
 
+impl fmt::Display for LimitResult {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, value, lowest, highest, unit, .. } = self;
+        write!(out, "{name} {value:.3} {unit} (limit {lowest:.3} to {highest:.3})")
+    }
+}
+
 /// Every limit, judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LandingVerdict {
@@ -168,15 +174,7 @@ impl LandingVerdict {
 
     /// One line: "inside every limit", or the broken limits with their values.
     pub fn summary(&self) -> String {
-        let broken: Vec<String> = self
-            .failures()
-            .map(|result| {
-                format!(
-                    "{} {:.3} {} (limit {:.3} to {:.3})",
-                    result.name, result.value, result.unit, result.lowest, result.highest
-                )
-            })
-            .collect();
+        let broken: Vec<String> = self.failures().map(LimitResult::to_string).collect();
         if broken.is_empty() { "inside every limit".to_owned() } else { broken.join(", ") }
     }
 }
@@ -247,8 +245,6 @@ impl fmt::Display for FlightEnding<'_> {
 
 #[cfg(test)]
 mod tests {
-    use alloc::string::ToString as _;
-
     use super::*;
     use crate::vehicle::dynamics::PlanarState;
 
