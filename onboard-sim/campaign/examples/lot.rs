@@ -60,7 +60,7 @@ fn main() -> anyhow::Result<()> {
             let numbers: Vec<u64> = (0..flights).collect();
             let one = |number: &u64| -> anyhow::Result<bool> {
                 let drawn = seen_by(pilot, &world, &draw(&world, &set, seed, *number));
-                Ok(Sortie::drawn_as(pilot, &set, &drawn)?.run().legs)
+                Ok(Sortie::drawn_as(pilot, &set, &drawn)?.run().landing.stands)
             };
             in_parallel(&numbers, one, &|_| {}).into_iter().collect()
         };

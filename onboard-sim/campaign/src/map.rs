@@ -300,7 +300,7 @@ impl fmt::Display for Axis {
 /// By what a mission lands on a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum By {
-    /// Its own guidance, inside the limits of the legs: a simulated flight for each cell.
+    /// Its own guidance: a simulated flight for each cell lands if it stands undamaged.
     Guidance,
     /// Perfect information ([`crate::attainable`]): an upper bound, in vertical motion alone.
     PerfectInformation,
@@ -357,8 +357,10 @@ fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Ce
     }
     let outcome = flight.run();
     Ok(Cell {
-        finding: if outcome.legs { Finding::Lands } else { Finding::Misses },
-        touchdown_speed_m_s: outcome.touchdown.map_or(f64::NAN, |touchdown| touchdown.vertical_m_s.abs()),
+        finding: if outcome.landing.stands { Finding::Lands } else { Finding::Misses },
+        touchdown_speed_m_s: outcome
+            .touchdown
+            .map_or(f64::NAN, |touchdown| touchdown.over_ground.vertical_m_s.abs()),
     })
 }
 

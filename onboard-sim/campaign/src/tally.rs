@@ -8,7 +8,7 @@ use nmpc::SolveStatus;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
-use sim::world::{RestOutcome, Touchdown};
+use sim::world::{FirstContact, RestOutcome};
 
 use crate::attainable;
 use crate::row::Row;
@@ -132,12 +132,12 @@ impl Tally {
     /// The row of the flight so far.
     pub fn row(&self) -> Row {
         let outcome = self.flight.outcome();
-        let touchdown = outcome.touchdown.as_ref();
+        let (touchdown, landing) = (outcome.touchdown.as_ref(), outcome.landing);
         let world = self.flight.world();
         let errors = self.flight.largest_errors();
         let drawn = self.flight.drawn();
         let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
-        let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
+        let at = |read: fn(&FirstContact) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
         let strain = outcome.rest.and_then(|rest| rest.strain);
@@ -174,16 +174,18 @@ impl Tally {
                 .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)
                 .filter(|burning_s| *burning_s >= 0.0),
             touchdown_time_s: at(|touchdown| touchdown.time_s),
-            touchdown_vertical_m_s: at(|touchdown| touchdown.vertical_m_s),
-            touchdown_lateral_m_s: at(|touchdown| touchdown.lateral_m_s),
-            touchdown_tilt_deg: at(|touchdown| touchdown.tilt_rad.to_degrees()),
-            touchdown_rate_deg_s: at(|touchdown| touchdown.rate_rad_s.to_degrees()),
+            touchdown_vertical_m_s: at(|touchdown| touchdown.over_ground.vertical_m_s),
+            touchdown_lateral_m_s: at(|touchdown| touchdown.over_ground.lateral_m_s),
+            touchdown_tilt_deg: at(|touchdown| touchdown.over_ground.tilt_rad.to_degrees()),
+            touchdown_rate_deg_s: at(|touchdown| touchdown.over_ground.rate_rad_s.to_degrees()),
             touchdown_x_m: at(|touchdown| touchdown.state.position_m.x),
             touchdown_y_m: at(|touchdown| touchdown.state.position_m.y),
             touchdown_thrust_over_weight: at(|touchdown| touchdown.thrust_n / touchdown.weight_n),
             leg_use: touchdown.map(|touchdown| self.leg_use(touchdown)),
-            strict: outcome.strict,
-            legs: outcome.legs,
+            stands: landing.stands,
+            upright: landing.upright,
+            envelope: landing.envelope,
+            table_2: landing.table_2,
             failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
             rest: outcome.rest.map_or("", |rest| rest_name(rest.outcome)).to_owned(),
             stroke_used: strain.map(|strain| strain.stroke_used),
@@ -210,12 +212,12 @@ impl Tally {
         }
     }
 
-    fn leg_use(&self, touchdown: &Touchdown) -> f64 {
+    fn leg_use(&self, touchdown: &FirstContact) -> f64 {
         let found = [
-            touchdown.vertical_m_s.abs(),
-            touchdown.lateral_m_s,
-            touchdown.tilt_rad.to_degrees(),
-            touchdown.rate_rad_s.to_degrees(),
+            touchdown.over_ground.vertical_m_s.abs(),
+            touchdown.over_ground.lateral_m_s,
+            touchdown.over_ground.tilt_rad.to_degrees(),
+            touchdown.over_ground.rate_rad_s.to_degrees(),
         ];
         found.iter().zip(&self.leg_limits).fold(0.0, |most, (found, limit)| (found / limit).max(most))
     }

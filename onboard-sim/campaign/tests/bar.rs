@@ -18,14 +18,14 @@ fn flown_by(recipe: &Recipe, flights: u64) -> Vec<Row> {
 
 #[test]
 fn regress_flights_without_dispersions_or_with_motor_scatter_only_land_strictly() {
-    assert!(flown("none", 2).iter().all(|row| row.strict));
-    assert!(flown("thrust-only", 10).iter().all(|row| row.strict));
+    assert!(flown("none", 2).iter().all(|row| row.table_2));
+    assert!(flown("thrust-only", 10).iter().all(|row| row.table_2));
 }
 
 /// About 987 of a thousand such flights land.
 #[test]
 fn regress_flights_with_field_dispersions_land_on_their_legs() {
-    let landed = flown("field", 20).iter().filter(|row| row.legs).count();
+    let landed = flown("field", 20).iter().filter(|row| row.stands).count();
     assert!(landed >= 18, "{landed} of 20");
 }
 
@@ -35,7 +35,7 @@ fn regress_flights_with_field_dispersions_land_on_their_legs() {
 fn regress_a_motor_that_turns_out_to_be_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();
     recipe.dispersion.mismatch.other_curve = [1.0, 1.0];
-    let standing = |recipe: &Recipe| flown_by(recipe, 20).iter().filter(|row| row.legs).count();
+    let standing = |recipe: &Recipe| flown_by(recipe, 20).iter().filter(|row| row.stands).count();
     let known = standing(&recipe);
     assert!(known >= 18, "{known} of 20");
     recipe.dispersion.mismatch.other_curve = [0.5, 0.5];

@@ -93,7 +93,7 @@ fn read_them(out: &Path) {
         assert_eq!(record.get_long(number).unwrap(), i64::try_from(row.number).unwrap());
         assert_eq!(record.get_double(impulse).unwrap().to_bits(), row.impulse_scale.to_bits());
         assert_eq!(record.get_double(vertical).ok(), row.touchdown_vertical_m_s);
-        assert_eq!(record.get_bool(legs).unwrap(), row.legs);
+        assert_eq!(record.get_bool(legs).unwrap(), row.stands);
         assert_eq!(record.get_string(failure).unwrap(), &row.failure);
         assert_eq!(record.get_double(onset).ok(), row.onset_height_m);
         count += 1;

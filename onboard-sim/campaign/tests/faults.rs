@@ -47,7 +47,7 @@ fn every_fault_ends_as_expected() {
 #[test]
 fn a_flight_without_faults_lands_and_a_silent_radio_changes_nothing() {
     let row = fly(&[]);
-    assert!(row.legs, "{row:?}");
+    assert!(row.stands, "{row:?}");
     let silent = fly(&["link-loss@0"]);
     assert_eq!(Row { faults: 0, ..silent }, row);
 }

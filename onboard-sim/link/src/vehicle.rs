@@ -11,7 +11,7 @@ use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::rules::verdict::{Landing, LandingVerdict, Limits, Touchdown};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::dynamics::PlanarState;
@@ -80,31 +80,14 @@ pub struct BatteryFacts {
     pub left: Option<f64>,
 }
 
-/// The contact that a landing is judged by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Impact {
-    /// Time since power-up, s.
-    pub time_s: f64,
-    /// State just before it.
-    pub state: PlanarState,
-}
-
 /// A touchdown and its judgement, which only a simulation knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
-    /// The contact that was judged.
-    pub impact: Impact,
-    /// Limit by limit.
-    pub verdict: LandingVerdict,
-    /// Inside every limit, and it stands.
-    pub landed: bool,
-}
-
-impl Judged {
-    /// One bit per broken limit, in the verdict's order.
-    pub fn violations(&self) -> u16 {
-        violations(&self.verdict)
-    }
+    /// The first contact, s since power-up.
+    pub time_s: f64,
+    /// What the legs felt of it.
+    pub touchdown: Touchdown,
+    pub landing: Landing,
 }
 
 /// A vehicle's state at one instant.
@@ -158,9 +141,9 @@ impl<'a> VehicleState<'a> {
         }
     }
 
-    /// What counts as a landing.
-    pub fn limits(&self) -> TouchdownLimits {
-        TouchdownLimits::of_the_legs(self.mission())
+    /// The design envelope of the legs.
+    pub fn limits(&self) -> Limits {
+        Limits::from(&self.mission().leg_limits)
     }
 
     /// Bit k: arming check k fails now. Zero off the pad.
@@ -194,7 +177,7 @@ impl<'a> VehicleState<'a> {
     /// a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]).
     pub fn since_zero_s(&self) -> Option<f64> {
         let air = self.airborne()?;
-        Some(self.judged.map_or(air.flown.time_s, |judged| judged.impact.time_s - air.released_at_s))
+        Some(self.judged.map_or(air.flown.time_s, |judged| judged.time_s - air.released_at_s))
     }
 
     /// Where it is and how it moves.
@@ -308,15 +291,15 @@ pub struct Planned<'a> {
 }
 
 impl Planned<'_> {
-    /// Its end over the ground, in its plane. A plan that misses its end by no more than `landing_miss` counts as a landing: it
+    /// Its end over the ground. A plan that misses its end by no more than `landing_miss` counts as a landing: it
     /// ends on the ground.
-    pub fn end(&self, landing_miss: f64) -> Option<PlanarState> {
+    pub fn end(&self, landing_miss: f64) -> Option<Touchdown> {
         let whole_s = self.states.len().saturating_sub(1) as f64 * self.step_s;
         let mut state = Plane::over_ground(self.states.last()?, self.wind_m_s, whole_s);
         if state.z_m.abs() <= landing_miss {
             state.z_m = 0.0;
         }
-        Some(state)
+        Some(Touchdown::over_ground(&RigidState::from(state), state.z_m))
     }
 
     /// Up to `N` points of its path over the ground, evenly spread, both ends kept, and how many: north and up, m, as it
@@ -376,6 +359,6 @@ pub fn violations(verdict: &LandingVerdict) -> u16 {
 }
 
 /// Flags as bits, the first in bit 0.
-fn bits(flags: impl Iterator<Item = bool>) -> u32 {
+pub(crate) fn bits(flags: impl Iterator<Item = bool>) -> u32 {
     flags.take(32).enumerate().fold(0, |bits, (place, set)| bits | (u32::from(set) << place))
 }

@@ -23,8 +23,7 @@ use nalgebra::Vector3;
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw, rail_upwind_m};
 use crate::fault::{Breakage, Injector};
-use crate::limits::Limits;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, by_envelope};
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
 use crate::surroundings::{Feedback, Surroundings, falling_as, world_at};
@@ -537,11 +536,10 @@ impl Rehearsal {
         let [plans, converged] = *plans;
         let outcome = flight.outcome();
         let how = outcome.failure.map_or("landed", |failure| failure.name());
-        let limits = Limits::of(flight.mission());
-        let landing =
-            outcome.touchdown.map(|touchdown| PredictedLanding::from(&limits.by_legs(&touchdown).1));
+        let legs = &flight.mission().leg_limits;
+        let landing = outcome.touchdown.map(|contact| PredictedLanding::from(&by_envelope(legs, &contact)));
         let rehearsed = Rehearsed {
-            warm: outcome.legs && converged > 0,
+            warm: outcome.landing.stands && converged > 0,
             found: format!("{how}, {converged} of {plans} plans converged"),
             landing,
         };

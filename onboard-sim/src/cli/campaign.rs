@@ -176,7 +176,11 @@ fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
         let how = "an upper bound: vertical motion, no wind, no attitude";
         (By::PerfectInformation, "could it be landed with perfect information?", how)
     } else {
-        (By::Guidance, "does its own guidance land on its legs?", "one simulated flight for each cell")
+        (
+            By::Guidance,
+            "does its own guidance leave it standing undamaged?",
+            "one simulated flight for each cell",
+        )
     };
     let title = format!("{}: {asked}", recipe.mission.name);
     let default = ["thrust-scale=0.8:1.2:21", "wind=0:10:11"];
@@ -194,9 +198,10 @@ struct Cost {
 
 /// Shows how far a campaign is.
 fn show(stopwatch: &Stopwatch, progress: &Progress) {
-    let Progress { flown, of, legs, strict, .. } = progress;
+    let Progress { flown, of, stands, envelope, .. } = progress;
     let rate = *flown as f64 / stopwatch.elapsed_s().max(1e-3);
-    let words = format!("flights, {rate:.1} a second, landed: legs {legs}, strict {strict}");
+    let words =
+        format!("flights, {rate:.1} a second, {stands} stand undamaged, {envelope} inside the envelope");
     stopwatch.show(*flown as usize, *of as usize, words);
 }
 

@@ -2,6 +2,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
+use flight::rules::verdict::{LandingVerdict, LimitResult, TABLE_2, Touchdown};
 use nmpc::Problem;
 use nmpc::dynamics::PlanarState;
 use nmpc::paper::{self, HORIZON};
@@ -160,38 +161,17 @@ pub(super) fn all() -> Vec<Case> {
     ]
 }
 
-/// Table 2: names, lowest and highest values, units.
-const TABLE_2: [(&str, f64, f64, &str); 6] = [
-    ("x", -20.0, 20.0, "m"),
-    ("altitude", 0.0, 0.2, "m"),
-    ("pitch error", -5.0, 5.0, "deg"),
-    ("u", -0.4, 0.4, "m/s"),
-    ("w", -0.1, 0.1, "m/s"),
-    ("pitch rate", -2.0, 2.0, "deg/s"),
-];
-
-/// How far below the ground a plan may end and still count as ending on it, m: it meets the ground only within its solver's
-/// tolerance.
-const HEIGHT_TOLERANCE_M: f64 = 1e-3;
-
 /// The limits of Table 2 that a final state breaks, in words; none means that it lands.
 pub(super) fn broken(state: &PlanarState) -> Vec<String> {
-    let on_ground = (-HEIGHT_TOLERANCE_M..0.0).contains(&state.z_m);
-    let values = [
-        state.x_m,
-        if on_ground { 0.0 } else { state.z_m },
-        (state.theta_rad - FRAC_PI_2).to_degrees(),
-        state.u_m_s,
-        state.w_m_s,
-        state.q_rad_s.to_degrees(),
-    ];
-    let limits = TABLE_2.iter().zip(values);
-    limits
-        .filter(|((_, lowest, highest, _), value)| !(lowest..=highest).contains(&value))
-        .map(|((name, lowest, highest, unit), value)| {
-            format!("{name} {value:.3} {unit} (limit {lowest:.3} to {highest:.3})")
-        })
-        .collect()
+    let end = Touchdown {
+        distance_m: state.x_m.abs(),
+        height_m: state.z_m,
+        vertical_m_s: state.u_m_s,
+        lateral_m_s: state.w_m_s.abs(),
+        tilt_rad: (state.theta_rad - FRAC_PI_2).abs(),
+        rate_rad_s: state.q_rad_s.abs(),
+    };
+    LandingVerdict::judge_plan(&TABLE_2, &end).failures().map(LimitResult::to_string).collect()
 }
 
 #[cfg(test)]
@@ -232,13 +212,13 @@ mod tests {
         assert!(failed(upright).is_empty());
         assert!(failed(PlanarState { z_m: -1e-12, ..upright }).is_empty());
         for (name, state) in [
-            ("x", PlanarState { x_m: -20.1, ..upright }),
-            ("altitude", PlanarState { z_m: 0.21, ..upright }),
-            ("altitude", PlanarState { z_m: -0.002, ..upright }),
-            ("pitch error", PlanarState { theta_rad: FRAC_PI_2 - 0.1, ..upright }),
-            ("u", PlanarState { u_m_s: -0.41, ..upright }),
-            ("w", PlanarState { w_m_s: 0.11, ..upright }),
-            ("pitch rate", PlanarState { q_rad_s: 0.036, ..upright }),
+            ("distance", PlanarState { x_m: -20.1, ..upright }),
+            ("height", PlanarState { z_m: 0.21, ..upright }),
+            ("height", PlanarState { z_m: -0.002, ..upright }),
+            ("tilt", PlanarState { theta_rad: FRAC_PI_2 - 0.1, ..upright }),
+            ("vertical speed", PlanarState { u_m_s: -0.41, ..upright }),
+            ("lateral speed", PlanarState { w_m_s: 0.11, ..upright }),
+            ("rotation rate", PlanarState { q_rad_s: 0.036, ..upright }),
         ] {
             assert_eq!(failed(state), [name]);
         }

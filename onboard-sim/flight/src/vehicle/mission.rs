@@ -152,26 +152,6 @@ impl StateWeights {
     }
 }
 
-/// What counts as a landing (Table 2 of the landing paper).
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TouchdownBox {
-    /// Largest horizontal distance, m.
-    pub x_m: f64,
-    /// Lowest altitude, m.
-    pub altitude_min_m: f64,
-    /// Highest altitude, m.
-    pub altitude_max_m: f64,
-    /// Largest pitch error from upright, degrees.
-    pub pitch_error_deg: f64,
-    /// Largest axial speed, m/s.
-    pub u_m_s: f64,
-    /// Largest lateral speed, m/s.
-    pub w_m_s: f64,
-    /// Largest pitch rate, degrees per second.
-    pub pitch_rate_deg_s: f64,
-}
-
 /// Limits of the pad checks before arming.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -301,8 +281,6 @@ pub struct Mission {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
-    /// What counts as a landing: the landing paper's Table 2.
-    pub touchdown_limits: TouchdownBox,
     pub leg_limits: LegLimits,
 }
 

@@ -6,7 +6,7 @@ use alloc::string::{String, ToString as _};
 use core::fmt::Display;
 
 use crate::vehicle::airframe;
-use crate::vehicle::mission::{ArmingLimits, FinalBox, GateLimits, SolverLimits, StateWeights, TouchdownBox};
+use crate::vehicle::mission::{ArmingLimits, FinalBox, GateLimits, SolverLimits, StateWeights};
 
 /// A value outside its range.
 pub(super) struct BadValue {
@@ -105,26 +105,6 @@ pub(super) fn solver(section: &str, solver: &SolverLimits) -> Check {
         solver.guess_half_waves,
         "from 1 to 10",
     )
-}
-
-pub(super) fn touchdown_limits(touchdown: &TouchdownBox) -> Check {
-    positive("touchdown_limits.x_m", touchdown.x_m)?;
-    require(
-        (-10.0..=10.0).contains(&touchdown.altitude_min_m),
-        "touchdown_limits.altitude_min_m",
-        touchdown.altitude_min_m,
-        "from -10 to 10",
-    )?;
-    require(
-        touchdown.altitude_max_m.is_finite() && touchdown.altitude_max_m > touchdown.altitude_min_m,
-        "touchdown_limits.altitude_max_m",
-        touchdown.altitude_max_m,
-        "finite and above touchdown_limits.altitude_min_m",
-    )?;
-    positive("touchdown_limits.pitch_error_deg", touchdown.pitch_error_deg)?;
-    positive("touchdown_limits.u_m_s", touchdown.u_m_s)?;
-    positive("touchdown_limits.w_m_s", touchdown.w_m_s)?;
-    positive("touchdown_limits.pitch_rate_deg_s", touchdown.pitch_rate_deg_s)
 }
 
 pub(super) fn arming(arming: &ArmingLimits) -> Check {

@@ -16,12 +16,12 @@ use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
     TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct,
-    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState,
-    TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
+    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLanding, TdLatch, TdLimit, TdMotor, TdPadCheckItem,
+    TdPadCheckState, TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
-use crate::vehicle::{Identity, VehicleKind, VehicleState, violations};
+use crate::vehicle::{Identity, VehicleKind, VehicleState, bits, violations};
 
 pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
     let (mode, time_s) = (state.mode(), state.time_s);
@@ -201,12 +201,12 @@ pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessag
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
         time_boot_ms: boot_ms(state.time_s),
         time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s?) as i32,
-        x_m: end.x_m as f32,
-        altitude_m: end.z_m as f32,
-        pitch_rad: end.theta_rad as f32,
-        u_m_s: end.u_m_s as f32,
-        w_m_s: end.w_m_s as f32,
-        q_rad_s: end.q_rad_s as f32,
+        distance_m: end.distance_m as f32,
+        height_m: end.height_m as f32,
+        vertical_m_s: end.vertical_m_s as f32,
+        lateral_m_s: end.lateral_m_s as f32,
+        tilt_rad: end.tilt_rad as f32,
+        rate_rad_s: end.rate_rad_s as f32,
         limits_violated: TdLimit::from_bits_truncate(violated),
     }))
 }
@@ -223,31 +223,29 @@ pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
 
 pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
     let judged = state.judged.as_ref()?;
-    let impact = &judged.impact;
+    let at = &judged.touchdown;
+    let violated = violations(&LandingVerdict::judge(&state.limits(), at));
+    let landing = judged.landing.flags().into_iter();
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
         time_boot_ms: boot_ms(state.time_s),
-        contact_ms: boot_ms(impact.time_s),
-        x_m: impact.state.x_m as f32,
-        altitude_m: impact.state.z_m as f32,
-        pitch_rad: impact.state.theta_rad as f32,
-        u_m_s: impact.state.u_m_s as f32,
-        w_m_s: impact.state.w_m_s as f32,
-        q_rad_s: impact.state.q_rad_s as f32,
-        limits_violated: TdLimit::from_bits_truncate(judged.violations()),
-        landed: u8::from(judged.landed),
+        contact_ms: boot_ms(judged.time_s),
+        distance_m: at.distance_m as f32,
+        vertical_m_s: at.vertical_m_s as f32,
+        lateral_m_s: at.lateral_m_s as f32,
+        tilt_rad: at.tilt_rad as f32,
+        rate_rad_s: at.rate_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(violated),
+        landing: TdLanding::from_bits_truncate(bits(landing) as u8),
     }))
 }
 
 pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
     let limits = state.limits();
     MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
-        x_m: limits.x_m as f32,
-        altitude_min_m: limits.altitude_min_m as f32,
-        altitude_max_m: limits.altitude_max_m as f32,
-        pitch_error_rad: limits.pitch_error_rad as f32,
-        u_m_s: limits.u_m_s as f32,
-        w_m_s: limits.w_m_s as f32,
-        q_rad_s: limits.pitch_rate_rad_s as f32,
+        vertical_m_s: limits.vertical_m_s as f32,
+        lateral_m_s: limits.lateral_m_s as f32,
+        tilt_rad: limits.tilt_rad as f32,
+        rate_rad_s: limits.rate_rad_s as f32,
         gimbal_limit_rad: state.mission().airframe.gimbal.limit_rad() as f32,
     })
 }

@@ -58,7 +58,6 @@ pub(super) fn validate(mission: &Mission) -> Check {
     aim(&mission.aim)?;
     ranges::arming(&mission.arming)?;
     ranges::gate(&mission.gate)?;
-    ranges::touchdown_limits(&mission.touchdown_limits)?;
     legs(&mission.leg_limits)
 }
 
