@@ -4,7 +4,7 @@
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use nmpc::SolveStatus;
+use nmpc::Status;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
@@ -124,7 +124,7 @@ impl Tally {
             let report = pilot.report();
             self.plans[usize::from(computer.level().index())] += 1;
             self.solver_iterations += report.iterations as u64;
-            let solved = matches!(report.status, SolveStatus::Converged | SolveStatus::NotRun);
+            let solved = matches!(report.status, Status::Converged | Status::NotRun);
             self.solver_failures += u64::from(!solved);
         }
     }

@@ -246,7 +246,7 @@ impl fmt::Display for FlightEnding<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vehicle::dynamics::PlanarState;
+    use nalgebra::{UnitQuaternion, Vector3};
 
     const AT_REST: Touchdown = Touchdown {
         distance_m: 0.0,
@@ -260,16 +260,15 @@ mod tests {
     #[test]
     fn a_leaning_vehicle_moves_over_the_ground_as_along_its_axis_turned_by_its_tilt() {
         let tilt_rad = 0.2;
-        let planar = PlanarState {
-            x_m: -3.0,
-            z_m: 1.0,
-            theta_rad: core::f64::consts::FRAC_PI_2 - tilt_rad,
-            u_m_s: -1.0,
-            w_m_s: 0.0,
-            q_rad_s: -0.1,
+        let upright = RigidState::upright(1.0);
+        let world_from_body =
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), tilt_rad) * upright.world_from_body;
+        let state = RigidState {
+            position_m: Vector3::new(-3.0, 0.0, 1.0),
+            velocity_m_s: world_from_body * -Vector3::x(),
+            world_from_body,
+            rate_rad_s: Vector3::new(0.3, -0.1, 0.0),
         };
-        let mut state = RigidState::from(planar);
-        state.rate_rad_s.x = 0.3;
         let [ground, axis] = [Touchdown::over_ground, Touchdown::along_axis].map(|of| of(&state, 0.0));
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
         assert!(near(axis.vertical_m_s, -1.0) && near(axis.lateral_m_s, 0.0), "{axis:?}");

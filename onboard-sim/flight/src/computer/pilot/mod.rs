@@ -24,11 +24,10 @@ use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
-use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
+use crate::guidance::powered::{ControlLevel, LandingSolved, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
 use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
-use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -244,18 +243,6 @@ impl Pilot {
         }
     }
 
-    /// The states of the plan being flown and the step between them, s, if there is a plan. They lie in the plane of
-    /// the landing, in the frame that moves with the wind along that plane and coincided with the ground's when the
-    /// plan began.
-    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
-        self.powered.planned()
-    }
-
-    /// The plane of the landing, once it is chosen.
-    pub fn plane(&self) -> Option<&Plane> {
-        self.powered.plane()
-    }
-
     /// The mission it flies.
     pub fn mission(&self) -> &Mission {
         &self.model.mission
@@ -272,8 +259,8 @@ impl Pilot {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
         let estimate = self.estimate.as_ref()?;
         let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
-        let (preferred, fallback) = self.model.situations_to_plan(estimate, &burning, &input.fins_rad);
-        before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
+        let situation = self.model.situation_to_plan(estimate, &burning);
+        before.powered.inspect(input.time_s, &estimate.state, &situation)
     }
 }
 

@@ -60,6 +60,11 @@ fn on_the_way_up(
     (measurements, VehicleNow { motor_burning: shaken, air_density_kg_m3: 0.0, ..*vehicle })
 }
 
+/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and keep the vehicle in the
+/// middle of that band.
+const FIN_SIGMAS: f64 = 1.0;
+const FIN_PLACE: f64 = 0.5;
+
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &Input<'_>) {
@@ -91,7 +96,7 @@ impl Pilot {
         let due = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         let burning = self.burning(mode, input.time_s).filter(|_| mode.phase.in_landing_burn());
         if let (Some(burning), Some(estimate), true) = (burning, self.estimate, due) {
-            self.plan_landing(input.time_s, &estimate, &burning, &input.fins_rad);
+            self.plan_landing(input.time_s, &estimate, &burning);
         }
         due && (mode.phase.in_descent() || mode.phase.in_landing_burn())
     }
@@ -482,10 +487,9 @@ impl Pilot {
         Ok(effects)
     }
 
-    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
-        let state = &estimate.state;
-        let (preferred, fallback) = self.model.situations_to_plan(estimate, situation, fins_rad);
-        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
+    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning) {
+        let planned = self.model.situation_to_plan(estimate, situation);
+        self.powered.plan(time_s, &estimate.state, &planned);
         if self.powered.fin_share(time_s).is_none() {
             self.fin_share = self.fin_share_of_band(estimate, situation);
         }
@@ -494,7 +498,7 @@ impl Pilot {
     /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
     fn fin_share_of_band(&self, estimate: &Estimate, situation: &Burning) -> f64 {
         let column = self.model.column(situation.density_kg_m3, self.model.mission.fin_soft_tilt_deg);
-        let sigmas = self.model.mission.fin_sigmas;
+        let sigmas = FIN_SIGMAS;
         let [weak, strong] =
             [-sigmas, sigmas].map(|sigmas| self.model.doubted_burn(situation.burning_s, sigmas));
         column.fin_share(
@@ -502,7 +506,7 @@ impl Pilot {
             situation.burning_s,
             estimate.state.velocity_m_s.z,
             estimate.state.position_m.z - self.model.feet_below_cg_m(&situation.mass),
-            self.model.mission.fin_place,
+            FIN_PLACE,
         )
     }
 
