@@ -32,7 +32,8 @@ where
     let size = |v: &Vector3<D>| (v.dot(v) + SMOOTH).sqrt();
 
     // Leans and rates at their means, under the acceleration of the gimbal alone.
-    let mean_lean = |lean: D, rate: D, gimbal: D| lean + rate * (h / 2.0) + gimbal * (push.turning_rad_s2 * h * h / 6.0);
+    let mean_lean =
+        |lean: D, rate: D, gimbal: D| lean + rate * (h / 2.0) + gimbal * (push.turning_rad_s2 * h * h / 6.0);
     let mean_rate = |rate: D, gimbal: D| rate + gimbal * (push.turning_rad_s2 * h / 2.0);
     let (sin_p, cos_p) = mean_lean(p0, p_rate0, gimbal_p).sin_cos();
     let (sin_r, cos_r) = mean_lean(r0, r_rate0, gimbal_r).sin_cos();
@@ -111,7 +112,11 @@ pub(crate) fn cost_at(problem: &SpaceProblem, k: usize) -> (Node, Node) {
         weight.fixed_rows_mut::<2>(0).fill(weights.place);
     }
     if k < problem.pushes.len() {
-        weight.fixed_rows_mut::<INPUTS>(STATES).copy_from_slice(&[weights.gimbal, weights.gimbal, weights.fins]);
+        weight.fixed_rows_mut::<INPUTS>(STATES).copy_from_slice(&[
+            weights.gimbal,
+            weights.gimbal,
+            weights.fins,
+        ]);
     }
     let free = [*x_m, *y_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, HALF_OPEN];
     (weight * *step_s, Node::from(free))

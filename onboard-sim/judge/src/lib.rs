@@ -11,6 +11,8 @@
 mod landing;
 mod sqp;
 
+use std::f64::consts::PI;
+
 use nmpc::space::{INPUTS, STATES, SpaceProblem, State};
 
 use self::landing::{Node, Range, after, cost_at, ranges};
@@ -45,15 +47,15 @@ pub struct Judgement {
     pub inputs: Vec<[f64; INPUTS]>,
 }
 
-/// Turns of the lean of the judge's own guesses.
-const TURNS: [f64; 3] = [1.0, -1.0, 0.0];
+/// The judge's own guesses: turns of the lean, and how far from the problem's direction it begins, rad.
+const GUESSES: [(f64, f64); 5] = [(1.0, 0.0), (-1.0, 0.0), (1.0, PI), (-1.0, PI), (0.0, 0.0)];
 
 /// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the answer. A plan with
 /// another number of intervals is not used. The final time is that of the problem.
 pub fn solve(problem: &SpaceProblem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {
     let search = Search::of(problem);
     let given = start.and_then(|(states, inputs)| nodes(problem, states, inputs));
-    let starts = given.into_iter().chain(TURNS.iter().map(|turns| search.guess(*turns)));
+    let starts = given.into_iter().chain(GUESSES.iter().map(|guess| search.guess(*guess)));
     let mut iterations = 0;
     let mut best: Option<(bool, Score, Vec<Node>)> = None;
     for start in starts {
@@ -82,7 +84,8 @@ pub fn score(problem: &SpaceProblem, states: &[State], inputs: &[[f64; INPUTS]])
 }
 
 impl Score {
-    const NONE: Self = Self { cost: f64::NAN, merit: f64::NAN, miss: f64::NAN, worst: None, defect: f64::NAN };
+    const NONE: Self =
+        Self { cost: f64::NAN, merit: f64::NAN, miss: f64::NAN, worst: None, defect: f64::NAN };
 }
 
 fn nodes(problem: &SpaceProblem, states: &[State], inputs: &[[f64; INPUTS]]) -> Option<Vec<Node>> {
