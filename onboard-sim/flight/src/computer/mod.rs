@@ -166,6 +166,18 @@ impl Computer {
         (output, solved)
     }
 
+    /// The same for a landing in space.
+    pub fn step_inspected_in_space(
+        &mut self,
+        input: &Input<'_>,
+    ) -> (Output, Option<crate::guidance::powered::SpaceSolved>) {
+        let before = self.pilot.clone();
+        let output = self.step(input);
+        let solved =
+            self.flown().and_then(|flown| self.pilot.space_planned(&before, self.table.mode(), &flown));
+        (output, solved)
+    }
+
     /// Reports what the input changes: the pin, and a log that has stopped.
     fn report_changes(&mut self, input: &Input<'_>) {
         let pin_out = self.table.mode().interlocks.pin_out;

@@ -289,6 +289,21 @@ impl Pilot {
     }
 }
 
+impl Pilot {
+    pub(crate) fn space_planned(
+        &self,
+        before: &Self,
+        mode: &Mode,
+        input: &Input<'_>,
+    ) -> Option<crate::guidance::powered::SpaceSolved> {
+        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
+        let estimate = self.estimate.as_ref()?;
+        let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
+        let (preferred, _) = self.model.situations_to_plan(estimate, &burning, &input.fins_rad);
+        before.powered.inspect_space(input.time_s, &estimate.state, &preferred)
+    }
+}
+
 // What a pilot saves for a restart in the air, and how it goes on.
 
 /// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has

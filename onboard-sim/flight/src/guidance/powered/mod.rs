@@ -26,7 +26,7 @@ pub use self::report::{ControlLevel, LandingSolved, PoweredReport, PoweredSettin
 use self::situation::{Ahead, Flown, largest_tilt_rad};
 pub use self::situation::{Plane, PoweredSituation};
 use self::space::SpaceGuidance;
-pub use self::space::SpaceSettings;
+pub use self::space::{SpaceSettings, SpaceSolved};
 use crate::control::aim::Aim;
 use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{FinalBox, SolverLimits};

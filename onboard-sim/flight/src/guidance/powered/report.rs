@@ -236,6 +236,18 @@ impl PoweredGuidance {
     }
 }
 
+impl PoweredGuidance {
+    pub(crate) fn inspect_space(
+        &self,
+        time_s: f64,
+        state: &RigidState,
+        preferred: &PoweredSituation<'_>,
+    ) -> Option<super::SpaceSolved> {
+        let space = self.settings.space.as_ref().filter(|_| !self.is_flown_out(time_s))?;
+        self.space.inspect(time_s, state, preferred, &self.settings, space)
+    }
+}
+
 /// The problem of one final time.
 fn at_final_time(posed: &FreeTimeProblem, ahead: &Ahead<'_, '_>, final_time_s: f64) -> Problem {
     let mut problem = posed.landing.clone();

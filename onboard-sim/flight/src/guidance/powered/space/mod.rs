@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use nmpc::SolveStatus;
 use nmpc::free_time::Motor;
-use nmpc::space::{Drag, End, Outcome, Push, SpaceProblem, SpaceWorkspace, State, Status, Weights};
+use nmpc::space::{Drag, End, INPUTS, Outcome, Push, SpaceProblem, SpaceWorkspace, State, Status, Weights};
 use serde::{Deserialize, Serialize};
 
 use self::plan::SpacePlan;
@@ -28,6 +28,16 @@ pub struct SpaceSettings {
     pub guess_lean_deg: f64,
     /// Weight of the fins' distance from half open.
     pub fin_weight: f64,
+}
+
+/// A landing that is planned again outside the flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpaceSolved {
+    /// The problem at the final time of the plan.
+    pub problem: SpaceProblem,
+    pub states: Vec<State>,
+    pub inputs: Vec<[f64; INPUTS]>,
+    pub outcome: Outcome,
 }
 
 /// First change of the final time that is tried, s, the factor after one that was no better, and the smallest change.
@@ -183,6 +193,24 @@ impl SpaceGuidance {
         }
         self.problem = Some(problem);
         Some(Outcome { iterations, ..best })
+    }
+
+    /// Solves what [`plan`](Self::plan) solves, outside the flight.
+    pub(super) fn inspect(
+        &self,
+        time_s: f64,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+        settings: &PoweredSettings,
+        space: &SpaceSettings,
+    ) -> Option<SpaceSolved> {
+        let mut again = self.clone();
+        let outcome = again.search(time_s, state, situation, settings, space)?;
+        let (states, inputs) = again.found.path();
+        let (states, inputs) = (states.to_vec(), inputs.to_vec());
+        let mut problem = again.problem.take()?;
+        stretch(&mut problem, situation, settings, again.found.length_s(), inputs.len());
+        Some(SpaceSolved { problem, states, inputs, outcome })
     }
 
     /// The flown plan's motion in the plane of the report, and the step between its states, s.

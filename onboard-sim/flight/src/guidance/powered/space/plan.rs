@@ -37,6 +37,10 @@ impl SpacePlan {
         self.step_s * self.intervals() as f64
     }
 
+    pub(super) fn path(&self) -> (&[State], &[[f64; INPUTS]]) {
+        (&self.states, &self.inputs)
+    }
+
     pub(super) fn left_s(&self, time_s: f64) -> f64 {
         self.begins_s + self.length_s() - time_s
     }
