@@ -36,12 +36,8 @@ fn problem(thrust_over_weight: f64) -> Problem {
         guess_towards_rad: 0.6,
         solver: SolverLimits {
             max_iterations: 200,
-            max_iterations_after_miss: 1,
             kkt_tolerance: 1e-6,
             terminal_penalty: 1000.0,
-            qp_max_iterations: 1,
-            guess_amplitude_rad: 0.0,
-            guess_half_waves: 1,
         },
     }
 }
