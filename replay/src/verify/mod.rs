@@ -617,9 +617,9 @@ pub(crate) struct Args {
     /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
     #[arg(long)]
     strict: bool,
-    /// Solve this frame of the only log again.
-    #[arg(long, value_name = "FRAME", conflicts_with = "strict")]
-    explain: Option<u64>,
+    /// Solve the plan of this frame of the only log again, and judge it; or of `all` frames, which takes a minute.
+    #[arg(long, value_name = "FRAME|all", conflicts_with = "strict")]
+    explain: Option<String>,
     #[command(flatten)]
     held: baseline::Arguments,
     #[command(flatten)]
@@ -634,7 +634,7 @@ impl Args {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
-        if let Some(frame) = self.explain {
+        if let Some(frame) = &self.explain {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, frame, self.json);
         }
