@@ -147,7 +147,7 @@ impl<'a> Prepared<'a> {
         let verdict = sortie::verdict(&rerun.flight);
         let reflown = verdict.as_ref().map(VerdictFacts::of);
         let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
-        let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+        let stands = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
         let report = ReflyReport {
             kind: "closed loop: flown again in simulation",
             file: self.recording.name.clone(),
@@ -159,7 +159,7 @@ impl<'a> Prepared<'a> {
             start: self.state,
             reached: self.reached,
             thrust_scale: rerun.flight.world().truth().impulse_scale,
-            verdict_changed: landed(&self.recorded).map(|then| Some(then) != landed(&reflown)),
+            verdict_changed: stands(&self.recorded).map(|then| Some(then) != stands(&reflown)),
             recorded: self.recorded.clone(),
             margin: reflown.as_ref().map(margin),
             reflown,
