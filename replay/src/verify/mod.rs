@@ -47,7 +47,9 @@ use serde::Serialize;
 
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
-use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
+use crate::log::{
+    BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+};
 use crate::print::{counted, print_json, shown};
 
 /// The topics that a verification reads.
@@ -586,10 +588,8 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     if let Some(obstacle) = &consequence.obstacle {
         return writeln!(output, "verdict: whether it would change is not known: {}", shown(obstacle));
     }
-    let words = |verdict: Option<bool>| match verdict {
-        Some(true) => "LANDED",
-        Some(false) => "NOT LANDED",
-        None => "no verdict",
+    let word = |verdict: &Option<VerdictFacts>| {
+        verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
     };
     let answer = match consequence.changed {
         Some(true) => "would CHANGE",
@@ -599,9 +599,9 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     writeln!(
         output,
         "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
-        words(consequence.recorded.as_ref().map(|verdict| verdict.landed)),
+        word(&consequence.recorded),
         consequence.from_frame,
-        words(consequence.reflown.as_ref().map(|verdict| verdict.landed))
+        word(&consequence.reflown)
     )
 }
 
