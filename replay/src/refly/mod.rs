@@ -255,7 +255,7 @@ pub fn refly_flight(
         .extend(verdict.iter().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict.clone())))));
     let [recorded, reflown] =
         [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
-    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
     let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
     let mut report = ReflyReport {
         kind: "closed loop: flown again in simulation",

@@ -135,7 +135,7 @@ fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>,
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let planned: Vec<u64> = frames.iter().filter(|frame| plans(frame)).map(logged).collect();
     let mut explained = Vec::new();
-    for recorded in &frames {
+    for recorded in frames {
         let number = logged(recorded);
         if only.is_some_and(|only| only != number) || only.is_none() && !planned.contains(&number) {
             controller.run_again(recorded)?;
