@@ -164,7 +164,7 @@ fn bar(limit: &VerdictLimit, share: f64) -> String {
 fn height(flight: &Flight) -> String {
     let track = flight.track.iter().map(|sample| (flight.axis_s(sample.time_s), sample.state[1]));
     let frames = flight.recording.frames.iter().filter_map(|frame| {
-        let height_m = frame.input.measured.as_ref()?.pressure_altitude_m?;
+        let height_m = frame.input.measured.pressure_altitude_m?;
         Some((flight.axis_s(frame.input.time_s), height_m))
     });
     let lines = vec![
