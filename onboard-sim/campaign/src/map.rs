@@ -1,8 +1,9 @@
 //! Maps where a vehicle lands, over two quantities of the start, the motor or the day.
 //!
 //! There are two questions: whether a mission can be landed with perfect information, which is cheaper, and whether its own
-//! guidance lands it ([`map`]). Cells are independent, so a map does not depend on how many of them are computed at the same time. A cell differs from the
-//! mission's nominal flight in two values alone: the draw of one flight number is the same in every cell.
+//! guidance lands it ([`map`]). Cells are independent, so a map does not depend on how many of them are computed at the same
+//! time. A cell differs from the mission's nominal flight in two values alone: the draw of one flight number is the same in
+//! every cell.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -154,7 +155,7 @@ pub enum Quantity {
 
 impl Quantity {
     const ALL: [Self; 5] = [Self::IgnitionHeight, Self::ThrustScale, Self::Wind, Self::Tilt, Self::Height];
-    /// What the bound of perfect information knows: no wind and no attitude.
+    /// What the bound of perfect information knows: no wind and no attitude. All are above 0.
     const ATTAINABLE: [Self; 3] = [Self::IgnitionHeight, Self::ThrustScale, Self::Height];
 
     /// The name on a command line, that of a table's column with its unit, and the words beside a picture's axis.

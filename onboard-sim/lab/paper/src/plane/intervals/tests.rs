@@ -2,10 +2,8 @@ use proptest::prelude::*;
 use pulp::{Scalar, Simd, WithSimd};
 use stages::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
-use super::lanes::Lanes;
 use super::*;
-use super::{DIRECTIONS, pair};
-use crate::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
+use crate::plane::dynamics::PlanarState;
 use crate::problem::{self, THRUST_N};
 
 const STEP_S: f64 = 0.1;
