@@ -58,7 +58,7 @@ pub(crate) struct Search<'a> {
     pub(crate) ranges: Vec<Range>,
 }
 
-/// The last iterate of a search.
+/// Where a search ended: if it has not converged, at its best iterate; without nodes if nothing flies.
 pub(crate) struct End {
     pub(crate) converged: bool,
     pub(crate) iterations: usize,
@@ -114,31 +114,33 @@ impl<'a> Search<'a> {
     pub(crate) fn descend(&self, mut nodes: Vec<Node>) -> End {
         let mut multipliers = vec![0.0; self.ranges.len()];
         let mut merits: Vec<f64> = Vec::new();
-        let (mut curved, mut converged, mut iterations) = (false, false, 0);
+        let mut best = (f64::INFINITY, Vec::new());
+        let (mut curved, mut iterations) = (false, 0);
         while iterations < ITERATIONS {
             let Some(stages) = self.model(&nodes, &multipliers, curved) else { break };
             let Some(step) = self.subproblem(&nodes, &stages) else { break };
             iterations += 1;
             // Before the first step the guess is not flyable, and has no merit.
-            if let Some(merit) = merits.last() {
-                let least = TOLERANCE * (1.0 + merit);
-                converged = step.promised.abs() <= least;
-                if step.promised <= least {
-                    break;
-                }
+            let converged =
+                merits.last().is_some_and(|merit| step.promised.abs() <= TOLERANCE * (1.0 + merit));
+            if converged {
+                return End { converged, iterations, nodes };
             }
             let recent = merits.iter().rev().take(MEMORY).copied();
             let reference = recent.reduce(f64::max).unwrap_or(f64::INFINITY);
-            let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(SHARES);
-            let taken = shares.into_iter().find_map(|share| {
+            let mut shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(SHARES);
+            let taken = shares.find_map(|share| {
                 let flown = self.flown(&nodes, &stages, &step, share);
                 let merit = scored(self.problem, &self.ranges, &flown).merit;
-                (merit < reference - KEPT * share * step.promised).then_some((flown, merit, share))
+                (merit < reference - KEPT * share * step.promised.max(0.0)).then_some((flown, merit, share))
             });
             match taken {
                 Some((flown, merit, share)) => {
                     nodes = flown;
                     merits.push(merit);
+                    if merit < best.0 {
+                        best = (merit, nodes.clone());
+                    }
                     for (kept, new) in multipliers.iter_mut().zip(step.multipliers) {
                         *kept += share * (new - *kept);
                     }
@@ -149,7 +151,7 @@ impl<'a> Search<'a> {
                 None => break,
             }
         }
-        End { converged, iterations, nodes }
+        End { converged: false, iterations, nodes: best.1 }
     }
 
     /// The quadratic model about a plan, with the curvature of the dynamics or without it.
