@@ -1,7 +1,6 @@
 //! `onboard-sim`: the guidance with its NMPC against a simulated vehicle, on MAVLink.
 
 mod cli;
-mod paper;
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -63,9 +62,6 @@ enum Command {
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
     #[command(after_help = "Example: onboard-sim hazard --profile mk2 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
-    /// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
-    #[command(after_help = "Example: onboard-sim paper --out figures")]
-    Paper(cli::paper::PaperArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
     Keygen {
@@ -110,7 +106,6 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Motors(arguments) => cli::motors::motors(&arguments),
         Command::Card(arguments) => cli::motors::card(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
-        Command::Paper(arguments) => cli::paper::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),

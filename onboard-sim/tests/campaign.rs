@@ -6,7 +6,6 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use flight::computer::Computer;
-use flight::guidance::baseline::Law;
 use flight_log::frame::{input_from_log, output_to_log};
 use flight_log::logged::state_from_log;
 use prost::Message as _;
@@ -92,7 +91,7 @@ fn a_logged_flight_flies_again_bit_for_bit() {
     let (mission, start) =
         (flight::vehicles::mission::from_toml(&toml.unwrap(), "log").unwrap(), start.unwrap());
     let believed = state_from_log(&start.believed);
-    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
+    let mut computer = Computer::at_power_up(&mission, &believed).released(0);
     let (mut expected_frame, mut restarts) = (1, 0);
     for frame in &frames {
         let number = frame.input.frame;
@@ -116,7 +115,6 @@ fn a_wrong_request_is_refused_with_the_reason() {
     for (arguments, words) in [
         (&["--out", "x", "--dispersion", "windy"][..], "neither a built-in set of dispersions"),
         (&["--out", "x", "--profile", "mk9"], "neither a built-in mission (mk2"),
-        (&["--out", "x", "--controller", "pid"], "nmpc, open-loop and oscillating"),
         (&["--out", "x", "--shard", "3/2"], "I/N"),
         (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
         (&["--only", "1", "--out", "x"], "cannot be used with"),

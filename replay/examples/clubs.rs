@@ -10,7 +10,6 @@ use std::io::Write as _;
 
 use anyhow::Context as _;
 use campaign::run::in_parallel;
-use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::lot::Posterior;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha12Rng;
@@ -49,7 +48,6 @@ struct World(Vec<(Motor, bool)>);
 impl World {
     fn flown(mission: &str, set: &str, flights: u64, seed: u64) -> anyhow::Result<Self> {
         let recipe = Recipe { seed, ..Recipe::built_in(mission, set)? };
-        let law = Law::of(Controller::Nmpc, &recipe.mission);
         let mut chance = Chance(ChaCha12Rng::seed_from_u64(seed));
         let mut motor = || [0, 1, 2].map(|i: usize| nominal()[i] + FLOWN[i] * chance.normal());
         let motors: Vec<(u64, Motor)> = (0..flights).map(|number| (number, motor())).collect();
@@ -59,7 +57,7 @@ impl World {
             let ignition_delay_s = delay_s.max(0.02);
             let truth = Truth { impulse_scale, burn_time_scale, ignition_delay_s, ..drawn.truth };
             let draw = Draw { truth, ..drawn };
-            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw, law.clone())?.run().legs)
+            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw)?.run().legs)
         };
         let landed = in_parallel(&motors, one, &|_| {});
         let flights = motors.into_iter().zip(landed).map(|((_, motor), landed)| Ok((motor, landed?)));

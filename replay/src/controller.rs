@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Output};
-use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::{ControlLevel, LandingSolved};
 use flight::rules::phase::Phase;
 use flight::vehicle::dynamics::PlanarState;
@@ -43,18 +42,12 @@ pub(crate) fn phase_name(output: &ComputerOutput) -> &'static str {
 /// Run fact of a re-flown flight's log: the settings that changed in flight, one on each line.
 pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
-/// Run facts of a re-flown flight's log: the law of the landing burn, and the first frame that it flew.
-pub(crate) const REFLOWN_BY: &str = "reflown_by";
-pub(crate) const REFLOWN_AT: &str = "reflown_at_frame";
-
 /// A flight computer that is run on the frames of a log, from its power-up or its release on; frames must come in order.
 /// Missing frames mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
     computer: RecordedComputer,
     schedule: Schedule<Mission>,
-    /// The frame in which a re-flown flight changed to another law, and that law.
-    other_law: Option<(u64, Controller)>,
     /// If false, the recorded digests are copied.
     compares_digests: bool,
 }
@@ -68,8 +61,8 @@ pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>
 }
 
 impl LoggedComputer {
-    /// The flight computer that a log's frames came from, before its first frame. It is built from the mission, from the laws
-    /// and changes of settings that the run facts name, and from the `other` settings, which apply last.
+    /// The flight computer that a log's frames came from, before its first frame. It is built from the mission, from the
+    /// changes of settings that the run facts name, and from the `other` settings, which apply last.
     ///
     /// # Errors
     /// This build cannot use the text as a mission, or a name is unknown.
@@ -82,12 +75,8 @@ impl LoggedComputer {
         let settings: Vec<Setting> =
             settings_in_flight(run)?.into_iter().chain(other.iter().cloned()).collect();
         let schedule = Self::schedule(mission_toml, start, &settings)?;
-        let law_of = |fact: &str| run.get(fact).map(|name| name.parse::<Controller>()).transpose();
-        let controller = law_of("controller")?.unwrap_or_default();
-        let at_frame = run.get(REFLOWN_AT).and_then(|frame| frame.parse().ok());
-        let other_law = at_frame.zip(law_of(REFLOWN_BY)?);
-        let computer = RecordedComputer::started(schedule.base(), start, controller);
-        Ok(Self { computer, schedule, other_law, compares_digests: true })
+        let computer = RecordedComputer::started(schedule.base(), start);
+        Ok(Self { computer, schedule, compares_digests: true })
     }
 
     /// The same computer where digests are not compared: one that did not wait on the pad remembers less.
@@ -165,15 +154,10 @@ impl LoggedComputer {
         if let Some(next) = next.filter(|_| flew && released_at_s.is_none()) {
             return Err(FrameError::Gap { frame: number, missing: number.saturating_sub(next) });
         }
-        let computer = self.computer.computer_mut();
         if let Some(released_at_s) = released_at_s
             && let Some(mission) = self.schedule.due(frame.input.time_s - released_at_s)
         {
-            computer.reconfigure(mission);
-        }
-        if let Some((_, controller)) = self.other_law.take_if(|(at_frame, _)| *at_frame <= number) {
-            let law = Law::of(controller, computer.pilot().mission());
-            computer.set_law(law);
+            self.computer.computer_mut().reconfigure(mission);
         }
         Ok(read)
     }

@@ -19,7 +19,7 @@ use crate::print::{print_json, shown};
 use crate::settings::{Setting, SettingArguments, SettingError};
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
-const NOT_THE_PILOTS: [&str; 3] = ["touchdown_limits.", "leg_limits.", "truth."];
+const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
 
 /// The time between frames.
 const FRAME: &str = "estimator.frame_s";

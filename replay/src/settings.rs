@@ -11,7 +11,6 @@ use std::str::FromStr;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
-use flight::guidance::baseline::UnknownController;
 use flight::vehicle::mission::Mission;
 use sim::world::Truth;
 
@@ -28,9 +27,6 @@ pub struct Setting {
 /// Why a setting cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SettingError {
-    /// The log names a controller of the landing burn that this build does not have.
-    #[error(transparent)]
-    Law(#[from] UnknownController),
     /// Not of the form `path=value`.
     #[error(
         "setting `{given}`: must be path=value or path=value@seconds, as in powered.weights.theta=90@6.5"

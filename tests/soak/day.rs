@@ -80,7 +80,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             drop(update(model, Msg::Tick, now));
         }
     }
-    let landed = vehicle.judged().is_some_and(|judged| judged.landed);
+    let landed = vehicle.judged().is_some_and(|judged| judged.landing.stands);
     let told = model.vehicle.verdict().is_some_and(|verdict| verdict.value.landed);
     Ok(landed && told)
 }

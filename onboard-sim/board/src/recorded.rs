@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 
 use flight::computer::Output;
 use flight::computer::saved::Saved;
-use flight::guidance::baseline::Controller;
 use flight_log::again::{FrameError, RecordedComputer, mission_flown};
 use flight_log::frame::output_to_log;
 use protocol::records::computer_v1::ComputerInput;
@@ -165,10 +164,9 @@ impl Flying {
 
     /// The flight computer before its first frame, and the crew's end of it; or why there is none.
     fn power_up(kind: VehicleKind, begin: &Begin, saved: Option<Saved>) -> Result<Self, String> {
-        let controller: Controller = begin.controller.parse().map_err(|error| alloc::format!("{error}"))?;
         let mission = flight::vehicles::mission::from_toml(&begin.toml, "mission");
         let mission = mission_flown(mission.map_err(|error| error.to_string())?, &begin.start, |_| false);
-        let computer = RecordedComputer::started(&mission, &begin.start, controller);
+        let computer = RecordedComputer::started(&mission, &begin.start);
         let crewed = begin.on_the_air.as_ref().map(|air| Crewed::new(kind, air, &mission, &begin.toml));
         Ok(Self { flight: begin.flight, computer, crewed, saved, answered: None })
     }

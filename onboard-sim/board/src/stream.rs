@@ -27,17 +27,14 @@ pub struct Begin {
     /// The mission's text, from the log.
     #[prost(string, required, tag = "1")]
     pub toml: String,
-    /// The law of the landing burn, by its name.
-    #[prost(string, required, tag = "2")]
-    pub controller: String,
     /// The start in the log: at power-up, or at the release.
-    #[prost(message, required, tag = "3")]
+    #[prost(message, required, tag = "2")]
     pub start: ComputerStart,
     /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are in the frames.
-    #[prost(message, optional, tag = "4")]
+    #[prost(message, optional, tag = "3")]
     pub on_the_air: Option<OnTheAir>,
     /// Another one for each flight: a board that flies this one already does not begin it again.
-    #[prost(uint32, required, tag = "5")]
+    #[prost(uint32, required, tag = "4")]
     pub flight: u32,
 }
 

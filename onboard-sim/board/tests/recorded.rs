@@ -46,7 +46,6 @@ fn recipe() -> Recipe {
 fn begin(sortie: &Sortie) -> Begin {
     Begin {
         toml: recipe().mission_toml,
-        controller: recipe().controller.name().to_owned(),
         start: flight_log::sortie::start(sortie),
         on_the_air: None,
         flight: 7,
@@ -184,7 +183,7 @@ impl port::Board for Recorded<'_> {
 }
 
 fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
-    RecordedComputer::started(&recipe.mission, &flight_log::sortie::start(sortie), recipe.controller)
+    RecordedComputer::started(&recipe.mission, &flight_log::sortie::start(sortie))
 }
 
 #[test]
@@ -239,11 +238,8 @@ fn what_is_wrong_with_a_stream_is_said() {
     let first = |begin: Begin| Frame { begin: Some(begin), ..Frame::default() };
 
     assert_eq!(said(Frame { begin: None, ..first(begin.clone()) }), "the first record must say what to fly");
-    let unknown = Begin { controller: "luck".to_owned(), ..begin.clone() };
-    assert_eq!(
-        said(first(unknown)),
-        "the first record: no controller is named `luck`; there are nmpc, open-loop and oscillating"
-    );
+    let unknown = Begin { toml: "luck = 1".to_owned(), ..begin.clone() };
+    assert!(said(first(unknown)).starts_with("the first record: mission: "));
     assert!(said(first(begin.clone())).starts_with("frame 0: needs measurements"));
 
     let mut cut = bytes_of([first(begin)]);

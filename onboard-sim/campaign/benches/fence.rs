@@ -72,7 +72,7 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
     }
     if let Some(touchdown) = flight.world().touchdown() {
         let state = &touchdown.state;
-        for value in [touchdown.time_s, touchdown.tilt_rad, touchdown.rate_rad_s]
+        for value in [touchdown.time_s, touchdown.over_ground.tilt_rad, touchdown.over_ground.rate_rad_s]
             .iter()
             .chain(state.position_m.iter())
             .chain(state.velocity_m_s.iter())
@@ -82,5 +82,5 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
     }
     let outcome = flight.outcome();
     hash.update(outcome.phase.name());
-    (hash.finalize().into(), outcome.legs)
+    (hash.finalize().into(), outcome.landing.stands)
 }

@@ -90,7 +90,7 @@ fn flown(mission: &str) -> String {
     let recipe = Recipe { seed: SEED, ..Recipe::built_in(mission, SET).unwrap() };
     let numbers: Vec<u64> = (0..FLIGHTS).collect();
     let ends = in_parallel(&numbers, |number| Sortie::new(&recipe, *number).unwrap().run(), &|_| {});
-    let landed = ends.iter().filter(|end| end.legs).count();
+    let landed = ends.iter().filter(|end| end.landing.stands).count();
     let hash = Sha256::digest(format!("{ends:?}"));
     format!("{landed} {:016x}", hash.first_chunk().map_or(0, |bytes| u64::from_be_bytes(*bytes)))
 }

@@ -1,7 +1,6 @@
 //! Times one flight from apogee to rest with all parts in the loop.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot be set up ends")]
 
-use flight::guidance::baseline::Law;
 use sim::dispersion::Dispersion;
 use sim::draw::draw;
 use sim::sortie::Sortie;
@@ -16,5 +15,5 @@ fn one_flight(bencher: divan::Bencher<'_, '_>, set: &str) {
     let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let dispersion = Dispersion::builtin(set).unwrap();
     let draw = draw(&mission, &dispersion, 1, 0);
-    bencher.bench_local(|| Sortie::drawn_as(&mission, &dispersion, &draw, Law::Nmpc).unwrap().run());
+    bencher.bench_local(|| Sortie::drawn_as(&mission, &dispersion, &draw).unwrap().run());
 }

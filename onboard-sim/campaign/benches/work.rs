@@ -70,7 +70,7 @@ fn passes(recipe: &Recipe, number: u64) -> (Vec<usize>, bool) {
             passes.push(flight.pilot().report().passes);
         }
         if !flight.goes_on() {
-            return (passes, flight.outcome().legs);
+            return (passes, flight.outcome().landing.stands);
         }
     }
 }

@@ -9,7 +9,6 @@ use std::io::Write as _;
 
 use campaign::run::in_parallel;
 use campaign::statistics::Share;
-use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::BUILTIN;
 use sim::dispersion::Dispersion;
@@ -58,11 +57,10 @@ fn main() -> anyhow::Result<()> {
         }
         let (world, less) = (mission(lot)?, mission(less)?);
         let stand = |pilot: &Mission| -> anyhow::Result<Vec<bool>> {
-            let law = Law::of(Controller::Nmpc, pilot);
             let numbers: Vec<u64> = (0..flights).collect();
             let one = |number: &u64| -> anyhow::Result<bool> {
                 let drawn = seen_by(pilot, &world, &draw(&world, &set, seed, *number));
-                Ok(Sortie::drawn_as(pilot, &set, &drawn, law.clone())?.run().legs)
+                Ok(Sortie::drawn_as(pilot, &set, &drawn)?.run().landing.stands)
             };
             in_parallel(&numbers, one, &|_| {}).into_iter().collect()
         };

@@ -7,6 +7,7 @@ use core::fmt;
 
 use flight::computer::{AbortEffect, FRAME_MS};
 use flight::rules::phase::Phase;
+use flight::rules::verdict::Landing;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::Mission;
@@ -23,6 +24,7 @@ use sim::world::{Actuators, Fault};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::run::in_parallel;
+use crate::statistics::Landings;
 
 /// The share of the flights that a radius has to hold.
 const HELD: f64 = 0.99;
@@ -164,8 +166,7 @@ pub struct Impact {
     pub place_m: Option<[f64; 2]>,
     /// Where the wind of this flight blows to, from world x towards y.
     pub downwind_rad: f64,
-    /// Within the limits of the legs.
-    pub landed: bool,
+    pub landing: Landing,
     pub course: Course,
 }
 
@@ -380,8 +381,8 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
     let mut impacts = Vec::with_capacity(ways.len());
     let drawn = draw(&recipe.mission, &recipe.dispersion, recipe.seed, number);
     let downwind_rad = drawn.truth.wind_towards_rad;
-    let mut add = |way: Way, (place_m, course), landed| {
-        impacts.push(Impact { way, number, place_m, downwind_rad, landed, course });
+    let mut add = |way: Way, (place_m, course), landing| {
+        impacts.push(Impact { way, number, place_m, downwind_rad, landing, course });
     };
     let (alone, beside): (Vec<Way>, Vec<Way>) =
         ways.iter().partition(|way| way.faults().is_some() || **way == Way::Uncommanded);
@@ -405,16 +406,16 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
         });
         for branch in branches {
             match (branch.way, branch.aborted) {
-                (Way::AsPlanned, _) => add(Way::AsPlanned, planned, flight.outcome().legs),
+                (Way::AsPlanned, _) => add(Way::AsPlanned, planned, flight.outcome().landing),
                 (Way::Booster, _) => {
                     if let Some(place_m) = booster {
-                        add(Way::Booster, (Some(place_m), Course::default()), false);
+                        add(Way::Booster, (Some(place_m), Course::default()), Landing::default());
                     }
                 }
                 (way, Some(mut aborted)) => {
                     aborted.abort();
                     let down = come_down(&mut aborted, |_| true);
-                    add(way, down, aborted.outcome().legs);
+                    add(way, down, aborted.outcome().landing);
                 }
                 // This flight had no such part.
                 (_, None) => {}
@@ -430,11 +431,17 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
             None => uncommanded(recipe, number)?,
         };
         let down = come_down(&mut flight, |_| true);
-        add(way, down, flight.outcome().legs);
+        add(way, down, flight.outcome().landing);
     }
     let place_of = |way: Way| ways.iter().position(|known| *known == way);
     impacts.sort_by_key(|impact| place_of(impact.way));
     Ok(impacts)
+}
+
+/// How the flights as planned landed.
+pub fn landed_as_planned(impacts: &[Impact]) -> Landings {
+    let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+    Landings::of(planned.map(|impact| impact.landing))
 }
 
 /// A copy of a flight, to be aborted.

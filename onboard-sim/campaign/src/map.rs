@@ -9,7 +9,6 @@ use std::fmt;
 use std::io::{self, Write};
 use std::str::FromStr;
 
-use flight::guidance::baseline::Law;
 use flight::vehicle::mission::Mission;
 use sim::draw::{Draw, draw};
 use sim::recipe::Recipe;
@@ -301,7 +300,7 @@ impl fmt::Display for Axis {
 /// By what a mission lands on a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum By {
-    /// Its own guidance, inside the limits of the legs: a simulated flight for each cell.
+    /// Its own guidance: a simulated flight for each cell lands if it stands undamaged.
     Guidance,
     /// Perfect information ([`crate::attainable`]): an upper bound, in vertical motion alone.
     PerfectInformation,
@@ -346,7 +345,7 @@ fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Ce
     for (quantity, value) in values() {
         put_into_draw(quantity, value, &mut drawn);
     }
-    let mut flight = Sortie::drawn_as(&mission, &dispersion, &drawn, Law::of(recipe.controller, &mission))?;
+    let mut flight = Sortie::drawn_as(&mission, &dispersion, &drawn)?;
     if by == By::PerfectInformation {
         let window = onset_window(&mission, flight.drawn(), flight.fell_from());
         // Without a height on an axis the best one is chosen.
@@ -358,8 +357,10 @@ fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Ce
     }
     let outcome = flight.run();
     Ok(Cell {
-        finding: if outcome.legs { Finding::Lands } else { Finding::Misses },
-        touchdown_speed_m_s: outcome.touchdown.map_or(f64::NAN, |touchdown| touchdown.vertical_m_s.abs()),
+        finding: if outcome.landing.stands { Finding::Lands } else { Finding::Misses },
+        touchdown_speed_m_s: outcome
+            .touchdown
+            .map_or(f64::NAN, |touchdown| touchdown.over_ground.vertical_m_s.abs()),
     })
 }
 

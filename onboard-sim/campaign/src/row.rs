@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use flight::rules::verdict::Landing;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
@@ -171,11 +172,15 @@ row! {
     /// The load of the contact on the legs as a fraction of their limit, the largest of all limits; above 1 is too
     /// much.
     leg_use: Option<f64>,
-    /// Inside the landing paper's Table 2, and upright afterwards.
-    strict: bool,
-    /// Within the limits of the legs, and upright afterwards.
-    legs: bool,
-    /// Why the flight did not land on its legs; empty if it did.
+    /// It stands undamaged ([`Landing`]).
+    stands: bool,
+    /// It stands, whatever it touched down with.
+    upright: bool,
+    /// Inside the design envelope of its legs at contact.
+    envelope: bool,
+    /// Inside the landing paper's Table 2 at contact.
+    table_2: bool,
+    /// Why it does not stand undamaged; empty if it does.
     failure: String,
     /// How the vehicle came to rest; empty if it did not.
     rest: String,
@@ -224,6 +229,11 @@ row! {
 }
 
 impl Row {
+    pub fn landing(&self) -> Landing {
+        let Self { stands, upright, envelope, table_2, .. } = *self;
+        Landing { stands, upright, envelope, table_2 }
+    }
+
     /// The command heights from which perfect information lands this draw.
     pub fn attainable(&self) -> Option<Window> {
         let (low_m, high_m) = (self.attainable_low_m?, self.attainable_high_m?);

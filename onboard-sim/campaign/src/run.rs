@@ -50,10 +50,10 @@ pub struct Progress {
     pub flown: u64,
     /// Flights that this run has to fly.
     pub of: u64,
-    /// Flights of this run that landed on their legs.
-    pub legs: u64,
-    /// Flights of this run that landed inside Table 2.
-    pub strict: u64,
+    /// Flights of this run that stand undamaged.
+    pub stands: u64,
+    /// Flights of this run that touched down inside the design envelope of their legs.
+    pub envelope: u64,
     /// Simulated time of this run's flights, whole milliseconds.
     pub flight_time_ms: u64,
 }
@@ -98,8 +98,8 @@ pub fn run(
             // Only `progress` can panic with the lock held, and then the counts are still valid.
             let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
             total.flown += 1;
-            total.legs += u64::from(row.legs);
-            total.strict += u64::from(row.strict);
+            total.stands += u64::from(row.stands);
+            total.envelope += u64::from(row.envelope);
             total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
             progress(&total);
             Ok::<_, RunError>(row)

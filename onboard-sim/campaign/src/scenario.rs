@@ -9,7 +9,7 @@ use sim::fault::{FaultError, TimedFault};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Expected {
-    /// The flight lands on its legs.
+    /// The vehicle stands undamaged.
     Land,
     /// The flight may not land, but the vehicle uses what still works: the motor is lit inside the gate, and the
     /// vehicle reaches the ground more slowly than without the motor.
@@ -40,10 +40,10 @@ impl Expected {
             return false;
         }
         match self {
-            Self::Land => row.legs,
+            Self::Land => row.stands,
             Self::Degrade => {
                 let slow = row.touchdown_vertical_m_s.is_some_and(|m_s| m_s.abs() < DEGRADED_M_S);
-                row.legs || (row.ignited && !row.parachute && slow)
+                row.stands || (row.ignited && !row.parachute && slow)
             }
             Self::Inhibit => row.onset_height_m.is_none() && !row.parachute,
             Self::Parachute => row.parachute && !row.ignited,

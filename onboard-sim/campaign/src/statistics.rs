@@ -1,5 +1,8 @@
 //! The statistics of a campaign's summary, and the search for a least value.
 
+use core::fmt;
+
+use flight::rules::verdict::Landing;
 use serde::Serialize;
 
 /// 97.5 % point of the normal distribution.
@@ -34,6 +37,45 @@ impl Share {
         let low = if count == 0 { 0.0 } else { (centre - half) / scale };
         let high = if count == of { 1.0 } else { (centre + half) / scale };
         Self { count, of, share, low, high }
+    }
+}
+
+/// How many of some flights ended as each word of a [`Landing`] says.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Landings {
+    pub stands: Share,
+    pub upright: Share,
+    pub envelope: Share,
+    pub table_2: Share,
+}
+
+impl Landings {
+    pub fn of(landings: impl Iterator<Item = Landing>) -> Self {
+        let (mut counts, mut of) = ([0; 4], 0);
+        for landing in landings {
+            of += 1;
+            counts.iter_mut().zip(landing.flags()).for_each(|(count, flag)| *count += u64::from(flag));
+        }
+        let [stands, upright, envelope, table_2] = counts.map(|count| Share::new(count, of));
+        Self { stands, upright, envelope, table_2 }
+    }
+
+    /// In the order of [`Landing::flags`].
+    pub fn shares(&self) -> [&Share; 4] {
+        [&self.stands, &self.upright, &self.envelope, &self.table_2]
+    }
+}
+
+impl fmt::Display for Landings {
+    /// What stands undamaged, never without what was inside the design envelope of its legs.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Share { count, of, share, low, high } = self.stands;
+        let [share, low, high] = [share, low, high].map(|share| 100.0 * share);
+        write!(
+            out,
+            "{count} of {of}: {share:.0} % ({low:.0} to {high:.0}), {} inside the envelope",
+            self.envelope.count
+        )
     }
 }
 

@@ -36,8 +36,6 @@ impl Order {
             dispersion_sha256: sha256(&recipe.dispersion_toml),
             seed: recipe.seed,
             flights: self.flights,
-            controller: recipe.controller.name().to_owned(),
-            steered: recipe.mission.steered,
             faults: recipe.faults.iter().map(ToString::to_string).collect(),
             build: build.to_owned(),
             shard,
@@ -64,10 +62,6 @@ pub struct Manifest {
     pub seed: u64,
     /// Flights of the whole campaign.
     pub flights: u64,
-    /// Name of the controller.
-    pub controller: String,
-    /// Whether the fins steer.
-    pub steered: bool,
     /// Faults, as written on a command line.
     pub faults: Vec<String>,
     /// The program.
@@ -81,15 +75,13 @@ impl Manifest {
     fn order(&self, mission_toml: &str, dispersion_toml: &str) -> Result<Order, Box<dyn core::error::Error>> {
         let texts = (("mission.toml", mission_toml), (self.dispersion.as_str(), dispersion_toml));
         let mut recipe = Recipe::from_texts(texts.0, texts.1)?;
-        recipe.mission.steered = self.steered;
         recipe.seed = self.seed;
-        recipe.controller = self.controller.parse()?;
         recipe.faults = self.faults.iter().map(|fault| fault.parse()).collect::<Result<_, _>>()?;
         Ok(Order { recipe, flights: self.flights })
     }
 
     /// What it holds, in words.
-    fn words(&self) -> [(&'static str, String); 12] {
+    fn words(&self) -> [(&'static str, String); 10] {
         [
             ("format", self.format.to_string()),
             ("mission", self.mission.clone()),
@@ -98,8 +90,6 @@ impl Manifest {
             ("text of the dispersion, SHA-256", self.dispersion_sha256.clone()),
             ("seed", self.seed.to_string()),
             ("number of flights", self.flights.to_string()),
-            ("controller", self.controller.clone()),
-            ("steering by fins", self.steered.to_string()),
             ("faults", self.faults.join(" ")),
             ("program", self.build.clone()),
             ("shard", self.shard.to_string()),

@@ -4,13 +4,14 @@
 
 use core::fmt::{self, Write};
 
+use flight::rules::verdict::Landing;
 use flight::vehicle::mission::LegLimits;
 use serde::Serialize;
 
 use crate::attainable::{Window, best_height_m};
 use crate::figure::{Bar, FigureError, Places, PlacesPanel, bars_svg, places_svg};
 use crate::row::{Row, column};
-use crate::statistics::{Share, quantile, rank_correlation, sorted};
+use crate::statistics::{Landings, Share, quantile, rank_correlation, sorted};
 use crate::store::{Manifest, Shard};
 
 /// Columns whose percentiles are in the summary.
@@ -36,10 +37,9 @@ const TOLD: [&str; 14] = [
 pub struct Summary {
     /// The manifest of the campaign.
     pub manifest: Manifest,
-    /// Flights that landed on their legs.
-    pub legs: Share,
-    /// Flights that landed inside the landing paper's Table 2.
-    pub strict: Share,
+    /// How the flights landed.
+    #[serde(flatten)]
+    pub landings: Landings,
     /// What perfect information lands; `None` if it lands no flight.
     pub attainable: Option<Attainable>,
     /// Why the others did not, the most frequent reason first.
@@ -60,7 +60,7 @@ pub struct Attainable {
     pub command_height_m: f64,
     /// Flights that it lands.
     pub attainable: Share,
-    /// Of these, the flights that landed on their legs.
+    /// Of these, the flights that stand undamaged.
     pub landed: Share,
     /// Flights that landed although they are not attainable from that height. Their controller chose another height for
     /// each flight.
@@ -80,9 +80,9 @@ impl Attainable {
         Some(Self {
             command_height_m,
             attainable: Share::new(attainable, rows.len() as u64),
-            landed: Share::new(count(&|row| row.legs && is(row)), attainable),
-            landed_from_another_height: count(&|row| row.legs && !is(row) && row.attainable().is_some()),
-            landed_beyond: count(&|row| row.legs && row.attainable().is_none()),
+            landed: Share::new(count(&|row| row.stands && is(row)), attainable),
+            landed_from_another_height: count(&|row| row.stands && !is(row) && row.attainable().is_some()),
+            landed_beyond: count(&|row| row.stands && row.attainable().is_none()),
         })
     }
 }
@@ -140,11 +140,11 @@ pub struct Sensitivity {
     /// The quantity, with its unit.
     pub column: &'static str,
     pub median_deviation: f64,
-    /// Fraction of the inner half that landed on their legs.
+    /// Fraction of the inner half that stands undamaged.
     pub inner: Share,
     /// The same fraction of the outer half.
     pub outer: Share,
-    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' limits used at contact.
+    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' design envelope used at contact.
     pub rank_correlation: f64,
 }
 
@@ -167,13 +167,11 @@ impl Sensitivity {
 impl Summary {
     /// The summary of rows in any order.
     pub fn new(manifest: &Manifest, rows: &[Row]) -> Self {
-        let of = rows.len() as u64;
         let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
         let sum = |read: fn(&Row) -> u64| rows.iter().map(read).sum();
         Self {
             manifest: manifest.clone(),
-            legs: Share::new(count(|row| row.legs), of),
-            strict: Share::new(count(|row| row.strict), of),
+            landings: Landings::of(rows.iter().map(Row::landing)),
             attainable: Attainable::of(rows),
             failures: failures(rows),
             ignitions_outside_gate: count(|row| row.ignition_outside_gate),
@@ -253,7 +251,7 @@ fn sensitivity_to(rows: &[Row], name: &'static str, deviations: &[f64]) -> Optio
     let half = |outer: bool| {
         let mine =
             || rows.iter().zip(deviations).filter(move |(_, deviation)| (**deviation > median) == outer);
-        Share::new(mine().filter(|(row, _)| row.legs).count() as u64, mine().count() as u64)
+        Share::new(mine().filter(|(row, _)| row.stands).count() as u64, mine().count() as u64)
     };
     let pairs: Vec<(f64, f64)> = rows
         .iter()
@@ -311,13 +309,8 @@ fn others(attainable: &Attainable) -> String {
 }
 
 fn what(manifest: &Manifest) -> String {
-    let mut what = format!(
-        "{}, dispersion {}, seed {}, controller {}",
-        manifest.mission, manifest.dispersion, manifest.seed, manifest.controller
-    );
-    if !manifest.steered {
-        what.push_str(", passive descent");
-    }
+    let mut what =
+        format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
     if manifest.shard != Shard::WHOLE {
         what = format!("{what}, shard {}", manifest.shard);
     }
@@ -368,11 +361,17 @@ fn write_text(table: &Table, out: &mut String) -> fmt::Result {
 }
 
 fn text(summary: &Summary, out: &mut String) -> fmt::Result {
-    let legs = &summary.legs;
-    writeln!(out, "{} of {} flights land on their legs.", legs.count, legs.of)?;
+    let Landings { stands, envelope, .. } = &summary.landings;
+    let (of, inside) = (stands.of, envelope.count);
+    writeln!(
+        out,
+        "{} of {of} flights stand undamaged, {inside} touch down inside their envelope.",
+        stands.count
+    )?;
     writeln!(out, "{}", what(&summary.manifest))?;
-    writeln!(out, "legs    {}", percent(legs))?;
-    writeln!(out, "strict  {}", percent(&summary.strict))?;
+    for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
+        writeln!(out, "{word:<38}  {}", percent(share))?;
+    }
     if let Some(attainable) = &summary.attainable {
         let Attainable { command_height_m, .. } = attainable;
         writeln!(
@@ -405,7 +404,7 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     write_text(&distributions(summary), out)?;
     let told = sensitivities(summary);
     if told.len() == 1 {
-        return writeln!(out, "\nwhat costs landings: {} flights do not tell", legs.of);
+        return writeln!(out, "\nwhat costs landings: {} flights do not tell", of);
     }
     writeln!(
         out,
@@ -439,15 +438,15 @@ pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>;
     let touchdowns = PlacesPanel {
         title: String::new(),
         places: vec![
-            places(|row| !row.legs),
-            places(|row| row.legs && !row.strict),
-            places(|row| row.legs && row.strict),
+            places(|row| !row.stands),
+            places(|row| row.stands && !row.envelope),
+            places(|row| row.stands && row.envelope),
         ],
         radii_m: Vec::new(),
     };
     let touchdowns = Places {
         labels: ["world x, m from the pad", "world y, m from the pad"],
-        kinds: &["not landed", "landed on its legs", "strictly"],
+        kinds: &["damaged", "stands, outside the envelope", "stands, inside"],
         radii: &[],
         arrow: None,
         panels: &[touchdowns],
@@ -463,7 +462,7 @@ pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>;
 
 fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Result<String, FigureError> {
     let tail = libm::floor(TAIL_SHARE * values.len() as f64) as usize;
-    let mark = limit.map(|limit| ("limit of the legs", limit));
+    let mark = limit.map(|limit| ("design envelope of the legs", limit));
     let (Some(from), Some(to)) = (values.get(tail), values.iter().rev().nth(tail)) else {
         return bars_svg(&format!("{title}: no flight has one"), [label, "flights"], &[], mark);
     };

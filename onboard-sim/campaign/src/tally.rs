@@ -2,21 +2,16 @@
 //! laws before the flight.
 
 use flight::computer::pilot::FRAMES_PER_PLAN;
-use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
-use nmpc::SolveStatus;
-use sim::dispersion::Dispersion;
-use sim::draw::draw;
+use nmpc::Status;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
-use sim::world::{RestOutcome, Touchdown};
+use sim::world::{FirstContact, RestOutcome};
 
 use crate::attainable;
 use crate::row::Row;
-use crate::statistics::golden_section;
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
@@ -129,7 +124,7 @@ impl Tally {
             let report = pilot.report();
             self.plans[usize::from(computer.level().index())] += 1;
             self.solver_iterations += report.iterations as u64;
-            let solved = matches!(report.status, SolveStatus::Converged | SolveStatus::NotRun);
+            let solved = matches!(report.status, Status::Converged | Status::NotRun);
             self.solver_failures += u64::from(!solved);
         }
     }
@@ -137,12 +132,12 @@ impl Tally {
     /// The row of the flight so far.
     pub fn row(&self) -> Row {
         let outcome = self.flight.outcome();
-        let touchdown = outcome.touchdown.as_ref();
+        let (touchdown, landing) = (outcome.touchdown.as_ref(), outcome.landing);
         let world = self.flight.world();
         let errors = self.flight.largest_errors();
         let drawn = self.flight.drawn();
         let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
-        let at = |read: fn(&Touchdown) -> f64| touchdown.map(read);
+        let at = |read: fn(&FirstContact) -> f64| touchdown.map(read);
         let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
         let ignition = self.ignition.as_ref();
         let strain = outcome.rest.and_then(|rest| rest.strain);
@@ -179,16 +174,18 @@ impl Tally {
                 .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)
                 .filter(|burning_s| *burning_s >= 0.0),
             touchdown_time_s: at(|touchdown| touchdown.time_s),
-            touchdown_vertical_m_s: at(|touchdown| touchdown.vertical_m_s),
-            touchdown_lateral_m_s: at(|touchdown| touchdown.lateral_m_s),
-            touchdown_tilt_deg: at(|touchdown| touchdown.tilt_rad.to_degrees()),
-            touchdown_rate_deg_s: at(|touchdown| touchdown.rate_rad_s.to_degrees()),
+            touchdown_vertical_m_s: at(|touchdown| touchdown.over_ground.vertical_m_s),
+            touchdown_lateral_m_s: at(|touchdown| touchdown.over_ground.lateral_m_s),
+            touchdown_tilt_deg: at(|touchdown| touchdown.over_ground.tilt_rad.to_degrees()),
+            touchdown_rate_deg_s: at(|touchdown| touchdown.over_ground.rate_rad_s.to_degrees()),
             touchdown_x_m: at(|touchdown| touchdown.state.position_m.x),
             touchdown_y_m: at(|touchdown| touchdown.state.position_m.y),
             touchdown_thrust_over_weight: at(|touchdown| touchdown.thrust_n / touchdown.weight_n),
             leg_use: touchdown.map(|touchdown| self.leg_use(touchdown)),
-            strict: outcome.strict,
-            legs: outcome.legs,
+            stands: landing.stands,
+            upright: landing.upright,
+            envelope: landing.envelope,
+            table_2: landing.table_2,
             failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
             rest: outcome.rest.map_or("", |rest| rest_name(rest.outcome)).to_owned(),
             stroke_used: strain.map(|strain| strain.stroke_used),
@@ -215,12 +212,12 @@ impl Tally {
         }
     }
 
-    fn leg_use(&self, touchdown: &Touchdown) -> f64 {
+    fn leg_use(&self, touchdown: &FirstContact) -> f64 {
         let found = [
-            touchdown.vertical_m_s.abs(),
-            touchdown.lateral_m_s,
-            touchdown.tilt_rad.to_degrees(),
-            touchdown.rate_rad_s.to_degrees(),
+            touchdown.over_ground.vertical_m_s.abs(),
+            touchdown.over_ground.lateral_m_s,
+            touchdown.over_ground.tilt_rad.to_degrees(),
+            touchdown.over_ground.rate_rad_s.to_degrees(),
         ];
         found.iter().zip(&self.leg_limits).fold(0.0, |most, (found, limit)| (found / limit).max(most))
     }
@@ -242,30 +239,4 @@ fn rest_name(rest: RestOutcome) -> &'static str {
         RestOutcome::TippedOver => "tipped over",
         RestOutcome::BodyStrike => "body strike",
     }
-}
-
-/// Search range on either side of the first guess, as a fraction of it.
-const SPAN_SHARE: f64 = 0.08;
-/// Flights of the search; they give the height to a centimetre or two.
-const FLIGHTS: usize = 14;
-
-/// The ignition height, m, from which a baseline touches down most slowly with nominal data, found by simulated
-/// flights. `None` for the pilot, which decides in flight.
-///
-/// # Errors
-/// The mission cannot be flown.
-pub fn fixed_height_m(controller: Controller, mission: &Mission) -> Result<Option<f64>, SetUpError> {
-    let law = Law::of(controller, mission);
-    let Some(guess_m) = law.ignition_height_m() else { return Ok(None) };
-    let certain = Dispersion::default();
-    let speed_m_s = |height_m: f64| -> Result<f64, SetUpError> {
-        let mut timed = mission.clone();
-        timed.ignition.fixed_height_m = Some(height_m);
-        let draw = draw(&timed, &certain, 0, 0);
-        let mut flight = Sortie::drawn_as(&timed, &certain, &draw, law.clone())?;
-        let outcome = flight.run();
-        Ok(outcome.touchdown.map_or(f64::INFINITY, |touchdown| touchdown.vertical_m_s.abs()))
-    };
-    let range_m = [guess_m * (1.0 - SPAN_SHARE), guess_m * (1.0 + SPAN_SHARE)];
-    golden_section(range_m, FLIGHTS, speed_m_s).map(Some)
 }

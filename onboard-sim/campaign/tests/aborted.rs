@@ -22,7 +22,7 @@ fn recipe(fault: Option<&str>) -> Recipe {
 }
 
 fn landed(rows: &[Row]) -> usize {
-    rows.iter().filter(|row| row.legs).count()
+    rows.iter().filter(|row| row.stands).count()
 }
 
 /// So many flights, each flown with and without an abort at a random moment of its burn.
@@ -37,7 +37,7 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     for (alone, aborted) in alone.iter().zip(&aborted).filter(|(_, aborted)| aborted.faults != 1) {
         // One that crashes may be on the ground before its abort would come.
         let early = aborted.burn_time_at_contact_s.is_some_and(|at_s| at_s < LATEST_S);
-        assert!(early && !alone.legs, "{}", aborted.number);
+        assert!(early && !alone.stands, "{}", aborted.number);
         assert_eq!(aborted.touchdown_time_s, alone.touchdown_time_s, "{}", aborted.number);
     }
     assert!(aborted.iter().filter(|row| row.faults == 1).count() >= 119);
@@ -60,7 +60,7 @@ fn an_abort_right_after_the_ignition_lands() {
         let locks = tally.flight().computer().mode().interlocks;
         assert!(locks.abort_latched && locks.lands_in_place);
         let row = tally.row();
-        assert!(row.legs, "{number}: {} {:?} m/s", row.failure, row.touchdown_vertical_m_s);
+        assert!(row.stands, "{number}: {} {:?} m/s", row.failure, row.touchdown_vertical_m_s);
     }
 }
 

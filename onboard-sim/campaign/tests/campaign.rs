@@ -14,12 +14,11 @@ use sim::recipe::Recipe;
 
 const FLIGHTS: u64 = 23;
 
-/// Passive descents from a low height, which are quick to simulate.
+/// Flights from a low height, which are quick to simulate.
 fn order(seed: u64) -> Order {
     let (name, text) = flight::vehicles::mission::BUILTIN[0];
     let low = text.replace("height_m = 300.0", "height_m = 60.0");
-    let mut recipe = Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap();
-    recipe.mission.steered = false;
+    let recipe = Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap();
     Order { recipe: Recipe { seed, ..recipe }, flights: FLIGHTS }
 }
 
@@ -94,7 +93,7 @@ fn read_them(out: &Path) {
         assert_eq!(record.get_long(number).unwrap(), i64::try_from(row.number).unwrap());
         assert_eq!(record.get_double(impulse).unwrap().to_bits(), row.impulse_scale.to_bits());
         assert_eq!(record.get_double(vertical).ok(), row.touchdown_vertical_m_s);
-        assert_eq!(record.get_bool(legs).unwrap(), row.legs);
+        assert_eq!(record.get_bool(legs).unwrap(), row.stands);
         assert_eq!(record.get_string(failure).unwrap(), &row.failure);
         assert_eq!(record.get_double(onset).ok(), row.onset_height_m);
         count += 1;

@@ -4,7 +4,6 @@
 use campaign::row::Row;
 use campaign::scenario::Expected;
 use campaign::tally;
-use flight::guidance::baseline::Controller;
 use sim::fault::TimedFault;
 use sim::recipe::Recipe;
 
@@ -15,11 +14,11 @@ const SENSORS_ONLY: &str = "sensors = true";
 /// land.
 const EXPECTED: &str = include_str!("expected-faults.csv");
 
-fn fly(controller: Controller, faults: &[&str]) -> Row {
+fn fly(faults: &[&str]) -> Row {
     let mission = flight::vehicles::mission::BUILTIN[0];
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let recipe = Recipe::from_texts(mission, ("sensors only", SENSORS_ONLY)).unwrap();
-    tally::fly(&Recipe { controller, faults, ..recipe }, 0).unwrap()
+    tally::fly(&Recipe { faults, ..recipe }, 0).unwrap()
 }
 
 #[test]
@@ -29,7 +28,7 @@ fn every_fault_ends_as_expected() {
     for expectation in expectations {
         let (fault, expected, _): (String, Expected, String) = expectation.unwrap();
         assert_eq!(fault.parse::<TimedFault>().unwrap().to_string(), fault);
-        let row = fly(Controller::Nmpc, &[&fault]);
+        let row = fly(&[&fault]);
         assert_eq!(row.faults, 1, "{fault} did not happen");
         if !expected.met(&row) {
             wrong.push(format!(
@@ -47,19 +46,8 @@ fn every_fault_ends_as_expected() {
 
 #[test]
 fn a_flight_without_faults_lands_and_a_silent_radio_changes_nothing() {
-    let row = fly(Controller::Nmpc, &[]);
-    assert!(row.legs, "{row:?}");
-    let silent = fly(Controller::Nmpc, &["link-loss@0"]);
+    let row = fly(&[]);
+    assert!(row.stands, "{row:?}");
+    let silent = fly(&["link-loss@0"]);
     assert_eq!(Row { faults: 0, ..silent }, row);
-}
-
-/// The simple controllers brake. How well they brake is a question for a campaign.
-#[test]
-fn the_simple_controllers_brake() {
-    for controller in [Controller::OpenLoop, Controller::Oscillating] {
-        let row = fly(controller, &[]);
-        assert!(row.ignited && !row.ignition_outside_gate, "{}: {row:?}", controller.name());
-        let vertical_m_s = row.touchdown_vertical_m_s.unwrap();
-        assert!(vertical_m_s.abs() < 20.0, "{}: {vertical_m_s} m/s", controller.name());
-    }
 }

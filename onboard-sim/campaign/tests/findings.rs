@@ -49,7 +49,7 @@ fn flown(recipe: &Recipe, number: u64, battery: Option<f64>) -> (bool, Vec<Findi
             findings.note(flight.computer());
         }
     }
-    (flight.outcome().legs, findings.found())
+    (flight.outcome().landing.stands, findings.found())
 }
 
 fn all_flown(recipe: &Recipe, flights: u64) -> Vec<(bool, Vec<Finding>)> {

@@ -3,6 +3,7 @@
 
 use campaign::hazard::{Course, Flights, Impact, Radius, Way, fly, study, widest};
 use campaign::run::threads;
+use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -24,7 +25,7 @@ fn a_flight_from_the_pad_that_ends_otherwise_comes_down_beyond_the_fence() {
             "every way, in its order"
         );
         assert!(impacts.iter().all(|impact| impact.place_m.is_some()), "{impacts:?}");
-        let landed = impacts.iter().filter(|impact| impact.landed);
+        let landed = impacts.iter().filter(|impact| impact.landing.stands);
         let may_land = [Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust];
         assert!(landed.clone().all(|impact| may_land.contains(&impact.way)), "{impacts:?}");
     }
@@ -95,7 +96,7 @@ fn val_hand_a_place_downwind_and_left_of_it() {
         number: 0,
         place_m: Some([-3.0, 10.0]),
         downwind_rad: core::f64::consts::FRAC_PI_2,
-        landed: false,
+        landing: Landing::default(),
         course: Course::default(),
     };
     let [along_m, left_m] = impact.in_wind_m().unwrap();

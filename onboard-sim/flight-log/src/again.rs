@@ -2,7 +2,6 @@
 
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Output, flight_time_s};
-use flight::guidance::baseline::{Controller, Law};
 use flight::guidance::powered::LandingSolved;
 use flight::vehicle::mission::Mission;
 use protocol::records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
@@ -47,12 +46,6 @@ pub struct RecordedComputer {
 
 /// The mission as it was flown, with the values that its start record adds, but for the keys that are `decided` otherwise.
 pub fn mission_flown(mut mission: Mission, start: &ComputerStart, decided: impl Fn(&str) -> bool) -> Mission {
-    if !decided("steered") {
-        mission.steered = start.steered;
-    }
-    if !decided("ignition.fixed_height_m") {
-        mission.ignition.fixed_height_m = start.fixed_ignition_height_m;
-    }
     if let (Some(launch), Some(foot_m)) = (&mut mission.launch, &start.rail_m) {
         for (key, value, found) in [
             ("launch.rail.x_m", &mut launch.rail.x_m, foot_m.x),
@@ -68,9 +61,9 @@ pub fn mission_flown(mut mission: Mission, start: &ComputerStart, decided: impl 
 
 impl RecordedComputer {
     /// The computer of a start record. `mission` is the mission [as flown](mission_flown).
-    pub fn started(mission: &Mission, start: &ComputerStart, controller: Controller) -> Self {
+    pub fn started(mission: &Mission, start: &ComputerStart) -> Self {
         let believed = state_from_log(&start.believed);
-        let computer = Computer::at_power_up(mission, Law::of(controller, mission), &believed);
+        let computer = Computer::at_power_up(mission, &believed);
         let (computer, next) = if start.released {
             let standing = match &start.gyro_bias_rad_s {
                 Some(bias) => computer.standing(&believed, vector_from_log(bias)),

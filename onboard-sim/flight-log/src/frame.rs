@@ -53,8 +53,6 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
         frame: if released { computer.frame() } else { 0 },
         believed: estimate.state.to_log(),
         gyro_bias_rad_s: stood.then(|| estimate.gyro_bias_rad_s.to_log()),
-        steered: mission.steered,
-        fixed_ignition_height_m: mission.ignition.fixed_height_m,
         rail_m: mission.launched().map(|launch| launch.rail.foot_m().to_log()),
         released,
         aborted_before_s: computer.mode().aborted_before_s,

@@ -5,23 +5,19 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use flight::computer::{Computer, Input, Output};
-use flight::guidance::baseline::Controller;
-use flight::guidance::powered::Plane;
 use flight::rules::phase::Phase;
-use flight::rules::verdict::LandingVerdict;
-use flight::vehicle::dynamics::PlanarState;
-use nalgebra::Vector3;
+use flight::rules::verdict::{Landing, LandingVerdict};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::flight_v1::TruthSample;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::{Dispersion, DispersionError};
-use sim::limits::Limits;
+use sim::outcome::{by_envelope, by_table_2};
 use sim::outside::Watch;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use sim::world::{Strain, Touchdown};
+use sim::world::Strain;
 
 use crate::frame::{frame_to_log, start_to_log, thought_to_log};
 use crate::logged::Logged as _;
@@ -34,7 +30,6 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
         ("dispersion", recipe.dispersion_name.clone()),
         ("seed", recipe.seed.to_string()),
         ("flight", number.to_string()),
-        ("controller", recipe.controller.name().to_owned()),
         ("faults", faults),
         ("start_unix_ns", start_unix_ns.to_string()),
     ];
@@ -152,66 +147,42 @@ pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> V
     records
 }
 
-/// The verdict on a finished flight, by its legs and by the landing paper's Table 2; `None` if it did not come down. Legs that can
-/// give way are judged by what they bore, others by their limits at contact. Any other failure (a parachute, tipping over) is
-/// an additional limit that allows nothing.
+/// The verdict on a finished flight; `None` if it did not come down.
 pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
-    let both = Limits::of(flight.mission());
-    let mut limits = match outcome.rest.and_then(|rest| rest.strain) {
-        Some(strain) => borne(&strain),
-        None => limits_to_log(&both.by_legs(touchdown).1),
-    };
-    if let Some(failure) = outcome.failure.filter(|failure| !failure.is_of_a_limit()) {
-        limits.push(v1::LimitResult {
-            name: failure.name().to_owned(),
-            value: 1.0,
-            minimum: 0.0,
-            maximum: 0.0,
-            unit: String::new(),
-            passed: false,
-        });
-    }
-    let aborted = flight.computer().mode().interlocks.abort_latched;
-    Some(v1::LandingVerdict {
-        time_s: touchdown.time_s,
-        state: in_world_plane(flight, touchdown),
-        limits,
-        landed: outcome.legs,
-        table_2: limits_to_log(&both.by_table_2(touchdown).1),
-        ending: Some(outcome.ending(aborted).to_string()),
-    })
-}
-
-/// What the legs bore and what they bear: the shares of stroke and strength.
-fn borne(strain: &Strain) -> Vec<v1::LimitResult> {
-    let share = |name: &str, value: f64, passed: bool| v1::LimitResult {
+    let one = |name: &str, value, maximum, passed| v1::LimitResult {
         name: name.to_owned(),
         value,
         minimum: 0.0,
-        maximum: 1.0,
+        maximum,
         unit: String::new(),
         passed,
     };
-    vec![
-        share("stroke used", strain.stroke_used, strain.stroke_used < 1.0),
-        share("leg load", strain.strength_used, strain.strength_used <= 1.0),
-    ]
-}
-
-/// The state at contact in the world's x-z plane.
-fn in_world_plane(flight: &Sortie, touchdown: &Touchdown) -> v1::PlanarState {
-    let nil = Vector3::zeros();
-    let feet_below_cg_m = flight.world().cg_above_feet_m();
-    let PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s } =
-        Plane::choose(&nil, &nil, &nil).project(&touchdown.state, feet_below_cg_m, 0.0);
-    v1::PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s }
+    let mut borne = Vec::new();
+    if let Some(Strain { stroke_used, strength_used, .. }) = outcome.rest.and_then(|rest| rest.strain) {
+        borne.push(one("stroke used", stroke_used, 1.0, stroke_used < 1.0));
+        borne.push(one("leg load", strength_used, 1.0, strength_used <= 1.0));
+    }
+    if let Some(failure) = outcome.failure.filter(|failure| !failure.is_of_a_limit()) {
+        borne.push(one(failure.name(), 1.0, 0.0, false));
+    }
+    let Landing { stands, upright, envelope, table_2 } = outcome.landing;
+    let aborted = flight.computer().mode().interlocks.abort_latched;
+    Some(v1::LandingVerdict {
+        time_s: touchdown.time_s,
+        table_2: limits_to_log(&by_table_2(touchdown)),
+        ending: Some(outcome.ending(aborted).to_string()),
+        landing: v1::Landing { stands, upright, envelope, table_2 },
+        envelope: limits_to_log(&by_envelope(&flight.mission().leg_limits, touchdown)),
+        borne,
+    })
 }
 
 /// Each limit with its result, as records.
 fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
-    let limits = verdict.results.iter().map(|result| v1::LimitResult {
+    let limits = verdict.results.iter().filter(|result| result.highest.is_finite());
+    let limits = limits.map(|result| v1::LimitResult {
         name: result.name.to_owned(),
         value: result.value,
         minimum: result.lowest,
@@ -220,9 +191,4 @@ fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
         passed: result.passed,
     });
     limits.collect()
-}
-
-/// The controller that flew the landing burn of a recorded flight; the pilot itself if the log does not say.
-pub fn controller_of(run: &BTreeMap<String, String>) -> Option<Controller> {
-    run.get("controller").map_or(Some(Controller::Nmpc), |name| name.parse().ok())
 }

@@ -15,8 +15,7 @@
 //!
 //! The crate `vehicles` reads the files that describe a vehicle, and the crate [`nmpc`] solves the landing problem.
 //!
-//! Units are SI and radians; names carry units and frames. The frames are those of [`nmpc::dynamics`] in the plane and
-//! of [`vehicle::rigid`] in space.
+//! Units are SI and radians; names carry units and frames. The frames are those of [`vehicle::rigid`].
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
@@ -30,7 +29,7 @@ pub mod vehicle {
     //! * [`airframe`] holds masses, shape and actuators.
     //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`] the expected burn of this motor.
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
-    //! * [`dynamics`] has the state and the equations of motion in the plane, [`rigid`] the state in space.
+    //! * [`rigid`] is the state in space.
     //! * [`site`] is the place of the pad on the Earth.
     //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`] the release from a drone.
 
@@ -45,8 +44,6 @@ pub mod vehicle {
     pub mod rigid;
     pub mod site;
     pub mod thrust_curve;
-
-    pub use nmpc::dynamics;
 }
 
 pub mod estimation {
@@ -69,9 +66,7 @@ pub mod guidance {
     //! * [`descent`] steers by the fins before ignition.
     //! * [`vertical`] computes the band of heights from which a landing exists, [`ignition`] when to light the motor.
     //! * [`powered`] plans and flies the landing burn.
-    //! * [`baseline`]: simpler laws, for comparison.
 
-    pub mod baseline;
     pub mod descent;
     pub mod ignition;
     pub mod powered;

@@ -13,7 +13,7 @@ use campaign::run::in_parallel;
 use campaign::statistics::quantile;
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::computer::{Computer, Input, Output};
-use flight::guidance::powered::SpaceSolved;
+use flight::guidance::powered::LandingSolved;
 use judge::{Judgement, Score};
 use sim::outside::{Outside, Watch};
 use sim::recipe::Recipe;
@@ -50,7 +50,7 @@ fn main() -> Result<()> {
         let numbers: Vec<u64> = (0..flights).collect();
         let plans: Result<Vec<_>> =
             in_parallel(&numbers, |number| flown(&recipe, *number, every), &|_| {}).into_iter().collect();
-        let plans: Vec<SpaceSolved> = plans?.into_iter().flatten().collect();
+        let plans: Vec<LandingSolved> = plans?.into_iter().flatten().collect();
         let judged = in_parallel(&plans, Pair::of, &|_| {});
         writeln!(stdout, "{}", row(mission, set, &judged))?;
         stdout.flush()?;
@@ -59,7 +59,7 @@ fn main() -> Result<()> {
 }
 
 /// Every so manyth plan of a flight.
-fn flown(recipe: &Recipe, number: u64, every: u64) -> Result<Vec<SpaceSolved>> {
+fn flown(recipe: &Recipe, number: u64, every: u64) -> Result<Vec<LandingSolved>> {
     let mut flight = Sortie::new(recipe, number)?;
     // Other flights give other plans of their burns.
     let mut inspector = Inspector { before: None, planned: number, every, plans: Vec::new() };
@@ -80,7 +80,7 @@ struct Inspector {
     before: Option<Computer>,
     planned: u64,
     every: u64,
-    plans: Vec<SpaceSolved>,
+    plans: Vec<LandingSolved>,
 }
 
 impl Watch for Inspector {
@@ -92,7 +92,7 @@ impl Watch for Inspector {
         let Some(mut before) = self.before.take() else { return };
         self.planned += 1;
         if self.planned.is_multiple_of(self.every) {
-            self.plans.extend(before.step_inspected_in_space(input).1);
+            self.plans.extend(before.step_inspected(input).1);
         }
     }
 }
@@ -105,8 +105,9 @@ struct Pair {
 }
 
 impl Pair {
-    fn of(solved: &SpaceSolved) -> Self {
-        let SpaceSolved { problem, states, inputs, .. } = solved;
+    fn of(solved: &LandingSolved) -> Self {
+        let (problem, plan) = (&solved.problem, &solved.warm.1);
+        let (states, inputs) = (plan.states(), plan.inputs());
         let [p, r, _] = inputs[0];
         Self {
             flown: judge::score(problem, states, inputs),

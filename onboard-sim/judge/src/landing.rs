@@ -1,8 +1,8 @@
-//! The landing in space, written from the equations in the documentation of [`nmpc::space`]: dynamics of an interval for any
+//! The landing in space, written from the equations in the documentation of [`nmpc`]: dynamics of an interval for any
 //! kind of number, running cost, and conditions.
 
 use nalgebra::{SMatrix, SVector, Vector3};
-use nmpc::space::{INPUTS, STATES, SpaceProblem};
+use nmpc::{INPUTS, Problem, STATES};
 use num_dual::{DualNum, DualNumCopy, HyperDual64};
 
 /// States and inputs of a node, one after the other.
@@ -22,7 +22,7 @@ const SMOOTH: f64 = 1e-4;
 const HALF_OPEN: f64 = 0.5;
 
 /// The state after interval `k`.
-pub(crate) fn after<D>(problem: &SpaceProblem, k: usize, node: &[D; BOTH]) -> [D; STATES]
+pub(crate) fn after<D>(problem: &Problem, k: usize, node: &[D; BOTH]) -> [D; STATES]
 where
     D: DualNumCopy + DualNum<Primitive = f64>,
 {
@@ -83,7 +83,7 @@ pub(crate) struct Tangent {
 }
 
 impl Tangent {
-    pub(crate) fn at(problem: &SpaceProblem, k: usize, node: &Node, costate: &Column) -> Self {
+    pub(crate) fn at(problem: &Problem, k: usize, node: &Node, costate: &Column) -> Self {
         let mut tangent = Self { end: Column::zeros(), by: SMatrix::zeros(), bend: SMatrix::zeros() };
         for i in 0..BOTH {
             for j in 0..=i {
@@ -103,8 +103,8 @@ impl Tangent {
 }
 
 /// Weights of the cost at node `k`, and the node that costs nothing: the cost is half the weighted sum of squares.
-pub(crate) fn cost_at(problem: &SpaceProblem, k: usize) -> (Node, Node) {
-    let SpaceProblem { weights, step_s, target_m: [x_m, y_m], .. } = problem;
+pub(crate) fn cost_at(problem: &Problem, k: usize) -> (Node, Node) {
+    let Problem { weights, step_s, target_m: [x_m, y_m], .. } = problem;
     let mut weight = Node::zeros();
     if k > 0 {
         let of_leans = [weights.lean, weights.lean, weights.rate, weights.rate];
@@ -143,8 +143,8 @@ impl Range {
 }
 
 /// All conditions of a landing, and the limits of its inputs.
-pub(crate) fn ranges(problem: &SpaceProblem) -> Vec<Range> {
-    let SpaceProblem { end, lean_max_rad, gimbal_limit_rad, .. } = problem;
+pub(crate) fn ranges(problem: &Problem) -> Vec<Range> {
+    let Problem { end, lean_max_rad, gimbal_limit_rad, .. } = problem;
     let last = problem.pushes.len();
     let mut ranges = Vec::new();
     let mut keep = |what, node, component, lower, upper| {

@@ -1,6 +1,6 @@
 //! This crate solves the landing in space a second time, to judge the plans that flew.
 //!
-//! It shares with the solver that flies ([`nmpc::space::solve`]) the data of a problem, and no function: dynamics, cost and
+//! It shares with the solver that flies ([`nmpc::solve`]) the data of a problem, and no function: dynamics, cost and
 //! conditions (`landing`) are written again from their documentation, and their derivatives are those of hyper-dual numbers.
 //! The method is another one (`sqp`): sequential quadratic programming, whose subproblems Clarabel solves. It takes about a
 //! second where the flying solver takes a millisecond.
@@ -13,7 +13,7 @@ mod sqp;
 
 use std::f64::consts::PI;
 
-use nmpc::space::{INPUTS, STATES, SpaceProblem, State};
+use nmpc::{INPUTS, Problem, STATES, State};
 
 use self::landing::{Node, Range, after, cost_at, ranges};
 use self::sqp::Search;
@@ -54,7 +54,7 @@ const GUESSES: [(f64, f64); 5] = [(1.0, 0.0), (-1.0, 0.0), (1.0, PI), (-1.0, PI)
 /// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the answer. A plan with
 /// another number of intervals is not used. The final time is that of the problem. The score is NaN if the problem has no
 /// intervals, or numbers that are not finite.
-pub fn solve(problem: &SpaceProblem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {
+pub fn solve(problem: &Problem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {
     let search = Search::of(problem);
     let given = start.and_then(|(states, inputs)| nodes(problem, states, inputs));
     let guesses = GUESSES.iter().filter(|_| !problem.pushes.is_empty()).map(|guess| search.guess(*guess));
@@ -85,7 +85,7 @@ pub fn solve(problem: &SpaceProblem, start: Option<(&[State], &[[f64; INPUTS]])>
 }
 
 /// Judges a given plan.
-pub fn score(problem: &SpaceProblem, states: &[State], inputs: &[[f64; INPUTS]]) -> Score {
+pub fn score(problem: &Problem, states: &[State], inputs: &[[f64; INPUTS]]) -> Score {
     nodes(problem, states, inputs).map_or(Score::NONE, |nodes| scored(problem, &ranges(problem), &nodes))
 }
 
@@ -95,7 +95,7 @@ impl Score {
 }
 
 /// The nodes of a plan, if it has the problem's intervals.
-fn nodes(problem: &SpaceProblem, states: &[State], inputs: &[[f64; INPUTS]]) -> Option<Vec<Node>> {
+fn nodes(problem: &Problem, states: &[State], inputs: &[[f64; INPUTS]]) -> Option<Vec<Node>> {
     let intervals = problem.pushes.len();
     let fits = intervals > 0 && inputs.len() == intervals && states.len() == intervals + 1;
     let inputs = inputs.iter().chain([&[0.0; INPUTS]]);
@@ -103,7 +103,7 @@ fn nodes(problem: &SpaceProblem, states: &[State], inputs: &[[f64; INPUTS]]) -> 
     fits.then(|| states.iter().zip(inputs).map(node).collect())
 }
 
-fn scored(problem: &SpaceProblem, ranges: &[Range], nodes: &[Node]) -> Score {
+fn scored(problem: &Problem, ranges: &[Range], nodes: &[Node]) -> Score {
     let mut score = Score { cost: 0.0, merit: 0.0, miss: 0.0, worst: None, defect: 0.0 };
     for (k, node) in nodes.iter().enumerate() {
         let (weight, free) = cost_at(problem, k);

@@ -1,19 +1,19 @@
 use super::*;
 use crate::landing::{Column, Tangent};
 use nmpc::SolverLimits;
-use nmpc::space::{Drag, End, Push, SpaceWorkspace, Weights};
+use nmpc::{Drag, End, Push, Weights, Workspace};
 
 const GRAVITY_M_S2: f64 = 9.806_65;
 
 /// A stage of 1.2 kg that falls at 12.5 m/s in a light wind. Its thrust falls to its weight in 3.8 s.
-fn problem(thrust_over_weight: f64) -> SpaceProblem {
+fn problem(thrust_over_weight: f64) -> Problem {
     const INTERVALS: usize = 38;
     let pushes = (0..INTERVALS).map(|k| {
         let share = k as f64 / INTERVALS as f64;
         let thrust_m_s2 = GRAVITY_M_S2 * (thrust_over_weight - (thrust_over_weight - 1.0) * share * share);
         Push { thrust_m_s2, turning_rad_s2: 6.0 * thrust_m_s2, per_kg: 1.0 / 1.2 }
     });
-    SpaceProblem {
+    Problem {
         initial: [0.3, 0.0, 17.6, -0.4, -0.5, -12.5, -0.05, 0.03, 0.0, 0.0],
         step_s: 0.1,
         pushes: pushes.collect(),
@@ -34,15 +34,7 @@ fn problem(thrust_over_weight: f64) -> SpaceProblem {
         floor_rise_m_s: 0.4,
         guess_lean_rad: 0.5,
         guess_towards_rad: 0.6,
-        solver: SolverLimits {
-            max_iterations: 200,
-            max_iterations_after_miss: 1,
-            kkt_tolerance: 1e-6,
-            terminal_penalty: 1000.0,
-            qp_max_iterations: 1,
-            guess_amplitude_rad: 0.0,
-            guess_half_waves: 1,
-        },
+        solver: SolverLimits { max_iterations: 200, kkt_tolerance: 1e-6, terminal_penalty: 1000.0 },
     }
 }
 
@@ -54,8 +46,8 @@ fn val_flying_solver_agrees_with_the_judges_own_guesses() {
     {
         let mut model = problem(thrust_over_weight);
         model.initial[4] += sideways_m_s;
-        let mut workspace = SpaceWorkspace::default();
-        nmpc::space::solve(&mut workspace, &model, None);
+        let mut workspace = Workspace::default();
+        nmpc::solve(&mut workspace, &model, None);
         let flown = score(&model, workspace.states(), workspace.inputs());
         let judged = solve(&model, None);
         let case = format!("{thrust_over_weight} {sideways_m_s}: {flown:?} {:?}", judged.score);
@@ -74,8 +66,8 @@ fn val_flying_solver_agrees_with_the_judges_own_guesses() {
 #[test]
 fn a_given_optimum_is_left_as_it_is() {
     let model = problem(1.8);
-    let mut workspace = SpaceWorkspace::default();
-    let outcome = nmpc::space::solve(&mut workspace, &model, None);
+    let mut workspace = Workspace::default();
+    let outcome = nmpc::solve(&mut workspace, &model, None);
     let search = Search::of(&model);
     let given = nodes(&model, workspace.states(), workspace.inputs()).unwrap();
     let end = search.descend(given);
@@ -85,12 +77,12 @@ fn a_given_optimum_is_left_as_it_is() {
 }
 
 /// Without air, with a constant thrust that stops the fall exactly at the ground.
-fn braking() -> SpaceProblem {
+fn braking() -> Problem {
     let mut model = problem(1.0);
     // From 10 m at 10 m/s in 2 s.
     model.initial = [0.0, 0.0, 10.0, 0.0, 0.0, -10.0, 0.0, 0.0, 0.0, 0.0];
     let push = Push { thrust_m_s2: GRAVITY_M_S2 + 5.0, turning_rad_s2: 60.0, per_kg: 1.0 };
-    SpaceProblem {
+    Problem {
         pushes: vec![push; 20],
         drag: Drag { fins: 0.0, axial: 0.0, crossflow: 0.0 },
         end: End { vertical_m_s: [-0.1, 0.1], ..model.end },

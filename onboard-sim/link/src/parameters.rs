@@ -7,7 +7,7 @@
 
 use alloc::format;
 use alloc::string::String;
-use flight::vehicle::mission::StateWeights;
+use flight::vehicle::mission::PlanWeights;
 use protocol::dialect::{MavMessage, MavParamError};
 use protocol::parameter::{ParamId, ParamKey, is_real32, value_message};
 
@@ -16,18 +16,16 @@ use crate::streams::{STANDARD, Streams};
 /// A weight of the landing cost, by its parameter's name.
 struct Weight {
     name: &'static str,
-    of: fn(&StateWeights) -> f64,
+    of: fn(&PlanWeights) -> f64,
 }
 
 /// The weights of the landing cost (a mission's `powered.weights`).
-const WEIGHTS: [Weight; 7] = [
+const WEIGHTS: [Weight; 5] = [
     Weight { name: "NMPC_W_X", of: |weights| weights.x },
-    Weight { name: "NMPC_W_Z", of: |weights| weights.z },
     Weight { name: "NMPC_W_THETA", of: |weights| weights.theta },
-    Weight { name: "NMPC_W_U", of: |weights| weights.u },
-    Weight { name: "NMPC_W_W", of: |weights| weights.w },
     Weight { name: "NMPC_W_Q", of: |weights| weights.q },
     Weight { name: "NMPC_W_DELTA", of: |weights| weights.delta },
+    Weight { name: "NMPC_W_FINS", of: |weights| weights.fins },
 ];
 
 /// Number of parameters; their indices are 0 to this number minus one. Rates first, then weights.
@@ -59,7 +57,7 @@ fn name(place: u16) -> &'static str {
 }
 
 /// PARAM_VALUE of the parameter at an index below [`COUNT`].
-pub fn value(place: u16, streams: &Streams, weights: &StateWeights) -> MavMessage {
+pub fn value(place: u16, streams: &Streams, weights: &PlanWeights) -> MavMessage {
     let found = match STANDARD.get(usize::from(place)) {
         Some(stream) => streams.rate_hz(stream.message_id),
         None => (WEIGHTS[usize::from(place) - STANDARD.len()].of)(weights),

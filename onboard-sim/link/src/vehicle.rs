@@ -8,13 +8,12 @@ use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown
 use flight::computer::{Computer, Input};
 use flight::estimation::estimator::Estimate;
 use flight::estimation::estimator::Measurements;
-use flight::guidance::powered::{ControlLevel, Plane, PoweredReport};
+use flight::guidance::powered::{ControlLevel, Plan, PoweredReport};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
-use flight::rules::verdict::{LandingVerdict, TouchdownLimits};
+use flight::rules::verdict::{Landing, LandingVerdict, Limits, Touchdown};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::burn::Burn;
-use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
@@ -80,31 +79,14 @@ pub struct BatteryFacts {
     pub left: Option<f64>,
 }
 
-/// The contact that a landing is judged by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Impact {
-    /// Time since power-up, s.
-    pub time_s: f64,
-    /// State just before it.
-    pub state: PlanarState,
-}
-
 /// A touchdown and its judgement, which only a simulation knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
-    /// The contact that was judged.
-    pub impact: Impact,
-    /// Limit by limit.
-    pub verdict: LandingVerdict,
-    /// Inside every limit, and it stands.
-    pub landed: bool,
-}
-
-impl Judged {
-    /// One bit per broken limit, in the verdict's order.
-    pub fn violations(&self) -> u16 {
-        violations(&self.verdict)
-    }
+    /// The first contact, s since power-up.
+    pub time_s: f64,
+    /// What the legs felt of it.
+    pub touchdown: Touchdown,
+    pub landing: Landing,
 }
 
 /// A vehicle's state at one instant.
@@ -158,9 +140,9 @@ impl<'a> VehicleState<'a> {
         }
     }
 
-    /// What counts as a landing.
-    pub fn limits(&self) -> TouchdownLimits {
-        TouchdownLimits::of_the_legs(self.mission())
+    /// The design envelope of the legs.
+    pub fn limits(&self) -> Limits {
+        Limits::from(&self.mission().leg_limits)
     }
 
     /// Bit k: arming check k fails now. Zero off the pad.
@@ -194,7 +176,7 @@ impl<'a> VehicleState<'a> {
     /// a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]).
     pub fn since_zero_s(&self) -> Option<f64> {
         let air = self.airborne()?;
-        Some(self.judged.map_or(air.flown.time_s, |judged| judged.impact.time_s - air.released_at_s))
+        Some(self.judged.map_or(air.flown.time_s, |judged| judged.time_s - air.released_at_s))
     }
 
     /// Where it is and how it moves.
@@ -234,18 +216,8 @@ impl<'a> VehicleState<'a> {
     pub fn planned(&self) -> Option<Planned<'a>> {
         let guidance = self.computer.pilot().powered();
         let air = self.airborne()?;
-        let (states, step_s) = guidance.planned().filter(|_| self.phase().in_landing_burn())?;
-        let plane = guidance.plane()?;
-        let estimate = air.estimate;
-        let time_to_go_s = guidance.left_s(air.flown.time_s);
-        Some(Planned {
-            states,
-            step_s,
-            plane,
-            wind_m_s: estimate.wind_m_s.push(0.0).dot(&plane.along),
-            beside_north_m: estimate.state.position_m.dot(&plane.across) * plane.across.x,
-            time_to_go_s,
-        })
+        let plan = guidance.planned().filter(|_| self.phase().in_landing_burn())?;
+        Some(Planned { plan, time_to_go_s: plan.left_s(air.flown.time_s) })
     }
 
     /// Where the present velocity leads to on the ground, in the world's axes, m; NaN where a parachute will take it there.
@@ -293,44 +265,33 @@ impl Airborne<'_> {
     }
 }
 
-/// A plan in its plane, and where that lies. The plan itself moves with the wind.
+/// A plan that is flown.
 #[derive(Debug, Clone, Copy)]
 pub struct Planned<'a> {
-    states: &'a [PlanarState],
-    step_s: f64,
-    plane: &'a Plane,
-    /// The wind along the plane, m/s.
-    wind_m_s: f64,
-    /// How far north its plane lies of the target, as seen from the east, m.
-    beside_north_m: f64,
+    plan: &'a Plan,
     /// From now to its end, s.
-    pub time_to_go_s: Option<f64>,
+    pub time_to_go_s: f64,
 }
 
 impl Planned<'_> {
-    /// Its end over the ground, in its plane. A plan that misses its end by no more than `landing_miss` counts as a landing: it
-    /// ends on the ground.
-    pub fn end(&self, landing_miss: f64) -> Option<PlanarState> {
-        let whole_s = self.states.len().saturating_sub(1) as f64 * self.step_s;
-        let mut state = Plane::over_ground(self.states.last()?, self.wind_m_s, whole_s);
-        if state.z_m.abs() <= landing_miss {
-            state.z_m = 0.0;
-        }
-        Some(state)
+    /// Its end. A plan that misses its end by no more than `landing_miss` counts as a landing: it ends on the ground.
+    pub fn end(&self, landing_miss: f64) -> Touchdown {
+        let end = self.plan.touchdown();
+        let on_ground = end.height_m.abs() <= landing_miss;
+        Touchdown { height_m: if on_ground { 0.0 } else { end.height_m }, ..end }
     }
 
-    /// Up to `N` points of its path over the ground, evenly spread, both ends kept, and how many: north and up, m, as it
-    /// looks from the east, where the path that is flown is seen from too. Its plane stands as it happens to.
-    pub fn path_from_the_east<const N: usize>(&self) -> Option<([(f64, f64); N], usize)> {
-        let last = self.states.len().checked_sub(1)?;
-        let count = self.states.len().min(N);
+    /// Up to `N` points of its path, evenly spread, both ends kept, and how many: north and up, m, as it looks from the east,
+    /// where the path that is flown is seen from too.
+    pub fn path_from_the_east<const N: usize>(&self) -> ([(f64, f64); N], usize) {
+        let states = self.plan.states();
+        let count = states.len().min(N);
         let mut points_m = [(0.0, 0.0); N];
         for (point, point_m) in points_m.iter_mut().enumerate().take(count) {
-            let node = last * point / (count - 1).max(1);
-            let state = Plane::over_ground(&self.states[node], self.wind_m_s, node as f64 * self.step_s);
-            *point_m = (state.x_m * self.plane.along.x + self.beside_north_m, state.z_m);
+            let state = &states[(states.len() - 1) * point / (count - 1).max(1)];
+            *point_m = (state[0], state[2]);
         }
-        Some((points_m, count))
+        (points_m, count)
     }
 }
 
@@ -376,6 +337,6 @@ pub fn violations(verdict: &LandingVerdict) -> u16 {
 }
 
 /// Flags as bits, the first in bit 0.
-fn bits(flags: impl Iterator<Item = bool>) -> u32 {
+pub(crate) fn bits(flags: impl Iterator<Item = bool>) -> u32 {
     flags.take(32).enumerate().fold(0, |bits, (place, set)| bits | (u32::from(set) << place))
 }

@@ -11,15 +11,11 @@
 //! * [`sortie`]: the flight itself.
 //! * `surroundings`: everything of it but its flight computer.
 //! * [`outside`]: the input from the crew and the ground in one frame.
-//! * [`limits`]: what counts as a landing.
-//! * [`ending`]: how the flight ended, in words.
-//! * [`outcome`]: how the flight ended, judged by the limits of the legs and by the landing paper's Table 2.
+//! * [`outcome`]: how the flight ended, judged.
 
 pub mod dispersion;
 pub mod draw;
-pub mod ending;
 pub mod fault;
-pub mod limits;
 pub mod outcome;
 pub mod outside;
 pub mod recipe;

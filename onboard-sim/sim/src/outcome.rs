@@ -1,13 +1,13 @@
-//! How a flight ended, judged by the landing paper's Table 2 and by its legs: by their limits at contact, or, where they can give
-//! way, by whether the vehicle stands undamaged.
+//! How a flight ended, judged.
 
-use crate::world::{Rest, RestOutcome, Strain, Touchdown};
+use crate::world::{FirstContact, Rest, RestOutcome, Strain};
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
+use flight::rules::verdict::{
+    FlightEnding, Landing, LandingVerdict, Limits, TABLE_2, Touchdown, UNDER_PARACHUTE,
+};
+use flight::vehicle::mission::{LegLimits, Mission};
 
-use crate::ending::{FlightEnding, UNDER_PARACHUTE};
-
-/// Why a flight did not land: the first thing that went wrong.
+/// Why a vehicle does not stand undamaged: the first thing that went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Failure {
     /// The ignition gate never opened.
@@ -16,14 +16,8 @@ pub enum Failure {
     NoLight,
     /// The vehicle came down under the parachute.
     Parachute,
-    /// The vertical speed at contact was too high.
-    Vertical,
-    /// The horizontal speed at contact was too high.
-    Lateral,
-    /// The tilt at contact was too large.
-    Tilt,
-    /// The rotation rate at contact was too high.
-    Rate,
+    /// The contact broke this limit of legs that cannot give way.
+    Limit(&'static str),
     /// The vehicle was within the limits at contact but fell over.
     TippedOver,
     /// Nozzle or body struck the ground, of a vehicle whose legs can give way.
@@ -45,10 +39,7 @@ impl Failure {
             Self::NoIgnition => "no ignition",
             Self::NoLight => "no light",
             Self::Parachute => UNDER_PARACHUTE,
-            Self::Vertical => "vertical speed",
-            Self::Lateral => "lateral speed",
-            Self::Tilt => "tilt",
-            Self::Rate => "rotation rate",
+            Self::Limit(name) => name,
             Self::TippedOver => "tipped over",
             Self::Struck => "body strike",
             Self::StrokeUsedUp => "stroke used up",
@@ -60,10 +51,7 @@ impl Failure {
 
     /// A limit of the legs tells it: at contact, or of what they bear.
     pub const fn is_of_a_limit(self) -> bool {
-        matches!(
-            self,
-            Self::Vertical | Self::Lateral | Self::Tilt | Self::Rate | Self::StrokeUsedUp | Self::Overload
-        )
+        matches!(self, Self::Limit(_) | Self::StrokeUsedUp | Self::Overload)
     }
 }
 
@@ -71,28 +59,20 @@ impl Failure {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// The first contact.
-    pub touchdown: Option<Touchdown>,
+    pub touchdown: Option<FirstContact>,
     /// How the vehicle came to rest.
     pub rest: Option<Rest>,
     /// Last phase.
     pub phase: Phase,
-    /// Inside Table 2 at contact and upright afterwards.
-    pub strict: bool,
-    /// Within the limits of the legs at contact and upright afterwards; of legs that can give way: it stands undamaged.
-    pub legs: bool,
-    /// Why it did not land on its legs.
+    pub landing: Landing,
+    /// Why it does not stand undamaged.
     pub failure: Option<Failure>,
 }
 
 impl Outcome {
     /// How it ended, for people; `aborted`: an abort was latched.
     pub fn ending(&self, aborted: bool) -> FlightEnding<'static> {
-        FlightEnding {
-            aborted,
-            landed: self.legs,
-            table_2: Some(self.strict),
-            failure: self.failure.map(Failure::name),
-        }
+        FlightEnding { aborted, landing: self.landing, failure: self.failure.map(Failure::name) }
     }
 }
 
@@ -100,7 +80,7 @@ impl Outcome {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ending {
     /// The first contact.
-    pub touchdown: Option<Touchdown>,
+    pub touchdown: Option<FirstContact>,
     /// How the vehicle came to rest.
     pub rest: Option<Rest>,
     /// Last phase.
@@ -118,41 +98,36 @@ pub struct Ending {
 /// Judges how a flight ended.
 pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
     let upright = ending.rest.is_some_and(|rest| rest.outcome == RestOutcome::Upright);
-    let (strict, failure) = match &ending.touchdown {
-        _ if !ending.finite => (false, Some(Failure::NotANumber)),
-        None => (false, Some(Failure::TimeOut)),
-        Some(_) if ending.parachute => (false, Some(Failure::Parachute)),
-        Some(_) if !ending.ignited => (false, Some(Failure::NoIgnition)),
-        Some(_) if !ending.lit => (false, Some(Failure::NoLight)),
-        Some(touchdown) => {
-            let damage = match ending.rest {
-                Some(Rest { outcome, strain: Some(strain), .. }) => damage(outcome, &strain),
-                _ => beyond_limits(mission, touchdown).or((!upright).then_some(Failure::TippedOver)),
-            };
-            (upright && inside_table_2(mission, touchdown), damage)
+    let envelope = ending.touchdown.map(|contact| by_envelope(&mission.leg_limits, &contact));
+    let failure = match (&envelope, ending.rest) {
+        _ if !ending.finite => Some(Failure::NotANumber),
+        (None, _) => Some(Failure::TimeOut),
+        _ if ending.parachute => Some(Failure::Parachute),
+        _ if !ending.ignited => Some(Failure::NoIgnition),
+        _ if !ending.lit => Some(Failure::NoLight),
+        (_, Some(Rest { outcome, strain: Some(strain), .. })) => damage(outcome, &strain),
+        (Some(envelope), _) => {
+            let broken = envelope.failures().next().map(|limit| Failure::Limit(limit.name));
+            broken.or((!upright).then_some(Failure::TippedOver))
         }
     };
-    Outcome {
-        touchdown: ending.touchdown,
-        rest: ending.rest,
-        phase: ending.phase,
-        strict: strict && failure.is_none(),
-        legs: failure.is_none(),
-        failure,
-    }
+    let landing = Landing {
+        stands: failure.is_none(),
+        upright,
+        envelope: envelope.is_some_and(|envelope| envelope.is_inside()),
+        table_2: ending.touchdown.is_some_and(|contact| by_table_2(&contact).is_inside()),
+    };
+    Outcome { touchdown: ending.touchdown, rest: ending.rest, phase: ending.phase, landing, failure }
 }
 
-/// The first limit of the legs that the contact broke.
-fn beyond_limits(mission: &Mission, touchdown: &Touchdown) -> Option<Failure> {
-    let legs = &mission.leg_limits;
-    let too_much = [
-        (touchdown.vertical_m_s.abs(), legs.vertical_m_s, Failure::Vertical),
-        (touchdown.lateral_m_s, legs.lateral_m_s, Failure::Lateral),
-        (touchdown.tilt_rad, legs.tilt_deg.to_radians(), Failure::Tilt),
-        (touchdown.rate_rad_s, legs.rate_deg_s.to_radians(), Failure::Rate),
-    ];
-    let first = too_much.iter().find(|(found, most, _)| found.is_nan() || found > most);
-    first.map(|(_, _, failure)| *failure)
+/// Judges a contact by the design envelope of the legs.
+pub fn by_envelope(legs: &LegLimits, contact: &FirstContact) -> LandingVerdict {
+    LandingVerdict::judge(&Limits::from(legs), &contact.over_ground)
+}
+
+/// Judges a contact by the landing paper's Table 2.
+pub fn by_table_2(contact: &FirstContact) -> LandingVerdict {
+    LandingVerdict::judge(&TABLE_2, &Touchdown::along_axis(&contact.state, 0.0))
 }
 
 /// What is broken of a vehicle whose legs can give way.
@@ -164,16 +139,4 @@ fn damage(rest: RestOutcome, strain: &Strain) -> Option<Failure> {
         RestOutcome::Upright if strain.stroke_used >= 1.0 => Some(Failure::StrokeUsedUp),
         RestOutcome::Upright => None,
     }
-}
-
-/// The landing paper's Table 2, in space: axial and lateral velocity in body axes, and the rate across the axis.
-fn inside_table_2(mission: &Mission, touchdown: &Touchdown) -> bool {
-    let limits = &mission.touchdown_limits;
-    let body = touchdown.state.velocity_in_body_m_s();
-    let place = touchdown.state.position_m;
-    libm::hypot(place.x, place.y) <= limits.x_m
-        && touchdown.tilt_rad <= limits.pitch_error_deg.to_radians()
-        && body.x.abs() <= limits.u_m_s
-        && libm::hypot(body.y, body.z) <= limits.w_m_s
-        && touchdown.cross_rate_rad_s <= limits.pitch_rate_deg_s.to_radians()
 }

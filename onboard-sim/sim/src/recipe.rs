@@ -7,7 +7,6 @@ use flight::vehicles::mission::MissionError;
 
 use crate::dispersion::{Dispersion, DispersionError};
 use crate::fault::TimedFault;
-use flight::guidance::baseline::Controller;
 
 /// Everything that a flight is made from. A log keeps the texts that the data were read from.
 #[derive(Debug, Clone)]
@@ -19,8 +18,6 @@ pub struct Recipe {
     pub dispersion_toml: String,
     /// Seed of everything random, for all flights of this recipe.
     pub seed: u64,
-    /// Which law flies the landing burn.
-    pub controller: Controller,
     /// What breaks in every flight.
     pub faults: Vec<TimedFault>,
 }
@@ -40,7 +37,7 @@ pub enum RecipeError {
 }
 
 impl Recipe {
-    /// A recipe from texts, each with its name: seed 1, no faults, flown by the NMPC.
+    /// A recipe from texts, each with its name: seed 1, no faults.
     ///
     /// # Errors
     /// A text does not parse; the message names it and the key.
@@ -53,7 +50,6 @@ impl Recipe {
             dispersion_name: dispersion_name.to_owned(),
             dispersion_toml: dispersion_toml.to_owned(),
             seed: 1,
-            controller: Controller::Nmpc,
             faults: Vec::new(),
         })
     }

@@ -13,7 +13,6 @@ use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
 use flight::estimation::estimator::{Estimate, Measurements};
-use flight::guidance::baseline::Law;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::Phase;
@@ -24,8 +23,7 @@ use nalgebra::Vector3;
 use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw, rail_upwind_m};
 use crate::fault::{Breakage, Injector};
-use crate::limits::Limits;
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, by_envelope};
 use crate::outside::{Flown, Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
 use crate::surroundings::{Feedback, Surroundings, falling_as, world_at};
@@ -82,22 +80,17 @@ impl Sortie {
     /// # Errors
     /// It cannot be set up.
     pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
-        let (mission, law, drawn) = prepared(recipe, number);
+        let (mission, drawn) = prepared(recipe, number);
         let injector = Injector::new(&recipe.faults, recipe.seed, number);
-        Ok(Self { injector, ..Self::of(&mission, &recipe.dispersion, &drawn, law)?.released() })
+        Ok(Self { injector, ..Self::of(&mission, &recipe.dispersion, &drawn)?.released() })
     }
 
     /// A flight without faults with the given draw, started at once.
     ///
     /// # Errors
     /// The mission or the draw cannot be flown.
-    pub fn drawn_as(
-        mission: &Mission,
-        dispersion: &Dispersion,
-        drawn: &Draw,
-        law: Law,
-    ) -> Result<Self, SetUpError> {
-        Ok(Self::of(mission, dispersion, drawn, law)?.released())
+    pub fn drawn_as(mission: &Mission, dispersion: &Dispersion, drawn: &Draw) -> Result<Self, SetUpError> {
+        Ok(Self::of(mission, dispersion, drawn)?.released())
     }
 
     /// Flight `number` of a recipe at power-up: upright on its pad, on its rail, or below its drone.
@@ -105,11 +98,11 @@ impl Sortie {
     /// # Errors
     /// It cannot be set up.
     pub fn on_the_pad(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
-        let (mission, law, drawn) = prepared(recipe, number);
+        let (mission, drawn) = prepared(recipe, number);
         let airframe = &mission.airframe;
         let cg_station_m = airframe.mass.loaded_cg_station_m + drawn.truth.cg_offset_m[0];
         let standing = RigidState::upright(airframe.above_feet_m(cg_station_m));
-        let started = Self::of(&mission, &recipe.dispersion, &drawn, law)?;
+        let started = Self::of(&mission, &recipe.dispersion, &drawn)?;
         let world = match (mission.start.at, drawn.hanging) {
             (StartPoint::Pad, _) => started.surroundings.world.clone(),
             (StartPoint::Drone, Some(hanging)) => started.surroundings.world.clone().hanging(hanging),
@@ -138,11 +131,11 @@ impl Sortie {
     }
 
     /// A flight in a world at its start, with a computer at power-up.
-    fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw, law: Law) -> Result<Self, SetUpError> {
+    fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw) -> Result<Self, SetUpError> {
         let drawn = falling_as(mission, drawn)?;
         let (surroundings, believed) = Surroundings::at_start(mission, dispersion, &drawn)?;
         Ok(Self {
-            computer: Computer::at_power_up(mission, law, &believed),
+            computer: Computer::at_power_up(mission, &believed),
             rehearsal: None,
             surroundings,
             fall: None,
@@ -300,11 +293,6 @@ impl Sortie {
         self.mission = mission.clone();
     }
 
-    /// Changes the law of the landing burn from now on.
-    pub fn set_law(&mut self, law: Law) {
-        self.computer.set_law(law);
-    }
-
     /// The flight computer.
     pub fn computer(&self) -> &Computer {
         &self.computer
@@ -393,11 +381,9 @@ impl Sortie {
     }
 }
 
-/// The mission, its law and the draw.
-pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
+/// The mission and the draw.
+pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Draw) {
     let mut mission = recipe.mission.clone();
-    let law = Law::of(recipe.controller, &mission);
-    mission.ignition.fixed_height_m = mission.ignition.fixed_height_m.or(law.ignition_height_m());
     let drawn = draw(&mission, &recipe.dispersion, recipe.seed, number);
     if mission.start.at == StartPoint::Pad
         && let Some(rail) = mission.launch.as_mut().map(|launch| &mut launch.rail)
@@ -407,7 +393,7 @@ pub(crate) fn prepared(recipe: &Recipe, number: u64) -> (Mission, Law, Draw) {
         [rail.x_m, rail.y_m] =
             rail_upwind_m(rail.upwind_s, &recipe.dispersion, &drawn.truth, recipe.seed, number);
     }
-    (mission, law, drawn)
+    (mission, drawn)
 }
 
 // Applies a fault to a flight.
@@ -550,11 +536,10 @@ impl Rehearsal {
         let [plans, converged] = *plans;
         let outcome = flight.outcome();
         let how = outcome.failure.map_or("landed", |failure| failure.name());
-        let limits = Limits::of(flight.mission());
-        let landing =
-            outcome.touchdown.map(|touchdown| PredictedLanding::from(&limits.by_legs(&touchdown).1));
+        let legs = &flight.mission().leg_limits;
+        let landing = outcome.touchdown.map(|contact| PredictedLanding::from(&by_envelope(legs, &contact)));
         let rehearsed = Rehearsed {
-            warm: outcome.legs && converged > 0,
+            warm: outcome.landing.stands && converged > 0,
             found: format!("{how}, {converged} of {plans} plans converged"),
             landing,
         };

@@ -44,7 +44,7 @@ fn after_the_first_plans_a_frame_without_a_message_does_not_allocate() {
     while flight.goes_on() {
         flight.step_with(&Outside::NOBODY, &mut shadow);
     }
-    assert!(shadow.silent_frames > 2_000 && flight.outcome().legs);
+    assert!(shadow.silent_frames > 2_000 && flight.outcome().landing.stands);
     // The first plans of a flight allocate the solver's workspace and the two plans that it fills in turn.
     assert!(shadow.allocating.iter().all(|(_, plans, _)| *plans <= 2), "{:?}", shadow.allocating);
     assert!(shadow.plans > 20, "{}", shadow.plans);

@@ -84,7 +84,10 @@ fn fly(mission: &str, dispersion: &str, fault: &str, seed: u64) -> Flown {
     Flown {
         apogee_m_s: apogee_m_s.unwrap(),
         ejected_m_s,
-        impact_m_s: flight.world().touchdown().map_or(f64::NAN, |touchdown| touchdown.vertical_m_s),
+        impact_m_s: flight
+            .world()
+            .touchdown()
+            .map_or(f64::NAN, |touchdown| touchdown.over_ground.vertical_m_s),
         landed: flight.outcome().failure.is_none(),
     }
 }

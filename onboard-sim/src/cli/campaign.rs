@@ -12,9 +12,7 @@ use campaign::run::{self, Progress};
 use campaign::scenario::{Expected, Scenario};
 use campaign::store::{Order, Shard, Store, merge};
 use campaign::summary::to_text;
-use campaign::tally;
 use clap::{Args, Subcommand};
-use flight::guidance::baseline::Controller;
 use flight::vehicle::mission::StartPoint;
 use protocol::log::build::build_info;
 use serde_json::json;
@@ -50,12 +48,6 @@ pub(crate) struct CampaignArguments {
     /// Fly only this part of the chunks of flights, counted from 1.
     #[arg(long, default_value = "1/1", value_name = "I/N")]
     shard: Shard,
-    /// Controller of the landing burn: nmpc, open-loop or oscillating.
-    #[arg(long, default_value = "nmpc", value_name = "NAME")]
-    controller: Controller,
-    /// Fall with equally open fins that do not steer.
-    #[arg(long)]
-    passive: bool,
     /// Break something in every flight; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
@@ -129,14 +121,8 @@ fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
 }
 
 fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
-    let CampaignArguments { profile, dispersion, controller, .. } = arguments;
+    let CampaignArguments { profile, dispersion, .. } = arguments;
     let mut recipe = recipe(profile, arguments.start, dispersion, arguments.seed)?;
-    let mission = &mut recipe.mission;
-    mission.steered &= !arguments.passive;
-    if mission.ignition.fixed_height_m.is_none() {
-        mission.ignition.fixed_height_m = tally::fixed_height_m(*controller, mission)?;
-    }
-    recipe.controller = *controller;
     recipe.faults.clone_from(&arguments.faults);
     let mut expected = None;
     if let Some(path) = &arguments.scenario {
@@ -190,7 +176,11 @@ fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
         let how = "an upper bound: vertical motion, no wind, no attitude";
         (By::PerfectInformation, "could it be landed with perfect information?", how)
     } else {
-        (By::Guidance, "does its own guidance land on its legs?", "one simulated flight for each cell")
+        (
+            By::Guidance,
+            "does its own guidance leave it standing undamaged?",
+            "one simulated flight for each cell",
+        )
     };
     let title = format!("{}: {asked}", recipe.mission.name);
     let default = ["thrust-scale=0.8:1.2:21", "wind=0:10:11"];
@@ -208,9 +198,10 @@ struct Cost {
 
 /// Shows how far a campaign is.
 fn show(stopwatch: &Stopwatch, progress: &Progress) {
-    let Progress { flown, of, legs, strict, .. } = progress;
+    let Progress { flown, of, stands, envelope, .. } = progress;
     let rate = *flown as f64 / stopwatch.elapsed_s().max(1e-3);
-    let words = format!("flights, {rate:.1} a second, landed: legs {legs}, strict {strict}");
+    let words =
+        format!("flights, {rate:.1} a second, {stands} stand undamaged, {envelope} inside the envelope");
     stopwatch.show(*flown as usize, *of as usize, words);
 }
 

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Args;
+use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
@@ -321,7 +322,7 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
     let words = match event {
         VehicleEvent::Text { text, .. } => text.clone(),
         VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
-        VehicleEvent::Planned { .. } | VehicleEvent::Verdict { .. } => return,
+        VehicleEvent::Planned { .. } | VehicleEvent::Verdict => return,
     };
     // A closed pipe must not end a flight.
     let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");
@@ -330,12 +331,15 @@ fn report_event(time_s: f64, event: &VehicleEvent) {
 fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     if let (Some(judged), Some(verdict)) = (&summary.judged, &summary.verdict) {
-        let boot_s = judged.impact.time_s;
+        let boot_s = judged.time_s;
         writeln!(out, "touchdown at T+{:.3} s, {boot_s:.3} s since power-up", verdict.time_s)?;
-        writeln!(out, "by what its legs bear:")?;
-        print_limits(&mut out, &verdict.limits)?;
-        writeln!(out, "by the landing paper's Table 2:")?;
-        print_limits(&mut out, &verdict.table_2)?;
+        let [_, _, envelope, table_2] = Landing::WORDS;
+        for (title, limits) in
+            [("borne", &verdict.borne), (envelope, &verdict.envelope), (table_2, &verdict.table_2)]
+        {
+            writeln!(out, "{title}:")?;
+            print_limits(&mut out, limits)?;
+        }
     }
     if let Some([median_s, p99_s, worst_s]) = summary.solve_times.quantiles_s() {
         writeln!(
@@ -356,7 +360,7 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         (_, Some(ending)) => writeln!(out, "{ending}")?,
         (FlightEnd::Aborted, None) => writeln!(out, "ABORTED in {}", summary.phase.name())?,
         (FlightEnd::Stopped, None) => writeln!(out, "STOPPED in {}", summary.phase.name())?,
-        (FlightEnd::Landed | FlightEnd::OutsideLimits, None) => {
+        (FlightEnd::Landed | FlightEnd::NotLanded, None) => {
             writeln!(out, "NOT LANDED: it did not come down")?;
         }
     }
@@ -387,7 +391,7 @@ fn print_limits(out: &mut impl std::io::Write, limits: &[LimitResult]) -> std::i
 fn exit_code(outcome: &FlightEnd) -> ExitCode {
     ExitCode::from(match outcome {
         FlightEnd::Landed => 0,
-        FlightEnd::OutsideLimits => 3,
+        FlightEnd::NotLanded => 3,
         FlightEnd::Aborted | FlightEnd::Refused(_) => 4,
         FlightEnd::Stopped => 5,
     })

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use campaign::figure::{Places, PlacesPanel, places_svg};
-use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, widest};
+use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
+use campaign::statistics::Landings;
 use clap::Args;
+use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
-
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
@@ -137,12 +138,10 @@ impl Study<'_> {
             writeln!(out)?;
         }
         let landed = |impacts: &Vec<Impact>| {
-            let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
-            let (of, landed) =
-                planned.fold((0, 0), |(of, landed), impact| (of + 1, landed + u64::from(impact.landed)));
-            format!("{landed} of {of}")
+            let Landings { stands, envelope, .. } = landed_as_planned(impacts);
+            format!("{} of {}, {} inside", stands.count, stands.of, envelope.count)
         };
-        write!(out, "\n{:<26}", "landed, as planned")?;
+        write!(out, "\n{:<26}", "stand, inside the envelope")?;
         self.impacts.iter().try_for_each(|impacts| write!(out, "{:<29}", landed(impacts)))?;
         writeln!(out, "\n\nRule   {rule}\n       ({})", Rule::SOURCE)?;
         writeln!(
@@ -169,24 +168,19 @@ impl Study<'_> {
 
     fn write_csv(&self, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let mut table = csv::Writer::from_writer(out);
-        table.write_record([
-            "wind_m_s",
-            "way",
-            "flight",
-            "x_m",
-            "y_m",
-            "downwind_m",
-            "across_m",
-            "landed",
-        ])?;
+        let told = ["wind_m_s", "way", "flight", "x_m", "y_m", "downwind_m", "across_m"];
+        table.write_record(told.iter().chain(&Landing::COLUMNS))?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
             for impact in impacts {
-                let Impact { way, number, place_m, landed, .. } = impact;
+                let Impact { way, number, place_m, landing, .. } = impact;
                 let two =
                     |m: Option<[f64; 2]>| m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
                 let ([x, y], [downwind, across]) = (two(*place_m), two(impact.in_wind_m()));
-                let (wind, number, landed) = (wind_m_s.to_string(), number.to_string(), landed.to_string());
-                table.write_record([&wind, way.name(), &number, &x, &y, &downwind, &across, &landed])?;
+                let (wind, number, flags) = (wind_m_s.to_string(), number.to_string(), landing.flags());
+                let told = [&wind, way.name(), &number, &x, &y, &downwind, &across];
+                table.write_record(
+                    told.into_iter().chain(flags.map(|flag| if flag { "true" } else { "false" })),
+                )?;
             }
         }
         table.flush()

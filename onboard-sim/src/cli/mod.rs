@@ -5,7 +5,6 @@ pub(crate) mod campaign;
 pub(crate) mod fly;
 pub(crate) mod hazard;
 pub(crate) mod motors;
-pub(crate) mod paper;
 mod single;
 
 use std::io::Write as _;

@@ -15,8 +15,8 @@ use sim::recipe::Recipe;
 
 /// Flies it and prints its row, one column on each line.
 ///
-/// Exit code 0 if the flight met the scenario's expectation or, without a scenario, landed within the limits of the
-/// legs; otherwise 3.
+/// Exit code 0 if the flight met the scenario's expectation or, without a scenario, stands undamaged; otherwise
+/// 3.
 pub(super) fn fly(
     recipe: &Recipe,
     number: u64,

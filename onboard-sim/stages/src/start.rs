@@ -1,5 +1,7 @@
 //! The start of a solve: cold, from an earlier solution, or again with a larger barrier; and its end.
 
+use serde::Serialize;
+
 use crate::barrier::{Elastic, Limits};
 use crate::iterate::{Iterate, Residual};
 use crate::model::{Condition, Model};
@@ -117,8 +119,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
 // How a solve ended, and what it found.
 
 /// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub enum Status {
+    /// Nothing was solved.
+    #[default]
+    NotRun,
     /// The optimality conditions hold to the tolerance.
     Converged,
     /// The iteration cap ended the solve; the best iterate is returned.
@@ -131,6 +136,21 @@ pub enum Status {
     SubproblemFailed,
     /// A number of the problem, the start or the path is not finite.
     NotFinite,
+}
+
+impl Status {
+    /// The name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotRun => "not run",
+            Self::Converged => "converged",
+            Self::IterationLimit => "iteration limit",
+            Self::WorkLimit => "work limit",
+            Self::Stalled => "stalled",
+            Self::SubproblemFailed => "subproblem failed",
+            Self::NotFinite => "not finite",
+        }
+    }
 }
 
 /// The outcome of a solve. The workspace has its path and multipliers.

@@ -5,10 +5,9 @@ use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
 use board::stream::{Answer, Begin, Frame, put};
-use flight::guidance::baseline::Controller;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 
-use crate::controller::{REFLOWN_BY, SETTINGS_IN_FLIGHT};
+use crate::controller::SETTINGS_IN_FLIGHT;
 use crate::log::{Entry, FlightLog, LogError};
 use crate::output::{Destination, NewFile, Overwrite, WriteError};
 
@@ -120,18 +119,8 @@ fn beginning<R: io::Read>(log: &FlightLog<R>, start: ComputerStart) -> Result<Be
     if head.run.contains_key(SETTINGS_IN_FLIGHT) {
         return Err("its settings were changed in flight");
     }
-    if head.run.contains_key(REFLOWN_BY) {
-        return Err("another law took over in flight");
-    }
     let Some(Ok(toml)) = &head.profile_toml else {
         return Err("has no mission or profile before its first frame");
     };
-    let controller = head.run.get("controller").cloned();
-    Ok(Begin {
-        toml: toml.clone(),
-        controller: controller.unwrap_or_else(|| Controller::default().name().to_owned()),
-        start,
-        on_the_air: None,
-        flight: 0,
-    })
+    Ok(Begin { toml: toml.clone(), start, on_the_air: None, flight: 0 })
 }

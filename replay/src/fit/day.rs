@@ -16,7 +16,6 @@ use anyhow::{Context as _, Result, bail, ensure};
 use campaign::run::in_parallel;
 use campaign::stopwatch::Stopwatch;
 use clap::Args;
-use flight::guidance::baseline::{Controller, Law};
 use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
 use rand::SeedableRng as _;
@@ -325,7 +324,6 @@ fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
 
 /// Flies the day's flights.
 fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<Trial>, LearnError> {
-    let law = Law::of(Controller::Nmpc, &day.mission);
     let mut chance = Chance(ChaCha12Rng::seed_from_u64(ask.seed));
     let motors: Vec<(u64, Vec<f64>)> =
         (0..flights as u64).map(|number| (number, draw_next(lots, &mut chance))).collect();
@@ -341,7 +339,7 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Resul
             ..drawn.truth
         };
         let draw = Draw { truth, ..drawn };
-        Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw, law.clone())?.run().legs)
+        Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().legs)
     };
     let stopwatch = Stopwatch::start();
     let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));

@@ -13,7 +13,6 @@
 //! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
 //! computer only. The crew's abort comes at its recorded frame.
 
-pub(crate) mod prepared;
 mod rerun;
 
 use std::collections::BTreeMap;
@@ -21,50 +20,28 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
-use clap::ValueEnum;
+use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
-use prepared::Prepared;
+use flight_log::frame::phase_of;
+use flight_log::sortie;
+use prost::Message as _;
+use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 use serde::Serialize;
+use sim::draw::draw;
 use sim::sortie::SetUpError;
 use sim::world::whole::WorldError;
 
+use self::rerun::Rerun;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
-use crate::controller::{REFLOWN_AT, REFLOWN_BY};
+use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::VerdictFacts;
 use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
-use crate::settings::{Setting, SettingArguments, SettingError};
-
-/// The controller that flies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Law {
-    /// As recorded.
-    #[default]
-    AsRecorded,
-    /// The pilot itself.
-    Nmpc,
-    /// Ignition and fins at times fixed in advance.
-    OpenLoop,
-    /// The nose swings to waste thrust.
-    Oscillating,
-}
-
-impl Law {
-    /// The name on a command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AsRecorded => "as-recorded",
-            Self::Nmpc => "nmpc",
-            Self::OpenLoop => "open-loop",
-            Self::Oscillating => "oscillating",
-        }
-    }
-}
+use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 
 /// Where to begin.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -80,29 +57,13 @@ pub enum StartAt {
     Phase(Phase),
 }
 
-/// Which recorded state to begin from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum From {
-    /// The simulated world's.
-    #[default]
-    Truth,
-    /// The flight computer's estimate.
-    Estimate,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
     /// The first frame flown again, by its number in the log.
     pub frame: u64,
-    /// The same since the release.
-    #[serde(skip)]
-    pub since_release: u64,
     /// Its vehicle time, s.
     pub time_s: f64,
     pub phase: &'static str,
-    /// The recorded state that was used.
-    pub from: From,
     /// Horizontal distance from the pad, m.
     pub x_m: f64,
     /// Altitude, m.
@@ -114,14 +75,10 @@ pub struct StartState {
 pub struct ReflyOptions {
     /// Where to begin.
     pub start: StartAt,
-    /// Which recorded state to begin from.
-    pub from: From,
     /// Settings of controller and plant; timed ones change the controller only.
     pub settings: Vec<Setting>,
     /// Additional settings of the plant only.
     pub plant_settings: Vec<Setting>,
-    /// The controller that flies.
-    pub law: Law,
     /// Seed of the plant's dispersions instead of the recorded seed.
     pub seed: Option<u64>,
     /// Other faults than the recorded ones.
@@ -135,12 +92,6 @@ pub struct FaultChanges {
     pub with: Vec<String>,
     /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for every one.
     pub without: Vec<String>,
-}
-
-impl FaultChanges {
-    fn is_none(&self) -> bool {
-        self.with.is_empty() && self.without.is_empty()
-    }
 }
 
 /// Why a flight cannot be flown again.
@@ -181,18 +132,13 @@ pub enum ReflyError {
         name: String,
         reason: String,
     },
-    /// A setting of the controller given to the plant, or the other way round.
+    /// A setting of the controller given to the plant, or the other way round, or one that does not change in flight.
     #[error("{setting}: {belongs}")]
     Misplaced {
         setting: String,
-        /// The owner of the setting.
+        /// Where it belongs.
         belongs: &'static str,
     },
-    /// A setting of the plant has a time.
-    #[error(
-        "{setting}: the plant's settings hold from the beginning; only the controller's can change in flight"
-    )]
-    TimedPlant { setting: String },
 }
 
 /// How the re-flown frames before the start compare with the record.
@@ -217,8 +163,6 @@ pub struct ReflyReport {
     pub settings: Vec<String>,
     /// The changed settings of the plant only.
     pub plant_settings: Vec<String>,
-    /// The controller that flew.
-    pub law: Law,
     /// The faults that differ from the recorded ones, from the beginning of the flight on.
     pub faults: FaultChanges,
     /// The seed of the plant's draw, if it is not the recorded one.
@@ -252,7 +196,7 @@ pub struct ReflyReport {
 pub struct ReflownFlight {
     /// All its records, with vehicle times, s.
     pub records: Vec<(f64, Record)>,
-    /// Facts that its log has in addition to those of the recorded flight.
+    /// The facts of its log.
     pub run: BTreeMap<String, String>,
     /// The landing verdict; `None` if it did not come down.
     pub verdict: Option<v1::LandingVerdict>,
@@ -263,10 +207,11 @@ pub struct ReflownFlight {
 /// # Errors
 /// See [`ReflyError`].
 pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
-    Prepared::new(recording, options)?.fly(options)
+    Ok(refly_flight(recording, options)?.0)
 }
 
-/// Flies a recorded flight again and keeps the flight itself.
+/// Flies a recorded flight again and keeps the flight itself. The frames before the start are the re-flown ones, too:
+/// recorded frames may come from another build or be partly lost, and the flight after the start would not continue them.
 ///
 /// # Errors
 /// See [`ReflyError`].
@@ -274,13 +219,211 @@ pub fn refly_flight(
     recording: &Recording,
     options: &ReflyOptions,
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
-    Prepared::new(recording, options)?.fly_kept(options)
+    refuse_misplaced(options)?;
+    let (_, frames) = recording.recorded_frames()?;
+    let place = find(recording, frames, &options.start)?;
+    let first_frame = frames[place].input.frame;
+    let mut rerun = Rerun::of(recording, &FaultChanges::default())?.fly_before(first_frame);
+    let reached = reached(recording, &rerun, &frames[..place]);
+    let world = rerun.flight.world();
+    let place_m = world.state().position_m;
+    let start = StartState {
+        frame: recording.release_frame + first_frame,
+        time_s: frames[place].input.time_s,
+        phase: place.checked_sub(1).map_or("DEPLOY", |before| phase_name(&frames[before].output)),
+        x_m: libm::hypot(place_m.x, place_m.y),
+        z_m: world.height_m(),
+    };
+    if options.faults != FaultChanges::default() {
+        // It may come there another way.
+        rerun = Rerun::of(recording, &options.faults)?.fly_before(first_frame);
+    }
+    let in_flight = in_flight(options, first_frame);
+    change(recording, options, &in_flight, &mut rerun)?;
+    let began = Event {
+        level: EventLevel::Info,
+        name: "replay".to_owned(),
+        message: format!("flown again in simulation from frame {}", start.frame),
+    };
+    rerun.records.push((rerun.flight.frame() as f64 * FRAME_S, Record::Event(began)));
+    rerun = rerun.fly_before(u64::MAX);
+
+    let verdict = sortie::verdict(&rerun.flight);
+    let end_s = rerun.flight.frame() as f64 * FRAME_S;
+    rerun
+        .records
+        .extend(verdict.iter().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict.clone())))));
+    let [recorded, reflown] =
+        [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
+    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+    let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
+    let mut report = ReflyReport {
+        kind: "closed loop: flown again in simulation",
+        file: recording.name.clone(),
+        settings: listed(&options.settings),
+        plant_settings: listed(&options.plant_settings),
+        faults: options.faults.clone(),
+        seed: options.seed,
+        start,
+        reached,
+        thrust_scale: rerun.flight.world().truth().impulse_scale,
+        verdict_changed: landed(&recorded).map(|then| Some(then) != landed(&reflown)),
+        recorded,
+        margin: reflown.as_ref().map(margin),
+        reflown,
+        frames: rerun.frames().filter(|frame| frame.input.frame >= first_frame).count(),
+        commands_recorded: 0,
+        commands_identical: 0,
+        gimbal_difference_max_rad: 0.0,
+    };
+    for (now, then) in rerun.beside(&frames[place..]) {
+        let pairs = || then.output.gimbal_rad.iter().zip(&now.output.gimbal_rad);
+        report.commands_recorded += 1;
+        report.commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
+        let apart_rad = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        report.gimbal_difference_max_rad = report.gimbal_difference_max_rad.max(apart_rad);
+    }
+    let run = run_facts(recording, &report, &in_flight, &rerun);
+    Ok((report, ReflownFlight { records: rerun.records, run, verdict }))
 }
 
-/// Refuses a time on settings of the plant.
-fn refuse_timed(plant_settings: &[Setting]) -> Result<(), ReflyError> {
-    let timed = plant_settings.iter().find(|setting| setting.at_s.is_some());
-    timed.map_or(Ok(()), |timed| Err(ReflyError::TimedPlant { setting: timed.to_string() }))
+/// How the frames before the start compare with the record.
+fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Reached {
+    let mut reached = Reached { frames: 0, identical: 0, first_different: None };
+    for (now, then) in rerun.beside(before) {
+        reached.frames += 1;
+        if is_same_flight(now, then, !recording.from_power_up) {
+            reached.identical += 1;
+        } else {
+            reached.first_different.get_or_insert(recording.release_frame + then.input.frame);
+        }
+    }
+    reached
+}
+
+/// Whether two frames are of the same flight: what was felt, what was decided, and what is remembered, unless that covers a
+/// pad. What only a crew or a log's disk makes different does not count.
+fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
+    let felt = |frame: &ComputerFrame| {
+        let ComputerInput {
+            measured, known, fins_rad, contact, igniter_continuity, booster_attached, ..
+        } = frame.input.clone();
+        let input = ComputerInput {
+            measured,
+            known,
+            fins_rad,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            ..ComputerInput::default()
+        };
+        let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
+        let state_digest = if same_memory { frame.state_digest } else { 0 };
+        ComputerFrame { input, output, state_digest }.encode_to_vec()
+    };
+    felt(now) == felt(then)
+}
+
+/// The settings as timed ones. None applies before the start (half a frame before the end of its first frame), because until
+/// then the flight is the recorded one.
+fn in_flight(options: &ReflyOptions, first_frame: u64) -> Vec<Setting> {
+    let start_s = (first_frame as f64 - 0.5) * FRAME_S;
+    let mut in_flight = options.settings.clone();
+    // Of two settings that take effect at the start, the later setting wins, as it would have in flight.
+    in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
+    for setting in &mut in_flight {
+        setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
+    }
+    in_flight
+}
+
+/// Changes the flight from here on. The world gets its airframe from all settings without a time, and its draw from the
+/// settings of the draw.
+fn change(
+    recording: &Recording,
+    options: &ReflyOptions,
+    in_flight: &[Setting],
+    rerun: &mut Rerun,
+) -> Result<(), ReflyError> {
+    let toml = recording.profile_toml()?;
+    rerun.schedule = Some(LoggedComputer::schedule(toml, recording.recorded_frames()?.0, in_flight)?);
+    let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
+        options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
+    let lasting = options.settings.iter().filter(|setting| setting.at_s.is_none());
+    let all: Vec<Setting> = lasting.chain(&of_mission).cloned().collect();
+    let true_mission = mission_with(toml, &all)?;
+    let world = rerun.flight.world();
+    let drawn = options.seed.map_or(*world.truth(), |seed| {
+        draw(&true_mission, &rerun.recipe.dispersion, seed, rerun.number).truth
+    });
+    let truth = truth_with(&drawn, &of_truth)?;
+    if truth != *world.truth() || true_mission.airframe != *world.airframe() {
+        let motor = truth.curve(&true_mission)?;
+        *rerun.flight.world_mut() = world.changed(&true_mission.airframe, motor.as_ref(), &truth)?;
+    }
+    Ok(())
+}
+
+/// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
+/// draw and of its estimator.
+fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
+    let refused = |settings: &[Setting], is_wrong: fn(&Setting) -> bool, belongs| {
+        let wrong = settings.iter().find(|setting| is_wrong(setting));
+        wrong.map_or(Ok(()), |wrong| Err(ReflyError::Misplaced { setting: wrong.to_string(), belongs }))
+    };
+    let (plant, controller) = (&options.plant_settings, &options.settings);
+    refused(
+        plant,
+        |setting| setting.at_s.is_some(),
+        "the plant's settings hold from the beginning; only the controller's can change in flight",
+    )?;
+    refused(
+        plant,
+        |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
+        "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
+    )?;
+    refused(
+        controller,
+        |setting| setting.path.starts_with("truth."),
+        "the random draw belongs to the plant alone (--plant)",
+    )?;
+    refused(
+        controller,
+        |setting| setting.path.starts_with("estimator."),
+        "the estimator is set up at apogee; evaluate takes it",
+    )
+}
+
+/// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
+/// cannot act earlier.
+fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Result<usize, ReflyError> {
+    let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
+    let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
+        let entered = frames.iter().position(|frame| phase_of(&frame.output).is_some_and(wanted))?;
+        Some(entered + 1).filter(|place| *place < frames.len())
+    };
+    let [first, last] = [frames.first(), frames.last()].map(|frame| frame.map_or(0, logged));
+    let (found, reason) = match start {
+        StartAt::Landing => (
+            in_phase(&Phase::is_landing),
+            "no frame of a landing to start from; a frame, a time or a phase names another moment".to_owned(),
+        ),
+        StartAt::Frame(number) => (
+            frames.iter().position(|frame| logged(frame) == *number),
+            format!("no frame {number}; there are {first} to {last}"),
+        ),
+        StartAt::Time(time_s) => (
+            frames.iter().position(|frame| frame.input.time_s >= *time_s),
+            format!(
+                "no frame at or after {time_s} s; the last is at {:.3} s",
+                frames.last().map_or(0.0, |frame| frame.input.time_s)
+            ),
+        ),
+        StartAt::Phase(phase) => {
+            (in_phase(&|found| found == *phase), format!("no frame in phase {}", phase.name()))
+        }
+    };
+    found.ok_or_else(|| ReflyError::Start { name: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
@@ -301,64 +444,50 @@ pub fn margin(verdict: &VerdictFacts) -> f64 {
 pub fn write_log<'a>(
     destination: impl Into<Destination<'a>>,
     recording: &Recording,
-    options: &ReflyOptions,
-    report: &ReflyReport,
     flight: &ReflownFlight,
 ) -> Result<(), WriteError> {
-    let destination = destination.into();
-    let header = header(recording, options, report, flight);
-    let mut log = NewLog::create(destination, Path::new(&recording.name), &header)?;
-    for (time_s, record) in records(report, flight) {
-        log.write(&record, (time_s.max(0.0) * 1e9) as u64)?;
+    let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
+    let header = LogHeader {
+        writer: "replay".to_owned(),
+        start_unix_ns: start.unwrap_or(0),
+        run: flight.run.clone(),
+        // It keeps its mission; its settings change in flight.
+        profile_toml: recording.profile_toml().ok().map(str::to_owned),
+        scenario_toml: recording.head.scenario_toml.clone(),
+    };
+    let mut log = NewLog::create(destination.into(), Path::new(&recording.name), &header)?;
+    for (time_s, record) in &flight.records {
+        log.write(record, (time_s * 1e9) as u64)?;
     }
     log.finish()
 }
 
-fn header(
+/// Facts about the run of a re-flown flight.
+fn run_facts(
     recording: &Recording,
-    options: &ReflyOptions,
     report: &ReflyReport,
-    flight: &ReflownFlight,
-) -> LogHeader {
-    let mut run: BTreeMap<String, String> = recording.head.run.clone();
-    run.insert("reflown_from".to_owned(), report.file.clone());
-    run.insert(REFLOWN_AT.to_owned(), report.start.since_release.to_string());
-    run.insert("reflown_with".to_owned(), report.settings.join(" "));
-    if report.law != Law::AsRecorded {
-        run.insert(REFLOWN_BY.to_owned(), report.law.name().to_owned());
-    }
-    run.extend(flight.run.clone());
-    run.insert("plant_settings".to_owned(), report.plant_settings.join(" "));
+    in_flight: &[Setting],
+    rerun: &Rerun,
+) -> BTreeMap<String, String> {
+    let lines: Vec<String> = in_flight.iter().map(ToString::to_string).collect();
+    let faults: Vec<String> = rerun.recipe.faults.iter().map(ToString::to_string).collect();
+    let mut run = recording.head.run.clone();
+    run.extend(
+        [
+            ("reflown_from", report.file.clone()),
+            ("reflown_with", report.settings.join(" ")),
+            (SETTINGS_IN_FLIGHT, lines.join("\n")),
+            ("faults", faults.join(" ")),
+            ("plant_settings", report.plant_settings.join(" ")),
+        ]
+        .map(|(fact, value)| (fact.to_owned(), value)),
+    );
     run.retain(|_, fact| !fact.is_empty());
-    if let Some(seed) = options.seed {
-        run.insert("seed".to_owned(), seed.to_string());
-        let before = recording.head.run.get("seed").map_or("not recorded", String::as_str);
-        run.insert("reflown_instead_of_seed".to_owned(), before.to_owned());
+    if let Some(seed) = report.seed {
+        let before = run.insert("seed".to_owned(), seed.to_string());
+        run.insert("reflown_instead_of_seed".to_owned(), before.unwrap_or_else(|| "not recorded".to_owned()));
     }
-    let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
-    LogHeader {
-        writer: "replay".to_owned(),
-        start_unix_ns: start.unwrap_or(0),
-        run,
-        // It keeps its mission; its settings change in flight.
-        profile_toml: recording.profile_toml().ok().map(str::to_owned),
-        scenario_toml: recording.head.scenario_toml.clone(),
-    }
-}
-
-/// Every record with its vehicle time, s, in order.
-fn records(report: &ReflyReport, flight: &ReflownFlight) -> Vec<(f64, Record)> {
-    let mut records = flight.records.clone();
-    let began = Event {
-        level: EventLevel::Info,
-        name: "replay".to_owned(),
-        message: format!("flown again in simulation from frame {}", report.start.frame),
-    };
-    records.push((report.start.time_s, Record::Event(began)));
-    let end_s = records.iter().map(|(time_s, _)| *time_s).fold(0.0, f64::max);
-    records.extend(flight.verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict)))));
-    records.sort_by(|a, b| a.0.total_cmp(&b.0));
-    records
+    run
 }
 
 /// Writes the result of flying a flight again.
@@ -370,17 +499,8 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     let start = &report.start;
     writeln!(
         output,
-        "from frame {} (T+{:.3} s, {}, recorded {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
-        start.frame,
-        start.time_s,
-        start.phase,
-        match start.from {
-            crate::refly::From::Truth => "truth",
-            crate::refly::From::Estimate => "estimate",
-        },
-        start.x_m,
-        start.z_m,
-        report.thrust_scale
+        "from frame {} (T+{:.3} s, {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
+        start.frame, start.time_s, start.phase, start.x_m, start.z_m, report.thrust_scale
     )?;
     for (what, settings) in [("with", &report.settings), ("plant alone with", &report.plant_settings)] {
         if !settings.is_empty() {
@@ -407,10 +527,6 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
             output,
             "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
         )?;
-    }
-    match report.law {
-        Law::AsRecorded => {}
-        law => writeln!(output, "with the landing burn flown by {}", law.name())?,
     }
     print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
     let answer = match report.verdict_changed {
@@ -458,7 +574,27 @@ pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     #[command(flatten)]
-    how: FlownHow,
+    settings: SettingArguments,
+    /// Another setting of the plant alone.
+    ///
+    /// As in truth.impulse_scale=0.97. The controller does not know about it. Also airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
+    #[arg(long, value_name = "SETTING")]
+    plant: Vec<Setting>,
+    /// Another fault, as in gnss-out@5.
+    #[arg(
+        long = "fault",
+        value_name = "FAULT",
+        long_help = format!("Another fault, from the beginning of the flight on; may be given more than once. Write {}", sim::fault::how_to_write())
+    )]
+    faults: Vec<String>,
+    /// Leave out a recorded fault; `all` for every one.
+    ///
+    /// By its name, or in full as it was given.
+    #[arg(long, value_name = "FAULT")]
+    without_fault: Vec<String>,
+    /// Seed of the plant's dispersions instead of the recorded one.
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    seed: Option<u64>,
     /// Begin at T+12.9, POWERED or frame:1290.
     ///
     /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8 (since power-up),
@@ -476,53 +612,6 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// How a flight is flown again, wherever it begins.
-#[derive(Debug, clap::Args)]
-pub(crate) struct FlownHow {
-    #[command(flatten)]
-    pub(crate) settings: SettingArguments,
-    /// Another setting of the plant alone.
-    ///
-    /// As in truth.impulse_scale=0.97. The controller does not know about it. Also airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
-    #[arg(long, value_name = "SETTING")]
-    plant: Vec<Setting>,
-    /// The recorded state to begin from.
-    #[arg(long, value_enum, default_value_t = From::Truth, hide_short_help = true)]
-    from: From,
-    /// The controller that flies.
-    #[arg(long, value_enum, value_name = "NAME", default_value_t = Law::AsRecorded, hide_short_help = true)]
-    controller: Law,
-    /// Another fault, as in gnss-out@5.
-    #[arg(
-        long = "fault",
-        value_name = "FAULT",
-        long_help = format!("Another fault, from the beginning of the flight on; may be given more than once. Write {}", sim::fault::how_to_write())
-    )]
-    faults: Vec<String>,
-    /// Leave out a recorded fault; `all` for every one.
-    ///
-    /// By its name, or in full as it was given.
-    #[arg(long, value_name = "FAULT")]
-    without_fault: Vec<String>,
-    /// Seed of the plant's dispersions instead of the recorded one.
-    #[arg(long, value_name = "N", hide_short_help = true)]
-    seed: Option<u64>,
-}
-
-impl FlownHow {
-    pub(crate) fn options(&self, start: StartAt) -> Result<ReflyOptions> {
-        Ok(ReflyOptions {
-            start,
-            from: self.from,
-            settings: self.settings.all()?,
-            plant_settings: self.plant.clone(),
-            law: self.controller,
-            seed: self.seed,
-            faults: FaultChanges { with: self.faults.clone(), without: self.without_fault.clone() },
-        })
-    }
-}
-
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
@@ -533,11 +622,17 @@ impl Args {
             None => StartAt::Landing,
         };
         warn_of_what_is_missing(&recording);
-        let options = self.how.options(start)?;
+        let options = ReflyOptions {
+            start,
+            settings: self.settings.all()?,
+            plant_settings: self.plant,
+            seed: self.seed,
+            faults: FaultChanges { with: self.faults, without: self.without_fault },
+        };
         let (report, flight) = refly_flight(&recording, &options)?;
         if let Some(path) = &self.log {
             let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
-            write_log(destination, &recording, &options, &report, &flight)?;
+            write_log(destination, &recording, &flight)?;
         }
         answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
         Ok(Outcome::Given)

@@ -1,11 +1,12 @@
-//! Sets up a recorded flight to be flown again, from the facts in its log.
+//! A recorded flight, flown again frame by frame from the facts in its log.
 
-use flight::computer::{Commands, FRAME_S};
+use flight::computer::FRAME_S;
 use flight::vehicle::mission::Mission;
 use flight_log::frame::accepts_abort;
 use flight_log::logged::{state_from_log, vector_from_log};
 use flight_log::sortie::{self as sortie_log, LastFrame};
-use sim::dispersion::Dispersion;
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::record::Record;
 use sim::fault::{Breakage, FaultError, TimedFault};
 use sim::outside::Outside;
 use sim::recipe::Recipe;
@@ -19,40 +20,27 @@ use crate::settings::Schedule;
 /// Stands for every recorded fault.
 const EVERY_FAULT: &str = "all";
 
-/// A flight in progress, with its faults and timed changes still to come.
-#[derive(Debug, Clone)]
+/// A flight in progress, with all its records so far.
 pub(super) struct Rerun {
+    pub(super) recipe: Recipe,
+    pub(super) number: u64,
     pub(super) flight: Sortie,
+    /// Changes of the mission that are still to come.
     pub(super) schedule: Option<Schedule<Mission>>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
-    /// The flight computer's last frame.
-    pub(super) last: LastFrame,
+    last: LastFrame,
+    /// With vehicle times, s.
+    pub(super) records: Vec<(f64, Record)>,
 }
 
-/// The recipe of a flight, and the flight at apogee.
-pub(super) struct Recorded {
-    pub(super) dispersion: Dispersion,
-    pub(super) number: u64,
-    pub(super) rerun: Rerun,
-    /// The faults that it is flown with, as text.
-    pub(super) faults: String,
-}
-
-impl Recorded {
-    /// The recipe of a recorded flight.
+impl Rerun {
+    /// A recorded flight at its start, with other faults.
     ///
     /// # Errors
-    /// The log lacks a part of it, or this build does not know it.
-    pub(super) fn of(recording: &Recording) -> Result<Self, ReflyError> {
-        Self::with_faults(recording, &FaultChanges::default())
-    }
-
-    /// The recipe of a recorded flight, with other faults.
-    ///
-    /// # Errors
-    /// As [`of`](Self::of); or a fault to leave out is not there, or a fault to add is unknown.
-    pub(super) fn with_faults(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
+    /// The log lacks a part of its recipe, or this build does not know it; a fault to leave out is not there, or a fault to
+    /// add is unknown.
+    pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
         let (start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
         let run = &recording.head.run;
@@ -66,24 +54,19 @@ impl Recorded {
         let (seed, number) = (number_of("seed")?, number_of("flight")?);
         let dispersion = sortie_log::dispersion_of(run, recording.head.scenario_toml.as_deref())
             .map_err(|error| lacking(error.to_string()))?;
-        let unknown = || lacking("it was flown by a controller that this build does not know".to_owned());
-        let controller = sortie_log::controller_of(run).ok_or_else(unknown)?;
         let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
         let recorded: Vec<TimedFault> = faults
             .map(str::parse)
             .collect::<Result<_, _>>()
             .map_err(|error: FaultError| lacking(error.to_string()))?;
-        let faults = changed(recording, &recorded, changes)?;
-        let mission = LoggedComputer::schedule(recording.profile_toml()?, start, &[])?.base().clone();
         let recipe = Recipe {
-            mission,
+            mission: LoggedComputer::schedule(recording.profile_toml()?, start, &[])?.base().clone(),
             mission_toml: recording.profile_toml()?.to_owned(),
             dispersion,
             dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),
             dispersion_toml: recording.head.scenario_toml.clone().unwrap_or_default(),
             seed,
-            controller,
-            faults,
+            faults: changed(recording, &recorded, changes)?,
         };
         let flight = Sortie::new(&recipe, number)?;
         let flight = match &start.gyro_bias_rad_s {
@@ -94,30 +77,51 @@ impl Recorded {
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|frame| accepts_abort(frame) && !by_fault);
         let aborts = crews.map(|frame| frame.input.frame).collect();
-        let rerun = Rerun { flight, schedule: None, aborts, last: LastFrame::default() };
-        let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-        Ok(Self { dispersion, number, rerun, faults })
+        let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie_log::start(&flight);
+        let start = ComputerStart { believed, gyro_bias_rad_s, ..*start };
+        let records = vec![(0.0, Record::ComputerStart(Box::new(start)))];
+        Ok(Self { recipe, number, flight, schedule: None, aborts, last: LastFrame::default(), records })
     }
-}
 
-impl Rerun {
-    /// Flies one frame; `false` when the flight is over.
-    pub(super) fn step(&mut self) -> bool {
-        let time_s = (self.flight.frame() + 1) as f64 * FRAME_S;
+    /// Flies up to a frame, or to the end.
+    pub(super) fn fly_before(mut self, frame: u64) -> Self {
+        while self.flight.frame() + 1 < frame && self.step() {}
+        self
+    }
+
+    /// Flies one frame and keeps it; `false` when the flight is over.
+    fn step(&mut self) -> bool {
+        let number = self.flight.frame() + 1;
+        let (time_s, phase) = (number as f64 * FRAME_S, self.flight.computer().mode().phase);
         // The change is made before the frame in whose time it falls, as in a recorded flight.
         if let Some(mission) = self.schedule.as_mut().and_then(|schedule| schedule.due(time_s)) {
             self.flight.reconfigure(mission);
         }
-        if self.aborts.binary_search(&(self.flight.frame() + 1)).is_ok() {
+        if self.aborts.binary_search(&number).is_ok() {
             self.flight.abort();
         }
         self.flight.step_with(&Outside::NOBODY, &mut self.last);
+        let records = sortie_log::frame_and_phase(&self.flight, &mut self.last, phase);
+        self.records.extend(records.into_iter().map(|record| (time_s, record)));
         self.flight.goes_on()
     }
 
-    /// The commands of the last frame; `None` while the computer is dead.
-    pub(super) fn commands(&self) -> Option<&Commands> {
-        (!self.flight.computer_is_dead()).then(|| self.flight.computer().commands())
+    /// Its frames beside the recorded ones of the same numbers; a log may have lost some.
+    pub(super) fn beside<'a>(
+        &'a self,
+        recorded: &'a [ComputerFrame],
+    ) -> impl Iterator<Item = (&'a ComputerFrame, &'a ComputerFrame)> {
+        self.frames().filter_map(|now| {
+            let place = recorded.binary_search_by_key(&now.input.frame, |then| then.input.frame).ok()?;
+            Some((now, &recorded[place]))
+        })
+    }
+
+    pub(super) fn frames(&self) -> impl Iterator<Item = &ComputerFrame> {
+        self.records.iter().filter_map(|(_, record)| match record {
+            Record::ComputerFrame(frame) => Some(frame.as_ref()),
+            _ => None,
+        })
     }
 }
 

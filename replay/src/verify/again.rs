@@ -8,7 +8,7 @@ use protocol::log::v1::LandingVerdict;
 
 use super::parts::Part;
 use crate::log::Recording;
-use crate::refly::{ReflyError, ReflyOptions, StartAt, prepared::Prepared};
+use crate::refly::{ReflyError, ReflyOptions, StartAt, refly_flight};
 
 /// The facts that a simulated flight is drawn from.
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
@@ -26,11 +26,10 @@ pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &
             .last()
             .map_or(StartAt::Landing, |last| StartAt::Frame(recording.release_frame + last.input.frame));
         let options = ReflyOptions { start, ..ReflyOptions::default() };
-        let prepared = Prepared::new(&recording, &options)?;
-        let (_, reflown) = prepared.fly_on(&options, None)?;
+        let (report, reflown) = refly_flight(&recording, &options)?;
         let bytes = |verdict: Option<&LandingVerdict>| verdict.map(LandingVerdict::encode_to_vec);
-        let same = bytes(recording.verdict.as_ref()) == bytes(reflown.as_ref());
-        Ok(Some((prepared.reached().first_different, same)))
+        let same = bytes(recording.verdict.as_ref()) == bytes(reflown.verdict.as_ref());
+        Ok(Some((report.reached.first_different, same)))
     });
     match flown {
         Ok(None) => {

@@ -18,7 +18,7 @@ use crate::log::{
     Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, misread_frame,
     summary_of,
 };
-use crate::refly::{ReflyOptions, StartAt, refly};
+use crate::refly::{ReflyOptions, refly};
 
 /// One flight being verified.
 pub(super) struct FlightVerifier {
@@ -338,14 +338,9 @@ pub struct Consequence {
 impl Consequence {
     /// Flies from a frame, or from the beginning of the landing if that comes later or the divergence lies on the pad.
     pub(super) fn of(recording: &Recording, first_divergence: Option<u64>) -> Self {
-        let at = |start| refly(recording, &ReflyOptions { start, ..ReflyOptions::default() });
-        let flown = at(StartAt::Landing).and_then(|landing| match first_divergence {
-            Some(frame) if landing.start.frame < frame => at(StartAt::Frame(frame)),
-            _ => Ok(landing),
-        });
-        match flown {
+        match refly(recording, &ReflyOptions::default()) {
             Ok(report) => Self {
-                from_frame: report.start.frame,
+                from_frame: first_divergence.unwrap_or(0).max(report.start.frame),
                 recorded: report.recorded,
                 reflown: report.reflown,
                 changed: report.verdict_changed,

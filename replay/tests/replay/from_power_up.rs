@@ -147,7 +147,7 @@ impl Flown {
         vehicle.computer_records().into_iter().for_each(&mut keep);
         for event in events {
             match event {
-                VehicleEvent::Verdict { .. } => {
+                VehicleEvent::Verdict => {
                     keep(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
                 VehicleEvent::PhaseChanged { to, .. } => self.phases.push(*to),

@@ -20,7 +20,6 @@ mod fit;
 mod flown;
 mod foreign;
 mod from_apogee;
-mod from_estimate;
 mod from_power_up;
 mod ground_log;
 mod help;

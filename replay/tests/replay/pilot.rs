@@ -6,7 +6,6 @@ use std::sync::LazyLock;
 use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
-use flight::guidance::baseline::Law;
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
 use flight_log::frame::frame_to_log;
@@ -45,7 +44,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         world_from_body: UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -1.2),
         rate_rad_s: Vector3::zeros(),
     };
-    let mut computer = Computer::at_power_up(&mission, Law::Nmpc, &believed).released(0);
+    let mut computer = Computer::at_power_up(&mission, &believed).released(0);
     let mut frames = Vec::new();
     for frame in (1..=400_u64).filter(|frame| !DEAD.contains(frame)) {
         if frame == DEAD.end() + 1 {
@@ -86,8 +85,6 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         frame: 0,
         released: true,
         believed: believed.to_log(),
-        steered: mission.steered,
-        fixed_ignition_height_m: mission.ignition.fixed_height_m,
         gyro_bias_rad_s: None,
         rail_m: None,
         aborted_before_s: None,

@@ -12,9 +12,9 @@ use crate::lost_frames::RECOVERED;
 
 /// Flies again, writes the log, and verifies it with this build.
 fn written(name: &str, recording: &Recording, options: &ReflyOptions) -> Recording {
-    let (report, flown) = refly_flight(recording, options).unwrap();
+    let (_, flown) = refly_flight(recording, options).unwrap();
     let path = LANDED.beside(name);
-    write_log(&path, recording, options, &report, &flown).unwrap();
+    write_log(&path, recording, &flown).unwrap();
     let verified = only(verify(&path).unwrap());
     assert_eq!((verified.outcome, verified.first_divergence), (Verification::Identical, None), "{name}");
     assert_eq!(verified.obstacle, None, "{name}");

@@ -235,7 +235,7 @@ fn without_a_summary_the_answer_says_what_cannot_be_known() {
 fn control_characters_of_a_log_are_not_shown() {
     let mut held = PAD[1].clone();
     held.metadata(METADATA_RUN).insert("faults".to_owned(), "\u{1b}[2J\u{9b}31m".to_owned());
-    held.metadata(METADATA_RUN).insert("controller".to_owned(), "\u{1b}]0;x\u{7}".to_owned());
+    held.metadata(METADATA_RUN).insert("flight".to_owned(), "\u{1b}]0;x\u{7}".to_owned());
     let named = held.messages.iter_mut().find(|message| message.topic == TOPIC_ESTIMATE).unwrap();
     named.topic = "/a\u{1b}[2J".to_owned();
     on_disk(&held, |path| {

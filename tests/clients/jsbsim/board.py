@@ -99,10 +99,10 @@ class Computer:
             vector(3, believed["world_from_body"]), vector(4, believed["rate_rad_s"]),
         ))
         self.flight += 1
-        # Frame, estimate, steered, released.
-        start = whole(1, 0) + message(2, state) + whole(4, True) + whole(6, True)
-        content = message(1, mission_toml.encode()) + message(2, b"nmpc") + message(3, start)
-        return message(2, content + whole(5, self.flight))
+        # Frame, estimate, released.
+        start = whole(1, 0) + message(2, state) + whole(6, True)
+        content = message(1, mission_toml.encode()) + message(2, start)
+        return message(2, content + whole(4, self.flight))
 
     def ask(self, frame, content, begin=b""):
         """Has a frame of a flight in the air decided; returns gimbal and fins, rad, and whether it lights and ejects."""

@@ -37,9 +37,9 @@ fn hex(number: f64) -> String {
 static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     let recording = MK2.recording();
     let options = ReflyOptions::default();
-    let (report, flight) = refly_flight(&recording, &options).unwrap();
+    let (_, flight) = refly_flight(&recording, &options).unwrap();
     let again = MK2.beside("again.mcap");
-    write_log(&again, &recording, &options, &report, &flight).unwrap();
+    write_log(&again, &recording, &flight).unwrap();
     let cut = MK2.beside("cut.mcap");
     let bytes = std::fs::read(&MK2.log).unwrap();
     // This cuts the file in the middle of the messages.

@@ -9,12 +9,11 @@ use sim::recipe::Recipe;
 
 use super::choice::{Limits, Refusal, Team, choose};
 use super::frame::{Ballast, Changes, Frame, FrameError, changed, start_height_m};
-use super::range_safety::landed;
 use super::ranking::{FlyError, Landing, Progress, RankError, fly};
 use super::sheet;
 use super::source::Candidate;
-use crate::hazard::{self, Flights, HazardError, Impact, Rule};
-use crate::statistics::Share;
+use crate::hazard::{self, Flights, HazardError, Impact, Rule, landed_as_planned};
+use crate::statistics::Landings;
 
 /// What a card is made for.
 pub struct Order<'a> {
@@ -43,8 +42,8 @@ pub struct Card {
     pub(super) start: StartPoint,
     /// The mean winds, rising, m/s, and where the flights in each came down.
     pub flown: Vec<(f64, Vec<Impact>)>,
-    /// Landed on their legs in the least wind, by mass with the motor full, kg, rising.
-    pub masses: Vec<(f64, Share)>,
+    /// How flights land in the least wind, by mass with the motor full, kg, rising.
+    pub masses: Vec<(f64, Landings)>,
     pub(super) flights: Flights,
     pub(super) rule: Rule,
     pub(super) wind_from_deg: Option<f64>,
@@ -95,7 +94,9 @@ impl Card {
         refuse_without_a_landing(calmest, progress)?;
         let told = |done, of| progress(Progress::Flights(done, of));
         let impacts = hazard::studies(&days, order.flights, &told)?;
-        let own = impacts.first().map_or_else(|| Share::new(0, 0), |impacts| landed(impacts));
+        let own = impacts
+            .first()
+            .map_or_else(|| Landings::of(core::iter::empty()), |impacts| landed_as_planned(impacts));
         Ok(Self {
             recipe: recipe.clone(),
             hash: order.hash.to_owned(),
@@ -181,7 +182,7 @@ fn refuse_without_a_landing(recipe: &Recipe, progress: &(dyn Fn(Progress) + Sync
     const FIRST: u64 = 12;
     progress(Progress::Flights(0, FIRST as usize));
     let flown = fly(&[recipe], FIRST, &|done| progress(Progress::Flights(done, FIRST as usize)))?;
-    flown.into_iter().filter(|flown| flown.legs.count == 0).try_for_each(|flown| {
+    flown.into_iter().filter(|flown| flown.landings.stands.count == 0).try_for_each(|flown| {
         let reason = flown.failure.map_or_else(|| "unknown".to_owned(), |(reason, _)| reason);
         Err(CardError::NoneLanded { flights: FIRST, set: flown.set, reason })
     })
@@ -191,17 +192,17 @@ fn refuse_without_a_landing(recipe: &Recipe, progress: &(dyn Fn(Progress) + Sync
 /// at the centre of gravity.
 fn masses(
     recipe: &Recipe,
-    own: Share,
+    own: Landings,
     flights: u64,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Vec<(f64, Share)>, CardError> {
+) -> Result<Vec<(f64, Landings)>, CardError> {
     /// Between neighbours, of the own mass, and most of them on each side.
     const STEP: f64 = 0.02;
     const STEPS: i32 = 10;
     let (frame, own_kg) = (Frame::of(&recipe.mission)?, recipe.mission.airframe.mass.loaded_kg);
     let mut found = vec![(own_kg, own)];
     for side in [-1, 1] {
-        let mut share = own.share;
+        let mut share = own.stands.share;
         for step in 1..=STEPS {
             let ballast_kg = f64::from(side * step) * STEP * own_kg;
             let ballast = Ballast { mass_kg: ballast_kg, station_m: frame.cg_station_m() };
@@ -211,8 +212,8 @@ fn masses(
             }
             let told = |done| progress(Progress::Flights(done, flights as usize));
             let flown = fly(&[&with_mass(recipe, mass)?], flights, &told)?;
-            share = flown.first().map_or(0.0, |flown| flown.legs.share);
-            found.extend(flown.into_iter().map(|flown| (mass.loaded_kg, flown.legs)));
+            share = flown.first().map_or(0.0, |flown| flown.landings.stands.share);
+            found.extend(flown.into_iter().map(|flown| (mass.loaded_kg, flown.landings)));
         }
     }
     found.sort_by(|one, two| one.0.total_cmp(&two.0));

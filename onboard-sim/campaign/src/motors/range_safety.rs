@@ -6,8 +6,8 @@ use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
 
 use super::sheet::words_of;
-use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, lift_off_kg, widest};
-use crate::statistics::Share;
+use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, lift_off_kg, widest};
+use crate::statistics::Landings;
 
 /// A rate or a radius that rests on fewer flights is not told.
 pub const FEWEST: u64 = 100;
@@ -19,8 +19,8 @@ const BESIDE_M: f64 = 10.0;
 pub struct InWind {
     /// Mean wind 10 m above the ground.
     pub wind_m_s: f64,
-    /// Landed on their legs, of the flights as planned.
-    pub landed: Option<Share>,
+    /// How the flights as planned landed.
+    pub landed: Option<Landings>,
     pub circle: Option<Circle>,
 }
 
@@ -47,8 +47,8 @@ impl Circle {
 pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
     let mut least_m: f64 = 0.0;
     let in_wind = |(wind_m_s, impacts): &(f64, Vec<Impact>)| {
-        let landed = landed(impacts);
-        let enough = landed.of >= FEWEST;
+        let landed = landed_as_planned(impacts);
+        let enough = landed.stands.of >= FEWEST;
         let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
         let circle = widest.map(|(way, radius)| {
             least_m = least_m.max(keep_out_m(&radius, rule));
@@ -57,12 +57,6 @@ pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
         InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
     };
     flown.iter().map(in_wind).collect()
-}
-
-/// On their legs, of the flights as planned.
-pub(super) fn landed(impacts: &[Impact]) -> Share {
-    let planned = || impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
-    Share::new(planned().filter(|impact| impact.landed).count() as u64, planned().count() as u64)
 }
 
 fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
@@ -80,7 +74,7 @@ pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     let ends = |circle: Circle| circle.keep_out_m.is_finite() && circle.radius.high_m.is_some();
     let may_fly = |wind: &&InWind| {
         wind.circle.is_some_and(ends)
-            && wind.landed.is_some_and(|landed| landed.share >= KEPT * calmest.share)
+            && wind.landed.is_some_and(|landed| landed.stands.share >= KEPT * calmest.stands.share)
     };
     winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
 }

@@ -9,7 +9,7 @@ use super::frame::{Changes, Frame, MissionTextError, changed, name_of};
 use super::source::{Candidate, Found, Unusable};
 use crate::row::Row;
 use crate::run::in_parallel;
-use crate::statistics::Share;
+use crate::statistics::Landings;
 use crate::tally;
 
 /// What to look for.
@@ -127,7 +127,7 @@ fn fly_the_best(
     for (landing, flown) in landings.iter_mut().zip(flown) {
         landing.flown = Some(Box::new(flown));
     }
-    let rate = |landing: &Landing| landing.flown.as_ref().map_or(-1.0, |flown| flown.legs.share);
+    let rate = |landing: &Landing| landing.flown.as_ref().map_or(-1.0, |flown| flown.landings.stands.share);
     landings[..best].sort_by(|one, two| rate(two).total_cmp(&rate(one)));
     Ok(())
 }
@@ -164,10 +164,7 @@ impl Landing {
 pub struct Flown {
     /// Name of the set of dispersions.
     pub set: String,
-    /// Landed on its legs.
-    pub legs: Share,
-    /// Landed inside the landing paper's Table 2.
-    pub strict: Share,
+    pub landings: Landings,
     /// The most frequent reason of the others, and its number.
     pub failure: Option<(String, u64)>,
     /// Work of the landing solver: the cost of the flights, the same on every machine.
@@ -203,10 +200,8 @@ pub fn fly(recipes: &[&Recipe], flights: u64, done: &(dyn Fn(usize) + Sync)) -> 
 impl Flown {
     /// What rows of a set of dispersions come to.
     fn of(set: &str, rows: &[Row]) -> Self {
-        let of = rows.len() as u64;
-        let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
         let mut failures: Vec<(String, u64)> = Vec::new();
-        for row in rows.iter().filter(|row| !row.legs) {
+        for row in rows.iter().filter(|row| !row.stands) {
             let reason = if row.failure.is_empty() { "did not land" } else { &row.failure };
             match failures.iter_mut().find(|(known, _)| known == reason) {
                 Some((_, count)) => *count += 1,
@@ -217,8 +212,7 @@ impl Flown {
         let failure = failures.into_iter().reduce(|most, next| if next.1 > most.1 { next } else { most });
         Self {
             set: set.to_owned(),
-            legs: Share::new(count(|row| row.legs), of),
-            strict: Share::new(count(|row| row.strict), of),
+            landings: Landings::of(rows.iter().map(Row::landing)),
             failure,
             solver_iterations: rows.iter().map(|row| row.solver_iterations).sum(),
         }

@@ -273,19 +273,19 @@ impl Card {
 
     /// The masses at which nine of ten land.
     fn nine_of_ten(&self) -> String {
-        let enough = self.masses.iter().all(|(_, landed)| landed.of >= FEWEST);
+        let enough = self.masses.iter().all(|(_, landed)| landed.stands.of >= FEWEST);
         let mut good =
-            self.masses.iter().filter(|(_, landed)| landed.share >= NINE_OF_TEN).map(|(kg, _)| *kg);
+            self.masses.iter().filter(|(_, landed)| landed.stands.share >= NINE_OF_TEN).map(|(kg, _)| *kg);
         let own = self.masses.first().map(|(_, landed)| landed);
         match (good.next(), own) {
-            _ if !enough => "too few flights to say at which masses nine of ten land".to_owned(),
+            _ if !enough => "too few flights to say at which masses nine of ten stand undamaged".to_owned(),
             (Some(least_kg), _) => {
                 let most_kg = good.next_back().unwrap_or(least_kg);
                 format!("nine of ten land at {least_kg:.2} to {most_kg:.2} kg in the least wind")
             }
             (None, own) => {
-                let landed = own.map_or_else(String::new, |own| format!("{} of {}", own.count, own.of));
-                format!("fewer than nine of ten land: {landed} in the least wind")
+                let landed = own.map_or_else(String::new, |own| own.to_string());
+                format!("fewer than nine of ten stand undamaged in the least wind: {landed}")
             }
         }
     }
@@ -324,7 +324,7 @@ fn wind_table(winds: &[InWind]) -> Section {
                 "launch crew, upwind; walk",
                 "farthest downwind, across, upwind",
                 "99 % come down within (95 % interval)",
-                "on their legs (95 % interval)",
+                "stand undamaged (95 % interval), inside the envelope of their legs",
             ],
             winds.iter().map(|wind| wind_row(wind, may_fly(wind))).collect(),
         ),
@@ -357,10 +357,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
                 way.name()
             )
         })),
-        told(wind.landed.map(|landed| {
-            let [share, low, high] = [landed.share, landed.low, landed.high].map(|share| 100.0 * share);
-            format!("{} of {}: {share:.0} % ({low:.0} to {high:.0})", landed.count, landed.of)
-        })),
+        told(wind.landed.map(|landed| landed.to_string())),
     ]
 }
 

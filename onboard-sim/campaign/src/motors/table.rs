@@ -23,7 +23,7 @@ fn write_text(ranking: &[Ranked], all: bool, out: &mut String) -> fmt::Result {
     if !landings.is_empty() {
         writeln!(
             out,
-            "{:>4}  {:<28} {:>8} {:>8} {:>7} {:>7} {:>13} {:>13} {:>7}  landed on its legs",
+            "{:>4}  {:<28} {:>8} {:>8} {:>7} {:>7} {:>13} {:>13} {:>7}  stands undamaged",
             "rank", "motor", "mass kg", "ballast", "from m", "lit m", "lands from m", "thrust x", "scatter"
         )?;
     }
@@ -65,17 +65,8 @@ fn gap(landings: &[&Landing]) -> &'static str {
 
 /// Landed flights with their interval, and the most frequent reason of the others.
 fn rate(flown: &Flown) -> String {
-    let legs = flown.legs;
     let others = flown.failure.as_ref().map_or_else(String::new, |(reason, _)| format!("; mostly {reason}"));
-    format!(
-        "{} of {} in {}: {:.0} % ({:.0} to {:.0}){others}",
-        legs.count,
-        legs.of,
-        flown.set,
-        100.0 * legs.share,
-        100.0 * legs.low,
-        100.0 * legs.high
-    )
+    format!("{} in {}{others}", flown.landings, flown.set)
 }
 
 fn cut(name: &str) -> String {
@@ -127,9 +118,10 @@ struct CsvRow<'a> {
     impulse_scale_high: Option<f64>,
     scatter: Option<f64>,
     flights: Option<u64>,
-    landed_legs: Option<u64>,
-    legs_low: Option<f64>,
-    legs_high: Option<f64>,
+    stands: Option<u64>,
+    stands_low: Option<f64>,
+    stands_high: Option<f64>,
+    envelope: Option<u64>,
     flown_in_set: Option<&'a str>,
 }
 
@@ -150,7 +142,8 @@ impl<'a> CsvRow<'a> {
             },
             Ranked::Lands(Landing { candidate, choice, flown }) => {
                 let window = &choice.window;
-                let legs = flown.as_deref().map(|flown| flown.legs);
+                let landings = flown.as_deref().map(|flown| flown.landings);
+                let stands = landings.map(|landings| landings.stands);
                 Self {
                     rank: Some(place + 1),
                     lands: true,
@@ -166,10 +159,11 @@ impl<'a> CsvRow<'a> {
                     impulse_scale_low: Some(window.impulse_scales[0]),
                     impulse_scale_high: Some(window.impulse_scales[1]),
                     scatter: Some(window.scatter),
-                    flights: legs.map(|legs| legs.of),
-                    landed_legs: legs.map(|legs| legs.count),
-                    legs_low: legs.map(|legs| legs.low),
-                    legs_high: legs.map(|legs| legs.high),
+                    flights: stands.map(|stands| stands.of),
+                    stands: stands.map(|stands| stands.count),
+                    stands_low: stands.map(|stands| stands.low),
+                    stands_high: stands.map(|stands| stands.high),
+                    envelope: landings.map(|landings| landings.envelope.count),
                     flown_in_set: flown.as_deref().map(|flown| flown.set.as_str()),
                     ..Self::of_motor(candidate)
                 }

@@ -40,7 +40,6 @@ pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::baseline::Law;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
@@ -74,9 +73,7 @@ pub struct Computer {
     pad: PadWatch,
     /// Flies from the release on.
     pilot: Box<Pilot>,
-    /// The law and the state at power-up, to power up again.
-    #[serde(skip)]
-    law: Law,
+    /// The state at power-up, to power up again.
     #[serde(skip)]
     believed: RigidState,
     /// The input of the last frame, without requests and rehearsal. What of it decides later is in the next one, too.
@@ -163,18 +160,6 @@ impl Computer {
         let output = self.step(input);
         let solved =
             self.flown().and_then(|flown| self.pilot.landing_planned(&before, self.table.mode(), &flown));
-        (output, solved)
-    }
-
-    /// The same for a landing in space.
-    pub fn step_inspected_in_space(
-        &mut self,
-        input: &Input<'_>,
-    ) -> (Output, Option<crate::guidance::powered::SpaceSolved>) {
-        let before = self.pilot.clone();
-        let output = self.step(input);
-        let solved =
-            self.flown().and_then(|flown| self.pilot.space_planned(&before, self.table.mode(), &flown));
         (output, solved)
     }
 

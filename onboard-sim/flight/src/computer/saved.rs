@@ -23,7 +23,6 @@ use super::table::PhaseTable;
 use super::{Commands, Computer, CrewMemory, Input, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::baseline::Law;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Outputs;
 use crate::rules::phase::{Event, Interlocks, Latch, Mode};
@@ -167,7 +166,7 @@ impl Computer {
     /// Restarts the computer: only what was saved in the last frame is kept.
     pub fn restart(&mut self, time_s: f64) {
         let saved = self.saved();
-        *self = Self::at_power_up(self.pilot.mission(), self.law.clone(), &self.believed);
+        *self = Self::at_power_up(self.pilot.mission(), &self.believed);
         self.resume(&saved, time_s);
     }
 }
@@ -177,7 +176,7 @@ impl Computer {
 impl Computer {
     /// The computer at power-up. `believed` is its estimate of the state at the start of the flight; one that
     /// stands on its rail finds its attitude there by itself.
-    pub fn at_power_up(mission: &Mission, law: Law, believed: &RigidState) -> Self {
+    pub fn at_power_up(mission: &Mission, believed: &RigidState) -> Self {
         let arming = match (mission.start.at, &mission.drop) {
             (StartPoint::Drone, Some(drop)) => ArmingLimits {
                 tilt_max_deg: drop.tilt_max_deg,
@@ -187,15 +186,12 @@ impl Computer {
             },
             _ => mission.arming,
         };
-        let mut pilot =
-            Pilot::starting(mission, 0.0, believed, &StartUncertainty::at_start(mission.start.at));
-        pilot.set_law(law.clone());
+        let uncertainty = StartUncertainty::at_start(mission.start.at);
         Self {
             table: PhaseTable::new(0.0),
             sensors: SensorWatch::default(),
             pad: PadWatch::default(),
-            pilot: Box::new(pilot),
-            law,
+            pilot: Box::new(Pilot::starting(mission, 0.0, believed, &uncertainty)),
             believed: *believed,
             input: Input::NONE,
             gate_told: None,
@@ -259,19 +255,12 @@ impl Computer {
     pub fn reconfigure(&mut self, mission: &Mission) {
         *self.pilot = self.pilot.reconfigured(mission);
     }
-
-    /// Changes the law for the landing burn from now on.
-    pub fn set_law(&mut self, law: Law) {
-        self.law = law.clone();
-        self.pilot.set_law(law);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::computer::pilot::sample;
-    use crate::guidance::baseline::Law;
     use crate::rules::phase::{Motor, Phase};
     use crate::vehicle::rigid::RigidState;
 
@@ -280,7 +269,7 @@ mod tests {
     }
 
     fn powered_up() -> Computer {
-        Computer::at_power_up(&mission(), Law::Nmpc, &RigidState::upright(300.0))
+        Computer::at_power_up(&mission(), &RigidState::upright(300.0))
     }
 
     fn resumed(saved: &Saved, time_s: f64) -> Computer {

@@ -81,8 +81,8 @@ impl DescentGains {
         Vector3::new(wanted.x, wanted.y, 0.0)
     }
 
-    /// The demand on the fins. `steered` is false in passive descent, when the nose only follows the wind.
-    pub fn demand(&self, state: &RigidState, situation: &DescentSituation, steered: bool) -> DescentDemand {
+    /// The demand on the fins.
+    pub fn demand(&self, state: &RigidState, situation: &DescentSituation) -> DescentDemand {
         let through_air_m_s = state.velocity_m_s - situation.wind_m_s;
         let airspeed_m_s = through_air_m_s.norm();
         let dynamic_pressure_pa = 0.5 * situation.air_density_kg_m3 * airspeed_m_s * airspeed_m_s;
@@ -98,11 +98,7 @@ impl DescentGains {
             };
         }
         let upstream = -through_air_m_s / airspeed_m_s;
-        let lean = if steered {
-            self.lean(state, situation, &upstream, dynamic_pressure_pa)
-        } else {
-            Vector3::zeros()
-        };
+        let lean = self.lean(state, situation, &upstream, dynamic_pressure_pa);
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
@@ -258,7 +254,7 @@ mod tests {
 
     #[test]
     fn over_the_pad_in_still_air_the_demand_is_zero() {
-        let demand = gains().demand(&falling(), &situation(), true);
+        let demand = gains().demand(&falling(), &situation());
         assert!(demand.moment_n_m.norm() < 1e-12 && (demand.nose_in_world - Vector3::z()).norm() < 1e-12);
     }
 
@@ -267,7 +263,7 @@ mod tests {
         // The air then pushes it back.
         let mut state = falling();
         state.position_m.x = 10.0;
-        let demand = gains().demand(&state, &situation(), true);
+        let demand = gains().demand(&state, &situation());
         assert!(demand.nose_in_world.x > 0.05, "{}", demand.nose_in_world);
         assert!(demand.moment_n_m.y < 0.0, "the nose goes down towards +x");
         let lean = libm::acos(demand.nose_in_world.z).to_degrees();
@@ -278,19 +274,14 @@ mod tests {
     fn a_vehicle_carried_by_the_wind_leans_with_the_wind_to_glide_against_it() {
         let mut situation = situation();
         situation.wind_m_s.y = 5.0;
-        let passive = gains().demand(&falling(), &situation, false);
-        let steered = gains().demand(&falling(), &situation, true);
-        assert!(passive.nose_in_world.y > 0.1, "weathercocked: {}", passive.nose_in_world);
-        assert!(
-            steered.nose_in_world.y > passive.nose_in_world.y,
-            "leaning further: {}",
-            steered.nose_in_world
-        );
+        let upstream = (situation.wind_m_s - falling().velocity_m_s).normalize();
+        let nose = gains().demand(&falling(), &situation).nose_in_world;
+        assert!(upstream.y > 0.1 && nose.y > upstream.y, "leaning further than {upstream}: {nose}");
     }
 
     #[test]
     fn at_apogee_the_demand_on_the_fins_is_zero() {
-        let demand = gains().demand(&RigidState::upright(300.0), &situation(), true);
+        let demand = gains().demand(&RigidState::upright(300.0), &situation());
         assert_eq!(demand.moment_n_m, Vector3::zeros());
     }
 
@@ -300,7 +291,7 @@ mod tests {
             let mut state = falling();
             state.position_m.x = 60.0;
             let situation = DescentSituation { time_to_go_s, ..situation() };
-            libm::acos(gains().demand(&state, &situation, true).nose_in_world.z).to_degrees()
+            libm::acos(gains().demand(&state, &situation).nose_in_world.z).to_degrees()
         };
         assert!((lean_deg(None) - 14.0).abs() < 1e-9, "the full lean while the ignition is far away");
         assert!((lean_deg(Some(4.0)) - 14.0).abs() < 1e-9);
@@ -312,11 +303,11 @@ mod tests {
         // At the wanted lean and at rest, the demand only balances the moment of the air.
         let mut state = falling();
         state.position_m.x = 60.0;
-        let nose = gains().demand(&state, &situation(), true).nose_in_world;
+        let nose = gains().demand(&state, &situation()).nose_in_world;
         state.world_from_body = UnitQuaternion::rotation_between(&Vector3::z(), &nose)
             .expect("the directions are not opposite")
             * upright();
-        let demand = gains().demand(&state, &situation(), true);
+        let demand = gains().demand(&state, &situation());
         let lean_rad = 14.0_f64.to_radians();
         let weathercock_m3 = (0.0061 - 0.0622 * 0.05 * libm::sin(lean_rad)) * lean_rad;
         let held_n_m = demand.dynamic_pressure_pa * weathercock_m3;

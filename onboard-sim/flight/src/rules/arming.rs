@@ -33,7 +33,7 @@ pub struct PredictedLanding {
 
 impl From<&LandingVerdict> for PredictedLanding {
     fn from(verdict: &LandingVerdict) -> Self {
-        Self { lands: verdict.landed(), found: verdict.summary() }
+        Self { lands: verdict.is_inside(), found: verdict.summary() }
     }
 }
 

@@ -1,66 +1,99 @@
-//! Judges a landing by the touchdown limits (Table 2 of the landing paper).
+//! How a landing ended, in four words that every program says alike, and the limits that two of them are judged by.
 
 use alloc::borrow::ToOwned as _;
-
-use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
+use core::fmt;
 
-use core::f64::consts::FRAC_PI_2;
+use crate::vehicle::mission::LegLimits;
+use crate::vehicle::rigid::RigidState;
 
-use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::mission::{Mission, TouchdownBox};
-
-/// What counts as a landing.
+/// A vehicle at its first contact, or at the end of a plan. Its target is the origin of the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TouchdownLimits {
-    /// Largest horizontal distance, m.
-    pub x_m: f64,
-    /// Lowest altitude, m.
-    pub altitude_min_m: f64,
-    /// Highest altitude, m.
-    pub altitude_max_m: f64,
-    /// Largest pitch error from upright, rad.
-    pub pitch_error_rad: f64,
-    /// Largest axial speed, m/s.
-    pub u_m_s: f64,
-    /// Largest lateral speed, m/s.
-    pub w_m_s: f64,
-    /// Largest pitch rate, rad/s.
-    pub pitch_rate_rad_s: f64,
+pub struct Touchdown {
+    /// Level distance of the centre of gravity from the target, m.
+    pub distance_m: f64,
+    /// Height of the feet above the ground, m.
+    pub height_m: f64,
+    /// Velocity of the centre of gravity, up, m/s; [`along_axis`](Self::along_axis): towards the nose.
+    pub vertical_m_s: f64,
+    /// Speed of the centre of gravity over the ground, m/s; [`along_axis`](Self::along_axis): across the axis.
+    pub lateral_m_s: f64,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+    /// Size of the rotation rate, roll included, rad/s; [`along_axis`](Self::along_axis): without roll.
+    pub rate_rad_s: f64,
 }
 
-impl TouchdownLimits {
-    /// The limits of a mission's legs, anywhere inside its fence.
-    pub fn of_the_legs(mission: &Mission) -> Self {
-        let legs = &mission.leg_limits;
+impl Touchdown {
+    /// What legs feel: velocities over the ground, and every rotation.
+    pub fn over_ground(state: &RigidState, height_m: f64) -> Self {
+        let (place_m, velocity_m_s) = (&state.position_m, &state.velocity_m_s);
         Self {
-            x_m: mission.gate.fence_radius_m,
-            pitch_error_rad: legs.tilt_deg.to_radians(),
-            u_m_s: legs.vertical_m_s,
-            w_m_s: legs.lateral_m_s,
-            pitch_rate_rad_s: legs.rate_deg_s.to_radians(),
-            ..Self::from(&mission.touchdown_limits)
+            distance_m: libm::hypot(place_m.x, place_m.y),
+            height_m,
+            vertical_m_s: velocity_m_s.z,
+            lateral_m_s: libm::hypot(velocity_m_s.x, velocity_m_s.y),
+            tilt_rad: state.tilt_rad(),
+            rate_rad_s: libm::sqrt(state.rate_rad_s.norm_squared()),
+        }
+    }
+
+    /// What [`TABLE_2`] limits: velocities along and across the axis, and the rotation across it.
+    pub fn along_axis(state: &RigidState, height_m: f64) -> Self {
+        let (velocity_m_s, rate_rad_s) = (state.velocity_in_body_m_s(), &state.rate_rad_s);
+        Self {
+            vertical_m_s: velocity_m_s.x,
+            lateral_m_s: libm::hypot(velocity_m_s.y, velocity_m_s.z),
+            rate_rad_s: libm::hypot(rate_rad_s.y, rate_rad_s.z),
+            ..Self::over_ground(state, height_m)
         }
     }
 }
 
-impl From<&TouchdownBox> for TouchdownLimits {
-    fn from(limits: &TouchdownBox) -> Self {
+/// The largest values of a [`Touchdown`]; infinite: not limited. Nothing is below the ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Distance from the target, m.
+    pub distance_m: f64,
+    /// Height of the feet, m.
+    pub height_m: f64,
+    /// Speed up or down, m/s.
+    pub vertical_m_s: f64,
+    /// Lateral speed, m/s.
+    pub lateral_m_s: f64,
+    /// Tilt, rad.
+    pub tilt_rad: f64,
+    /// Rotation rate, rad/s.
+    pub rate_rad_s: f64,
+}
+
+/// Table 2 of the landing paper, for a [`Touchdown::along_axis`]: x, altitude, u, w, pitch error, pitch rate.
+pub const TABLE_2: Limits = Limits {
+    distance_m: 20.0,
+    height_m: 0.2,
+    vertical_m_s: 0.4,
+    lateral_m_s: 0.1,
+    tilt_rad: f64::to_radians(5.0),
+    rate_rad_s: f64::to_radians(2.0),
+};
+
+impl From<&LegLimits> for Limits {
+    /// The design envelope of legs, for a [`Touchdown::over_ground`].
+    fn from(legs: &LegLimits) -> Self {
         Self {
-            x_m: limits.x_m,
-            altitude_min_m: limits.altitude_min_m,
-            altitude_max_m: limits.altitude_max_m,
-            pitch_error_rad: limits.pitch_error_deg.to_radians(),
-            u_m_s: limits.u_m_s,
-            w_m_s: limits.w_m_s,
-            pitch_rate_rad_s: limits.pitch_rate_deg_s.to_radians(),
+            distance_m: f64::INFINITY,
+            height_m: f64::INFINITY,
+            vertical_m_s: legs.vertical_m_s,
+            lateral_m_s: legs.lateral_m_s,
+            tilt_rad: legs.tilt_deg.to_radians(),
+            rate_rad_s: legs.rate_deg_s.to_radians(),
         }
     }
 }
 
 /// How far below the ground a plan may end and still count as ending on it, m.
-pub const PLAN_HEIGHT_TOLERANCE_M: f64 = 1e-3;
+const PLAN_HEIGHT_TOLERANCE_M: f64 = 1e-3;
 
 /// One limit and the value that was compared with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +104,7 @@ pub struct LimitResult {
     pub value: f64,
     /// The lowest value allowed.
     pub lowest: f64,
-    /// The highest value allowed.
+    /// The highest value allowed; infinite: not limited.
     pub highest: f64,
     /// The unit of the three; angles are in degrees, for people.
     pub unit: &'static str,
@@ -79,16 +112,23 @@ pub struct LimitResult {
     pub passed: bool,
 }
 
-/// Every touchdown limit, judged.
+impl fmt::Display for LimitResult {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, value, lowest, highest, unit, .. } = self;
+        write!(out, "{name} {value:.3} {unit} (limit {lowest:.3} to {highest:.3})")
+    }
+}
+
+/// Every limit, judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LandingVerdict {
-    /// The limits in state order: x, altitude, pitch, u, w, pitch rate.
+    /// In the order of [`Limits`].
     pub results: [LimitResult; 6],
 }
 
 impl LandingVerdict {
-    /// Judges a state at touchdown.
-    pub fn judge(limits: &TouchdownLimits, state: &PlanarState) -> Self {
+    /// Judges a touchdown.
+    pub fn judge(limits: &Limits, at: &Touchdown) -> Self {
         let judged = |name, value: f64, lowest: f64, highest: f64, unit| LimitResult {
             name,
             value,
@@ -97,37 +137,34 @@ impl LandingVerdict {
             unit,
             passed: (lowest..=highest).contains(&value),
         };
-        let within = |name, value, limit: f64, unit| judged(name, value, -limit, limit, unit);
-        let pitch_error_deg = (state.theta_rad - FRAC_PI_2).to_degrees();
+        let size = |name, value, highest, unit| judged(name, value, 0.0, highest, unit);
+        let angle =
+            |name, value: f64, highest: f64, unit| size(name, value.to_degrees(), highest.to_degrees(), unit);
+        let fastest_m_s = limits.vertical_m_s;
         Self {
             results: [
-                within("x", state.x_m, limits.x_m, "m"),
-                judged("altitude", state.z_m, limits.altitude_min_m, limits.altitude_max_m, "m"),
-                within("pitch error", pitch_error_deg, limits.pitch_error_rad.to_degrees(), "deg"),
-                within("u", state.u_m_s, limits.u_m_s, "m/s"),
-                within("w", state.w_m_s, limits.w_m_s, "m/s"),
-                within(
-                    "pitch rate",
-                    state.q_rad_s.to_degrees(),
-                    limits.pitch_rate_rad_s.to_degrees(),
-                    "deg/s",
-                ),
+                size("distance", at.distance_m, limits.distance_m, "m"),
+                size("height", at.height_m, limits.height_m, "m"),
+                judged("vertical speed", at.vertical_m_s, -fastest_m_s, fastest_m_s, "m/s"),
+                size("lateral speed", at.lateral_m_s, limits.lateral_m_s, "m/s"),
+                angle("tilt", at.tilt_rad, limits.tilt_rad, "deg"),
+                angle("rotation rate", at.rate_rad_s, limits.rate_rad_s, "deg/s"),
             ],
         }
     }
 
-    /// Judges the end of a plan. A plan meets the ground only within its solver's tolerance, so a height within
-    /// [`PLAN_HEIGHT_TOLERANCE_M`] below the lowest limit counts as that limit.
-    pub fn judge_plan(limits: &TouchdownLimits, end: &PlanarState) -> Self {
-        let lowest_m = limits.altitude_min_m;
-        let on_ground = (lowest_m - PLAN_HEIGHT_TOLERANCE_M..lowest_m).contains(&end.z_m);
-        let z_m = if on_ground { lowest_m } else { end.z_m };
-        Self::judge(limits, &PlanarState { z_m, ..*end })
+    /// Judges the end of a plan, which has to be on the ground. A plan meets it only within its solver's tolerance, so an end that is
+    /// within a millimetre below counts as on it.
+    pub fn judge_plan(limits: &Limits, end: &Touchdown) -> Self {
+        let limits = Limits { height_m: limits.height_m.min(TABLE_2.height_m), ..*limits };
+        let on_ground = (-PLAN_HEIGHT_TOLERANCE_M..0.0).contains(&end.height_m);
+        let height_m = if on_ground { 0.0 } else { end.height_m };
+        Self::judge(&limits, &Touchdown { height_m, ..*end })
     }
 
     /// Whether every limit was kept.
-    pub fn landed(&self) -> bool {
-        self.results.iter().all(|result| result.passed)
+    pub fn is_inside(&self) -> bool {
+        self.failures().next().is_none()
     }
 
     /// The limits that were not kept.
@@ -137,84 +174,156 @@ impl LandingVerdict {
 
     /// One line: "inside every limit", or the broken limits with their values.
     pub fn summary(&self) -> String {
-        let broken: Vec<String> = self
-            .failures()
-            .map(|result| {
-                format!(
-                    "{} {:.3} {} (limit {:.3} to {:.3})",
-                    result.name, result.value, result.unit, result.lowest, result.highest
-                )
-            })
-            .collect();
+        let broken: Vec<String> = self.failures().map(LimitResult::to_string).collect();
         if broken.is_empty() { "inside every limit".to_owned() } else { broken.join(", ") }
+    }
+}
+
+/// How a landing ended. No word implies another, but what stands undamaged is upright.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Landing {
+    /// It came to rest upright on its legs, and nothing broke. Legs that crush tell it by what they bore; others have kept their
+    /// limits at contact.
+    pub stands: bool,
+    /// It came to rest upright, whatever it touched down with.
+    pub upright: bool,
+    /// Inside the mission's `[leg_limits]` at contact, all at once.
+    pub envelope: bool,
+    /// Inside [`TABLE_2`] at contact.
+    pub table_2: bool,
+}
+
+impl Landing {
+    /// The names of the four in tables.
+    pub const COLUMNS: [&str; 4] = ["stands", "upright", "envelope", "table_2"];
+    /// The four in words.
+    pub const WORDS: [&str; 4] =
+        ["stands undamaged", "upright", "inside the design envelope of its legs", "inside Table 2"];
+
+    /// The four in their order.
+    pub fn flags(self) -> [bool; 4] {
+        [self.stands, self.upright, self.envelope, self.table_2]
+    }
+}
+
+impl From<[bool; 4]> for Landing {
+    fn from([stands, upright, envelope, table_2]: [bool; 4]) -> Self {
+        Self { stands, upright, envelope, table_2 }
+    }
+}
+
+/// How a flight that touched the ground ended; it is displayed as one sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FlightEnding<'a> {
+    /// An abort was latched.
+    pub aborted: bool,
+    pub landing: Landing,
+    /// Why it does not stand undamaged.
+    pub failure: Option<&'a str>,
+}
+
+/// The failure of a vehicle that came down under its parachute.
+pub const UNDER_PARACHUTE: &str = "parachute";
+
+impl fmt::Display for FlightEnding<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Landing { stands, upright, envelope, table_2 } = self.landing;
+        if self.aborted {
+            out.write_str("ABORTED, then ")?;
+        }
+        let failure = self.failure.unwrap_or("for no told reason");
+        match failure {
+            _ if stands => out.write_str("STANDS UNDAMAGED")?,
+            UNDER_PARACHUTE => return out.write_str("DOWN UNDER THE PARACHUTE, not landed"),
+            _ if upright => write!(out, "UPRIGHT, taken as damaged: {failure}")?,
+            _ => return write!(out, "NOT LANDED: {failure}"),
+        }
+        let side = |is_inside| if is_inside { "inside" } else { "outside" };
+        write!(out, ", {} the design envelope of its legs, {} Table 2", side(envelope), side(table_2))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
 
-    fn limits() -> TouchdownLimits {
-        TouchdownLimits::from(&crate::vehicles::mission::builtin("mk2").unwrap().unwrap().touchdown_limits)
-    }
+    const AT_REST: Touchdown = Touchdown {
+        distance_m: 0.0,
+        height_m: 0.0,
+        vertical_m_s: 0.0,
+        lateral_m_s: 0.0,
+        tilt_rad: 0.0,
+        rate_rad_s: 0.0,
+    };
 
-    fn upright() -> PlanarState {
-        PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() }
-    }
-
-    /// Tables 3 to 6 of the landing paper under its own Table 2: 3 of the 7 distinct start states land.
     #[test]
-    fn val_landing_paper_tables_4_to_6_judged_by_table_2() {
-        // (x m, theta deg, u m/s, w m/s, q deg/s), z is zero in all.
-        let rows = [
-            ("nominal", -0.27, 87.28, 0.11, 0.040, 0.80, true),
-            ("theta0 = 60", -8.02, 90.47, -0.29, 0.011, 1.03, true),
-            ("theta0 = 120", 0.41, 89.65, 0.019, 0.0020, -0.039, true),
-            ("w0 = -1", -6.84, 88.18, 0.48, 0.010, 1.69, false),
-            ("w0 = +1", 6.35, 91.50, 0.46, 0.0039, -1.86, false),
-            ("q0 = -5", -18.08, 93.96, -1.00, 0.083, -0.41, false),
-            ("q0 = +5", 19.85, 82.50, -0.99, -0.069, 1.77, false),
-        ];
-        for (name, x_m, theta_deg, u_m_s, w_m_s, q_deg_s, lands) in rows {
-            let state = PlanarState {
-                x_m,
-                z_m: 0.0,
-                theta_rad: f64::to_radians(theta_deg),
-                u_m_s,
-                w_m_s,
-                q_rad_s: f64::to_radians(q_deg_s),
-            };
-            let verdict = LandingVerdict::judge(&limits(), &state);
-            assert_eq!(verdict.landed(), lands, "{name}: {}", verdict.summary());
+    fn a_leaning_vehicle_moves_over_the_ground_as_along_its_axis_turned_by_its_tilt() {
+        let tilt_rad = 0.2;
+        let upright = RigidState::upright(1.0);
+        let world_from_body =
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), tilt_rad) * upright.world_from_body;
+        let state = RigidState {
+            position_m: Vector3::new(-3.0, 0.0, 1.0),
+            velocity_m_s: world_from_body * -Vector3::x(),
+            world_from_body,
+            rate_rad_s: Vector3::new(0.3, -0.1, 0.0),
+        };
+        let [ground, axis] = [Touchdown::over_ground, Touchdown::along_axis].map(|of| of(&state, 0.0));
+        let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
+        assert!(near(axis.vertical_m_s, -1.0) && near(axis.lateral_m_s, 0.0), "{axis:?}");
+        assert!(near(ground.vertical_m_s, -tilt_rad.cos()) && near(ground.lateral_m_s, tilt_rad.sin()));
+        assert!(near(axis.rate_rad_s, 0.1) && near(ground.rate_rad_s, 0.1_f64.hypot(0.3)), "{ground:?}");
+        assert!(near(ground.distance_m, 3.0) && near(ground.tilt_rad, tilt_rad), "{ground:?}");
+    }
+
+    #[test]
+    fn a_plan_ends_on_the_ground_or_slightly_below_it() {
+        let legs = LegLimits { vertical_m_s: 1.0, lateral_m_s: 0.7, tilt_deg: 10.0, rate_deg_s: 30.0 };
+        for limits in [TABLE_2, Limits::from(&legs)] {
+            let end = |height_m| Touchdown { height_m, ..AT_REST };
+            let ends = |height_m| LandingVerdict::judge_plan(&limits, &end(height_m)).is_inside();
+            assert!(ends(-1e-12) && ends(0.2));
+            assert!(!ends(-0.002) && !ends(0.21) && !ends(f64::NAN));
+            assert!(!LandingVerdict::judge(&limits, &end(-1e-12)).is_inside());
         }
-    }
-
-    #[test]
-    fn a_plan_may_end_slightly_below_the_ground_and_a_landing_may_not() {
-        let end = |z_m| PlanarState { z_m, ..upright() };
-        assert!(LandingVerdict::judge_plan(&limits(), &end(-1e-12)).landed());
-        assert!(!LandingVerdict::judge_plan(&limits(), &end(-0.002)).landed());
-        assert!(!LandingVerdict::judge_plan(&limits(), &end(f64::NAN)).landed());
-        assert!(!LandingVerdict::judge(&limits(), &end(-1e-12)).landed());
     }
 
     #[test]
     fn each_limit_can_fail_alone() {
-        let states = [
-            ("x", PlanarState { x_m: -20.1, ..upright() }),
-            ("altitude", PlanarState { z_m: 0.21, ..upright() }),
-            ("altitude", PlanarState { z_m: -0.006, ..upright() }),
-            ("pitch error", PlanarState { theta_rad: FRAC_PI_2 - 0.1, ..upright() }),
-            ("u", PlanarState { u_m_s: -0.41, ..upright() }),
-            ("w", PlanarState { w_m_s: 0.11, ..upright() }),
-            ("pitch rate", PlanarState { q_rad_s: 0.036, ..upright() }),
-            ("u", PlanarState { u_m_s: f64::NAN, ..upright() }),
+        let touchdowns = [
+            ("distance", Touchdown { distance_m: 20.1, ..AT_REST }),
+            ("height", Touchdown { height_m: 0.21, ..AT_REST }),
+            ("height", Touchdown { height_m: -0.006, ..AT_REST }),
+            ("vertical speed", Touchdown { vertical_m_s: -0.41, ..AT_REST }),
+            ("vertical speed", Touchdown { vertical_m_s: f64::NAN, ..AT_REST }),
+            ("lateral speed", Touchdown { lateral_m_s: 0.11, ..AT_REST }),
+            ("tilt", Touchdown { tilt_rad: 0.1, ..AT_REST }),
+            ("rotation rate", Touchdown { rate_rad_s: 0.036, ..AT_REST }),
         ];
-        assert!(LandingVerdict::judge(&limits(), &upright()).landed());
-        for (name, state) in states {
-            let verdict = LandingVerdict::judge(&limits(), &state);
+        assert!(LandingVerdict::judge(&TABLE_2, &AT_REST).is_inside());
+        for (name, at) in touchdowns {
+            let verdict = LandingVerdict::judge(&TABLE_2, &at);
             let failed: Vec<_> = verdict.failures().map(|result| result.name).collect();
             assert_eq!(failed, [name]);
         }
+    }
+
+    #[test]
+    fn an_ending_says_whether_legs_were_inside_their_envelope() {
+        let said = |flags, failure| {
+            FlightEnding { aborted: false, landing: Landing::from(flags), failure }.to_string()
+        };
+        assert_eq!(
+            said([true, true, false, false], None),
+            "STANDS UNDAMAGED, outside the design envelope of its legs, outside Table 2"
+        );
+        assert_eq!(
+            said([false, true, true, false], Some("leg overloaded")),
+            "UPRIGHT, taken as damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
+        );
+        assert_eq!(said([false, false, true, true], Some("tipped over")), "NOT LANDED: tipped over");
+        let under = FlightEnding { aborted: true, failure: Some(UNDER_PARACHUTE), ..FlightEnding::default() };
+        assert_eq!(under.to_string(), "ABORTED, then DOWN UNDER THE PARACHUTE, not landed");
     }
 }

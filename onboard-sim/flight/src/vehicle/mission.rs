@@ -19,7 +19,7 @@ use crate::vehicle::lot::{Expectation, Lot};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-pub use nmpc::{FinalBox, SolverLimits};
+pub use nmpc::SolverLimits;
 
 /// Length of the countdown of a mission whose text does not say it, s: what all missions had before it was 10 s, so that their
 /// logs verify. The built-in ones say it.
@@ -121,54 +121,36 @@ pub struct LegLimits {
     pub rate_deg_s: f64,
 }
 
-/// Diagonal weights of the running cost, Eq. 28 of the landing paper; SI units and radians.
+/// Weights of a plan's running cost, per second; SI units and radians.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct StateWeights {
-    /// Horizontal position, 1/m^2.
+pub struct PlanWeights {
+    /// Distance from the landing point, 1/m^2.
     pub x: f64,
-    /// Altitude, 1/m^2.
-    #[serde(default)]
-    pub z: f64,
-    /// Pitch from upright, 1/rad^2.
+    /// Leans, 1/rad^2.
     pub theta: f64,
-    /// Axial velocity, s^2/m^2.
-    #[serde(default)]
-    pub u: f64,
-    /// Lateral velocity, s^2/m^2.
-    #[serde(default)]
-    pub w: f64,
-    /// Pitch rate, s^2/rad^2.
+    /// Rates of the leans, s^2/rad^2.
     #[serde(default)]
     pub q: f64,
-    /// Gimbal angle, 1/rad^2 (the paper's P).
+    /// Gimbal angles, 1/rad^2.
     pub delta: f64,
+    /// The fins' distance from half open.
+    pub fins: f64,
 }
 
-impl StateWeights {
-    /// The state weights in state order (x, z, theta, u, w, q).
-    pub fn state_diagonal(&self) -> [f64; 6] {
-        [self.x, self.z, self.theta, self.u, self.w, self.q]
-    }
-}
-
-/// What counts as a landing (Table 2 of the landing paper).
+/// The box in which a plan ends.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TouchdownBox {
-    /// Largest horizontal distance, m.
-    pub x_m: f64,
-    /// Lowest altitude, m.
-    pub altitude_min_m: f64,
-    /// Highest altitude, m.
-    pub altitude_max_m: f64,
-    /// Largest pitch error from upright, degrees.
+pub struct FinalBox {
+    /// Largest lean in each level direction, degrees.
     pub pitch_error_deg: f64,
-    /// Largest axial speed, m/s.
-    pub u_m_s: f64,
-    /// Largest lateral speed, m/s.
+    /// Lowest vertical velocity, m/s.
+    pub u_min_m_s: f64,
+    /// Highest vertical velocity, m/s.
+    pub u_max_m_s: f64,
+    /// Largest lateral speed in each level direction, m/s.
     pub w_m_s: f64,
-    /// Largest pitch rate, degrees per second.
+    /// Largest rate of a lean, degrees per second.
     pub pitch_rate_deg_s: f64,
 }
 
@@ -251,8 +233,6 @@ pub struct Mission {
     /// Position of the pad on the Earth.
     #[serde(default)]
     pub site: Site,
-    /// Whether the fins steer; otherwise they stay open at equal angles (passive descent).
-    pub steered: bool,
     /// Position of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
     #[serde(default)]
@@ -265,13 +245,6 @@ pub struct Mission {
     pub caution_sigmas: f64,
     /// This caution fades over this time before the thrust falls through the weight, s.
     pub caution_fades_s: f64,
-    /// The fins leave room for a motor that is weaker or stronger by this many standard deviations of the remaining
-    /// impulse.
-    pub fin_sigmas: f64,
-    /// Place in the remaining band at which the fins hold the vehicle, 0 at its low end, 1 at its high end.
-    pub fin_place: f64,
-    /// Weight of the fins' present opening in a plan; the rest is the opening that the planned motor will need.
-    pub fins_kept: f64,
     /// Largest tilt that the landing may use throughout, in the band of feasible heights before the ignition, degrees.
     pub soft_tilt_deg: f64,
     /// The same for the fins' band after the ignition, degrees; the rest of the tilt is reserved for the planner.
@@ -303,8 +276,6 @@ pub struct Mission {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
-    /// What counts as a landing: the landing paper's Table 2.
-    pub touchdown_limits: TouchdownBox,
     pub leg_limits: LegLimits,
 }
 

@@ -2,9 +2,7 @@
 //!
 //! World: `x` and `y` horizontal, `z` up, right-handed, origin at the pad on the ground. Body: `x` along the axis of
 //! symmetry towards the nose, `z` along world `x` when upright and not rolled, `y` to complete a right-handed set
-//! (world `-y` when upright), origin at the centre of gravity. So the planar state of [`crate::vehicle::dynamics`] is
-//! the motion in the world's x-z plane: `theta` is the nose's elevation, `u` and `w` are the body velocities along `x`
-//! and `z`, and `q` is the rotation rate about body `y`.
+//! (world `-y` when upright), origin at the centre of gravity.
 //!
 //! The nozzle points along body `-x`. Gimbal angles `(pitch, yaw)` turn the thrust to
 //! `T (cos p cos y, sin y, -sin p cos y)` in body axes: a positive angle pitches the nose down, or yaws it, by
@@ -12,8 +10,6 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-
-use crate::vehicle::dynamics::PlanarState;
 
 /// Position, velocity, attitude and rotation of a rigid rocket.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -65,24 +61,6 @@ impl RigidState {
     }
 }
 
-impl From<PlanarState> for RigidState {
-    /// The planar motion in the world's x-z plane.
-    fn from(planar: PlanarState) -> Self {
-        let (sin, cos) = libm::sincos(planar.theta_rad);
-        let (u, w) = (planar.u_m_s, planar.w_m_s);
-        let lean = UnitQuaternion::from_axis_angle(
-            &Vector3::y_axis(),
-            core::f64::consts::FRAC_PI_2 - planar.theta_rad,
-        );
-        Self {
-            position_m: Vector3::new(planar.x_m, 0.0, planar.z_m),
-            velocity_m_s: Vector3::new(u * cos + w * sin, 0.0, u * sin - w * cos),
-            world_from_body: lean * upright(),
-            rate_rad_s: Vector3::new(0.0, planar.q_rad_s, 0.0),
-        }
-    }
-}
-
 /// The upright attitude without roll: body x, y, z along world z, -y, x.
 pub fn upright() -> UnitQuaternion<f64> {
     let half = core::f64::consts::FRAC_1_SQRT_2;
@@ -102,20 +80,5 @@ mod tests {
             assert!((attitude * body - world).norm() < 1e-15, "{body} goes to {}", attitude * body);
         }
         assert!(RigidState::upright(3.0).tilt_rad().abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_planar_state_keeps_its_body_velocities_and_its_elevation() {
-        let planar =
-            PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.2, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: 0.3 };
-        let rigid = RigidState::from(planar);
-        let body = rigid.velocity_in_body_m_s();
-        assert!((body - Vector3::new(-7.0, 0.0, 0.8)).norm() < 1e-12, "{body}");
-        let nose = rigid.nose_in_world();
-        assert!((nose - Vector3::new(libm::cos(1.2), 0.0, libm::sin(1.2))).norm() < 1e-12, "{nose}");
-        assert!((rigid.tilt_rad() - (core::f64::consts::FRAC_PI_2 - 1.2)).abs() < 1e-12);
-        // The nose rises at q.
-        let rate_in_world = rigid.world_from_body * rigid.rate_rad_s;
-        assert!(rate_in_world.cross(&nose).z > 0.0);
     }
 }

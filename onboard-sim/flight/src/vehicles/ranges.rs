@@ -6,7 +6,7 @@ use alloc::string::{String, ToString as _};
 use core::fmt::Display;
 
 use crate::vehicle::airframe;
-use crate::vehicle::mission::{ArmingLimits, FinalBox, GateLimits, SolverLimits, StateWeights, TouchdownBox};
+use crate::vehicle::mission::{ArmingLimits, FinalBox, GateLimits, PlanWeights, SolverLimits};
 
 /// A value outside its range.
 pub(super) struct BadValue {
@@ -50,18 +50,16 @@ pub(super) fn angle_below_right(key: impl Into<String>, value_deg: f64) -> Check
     require(value_deg > 0.0 && value_deg < 90.0, key, value_deg, "above 0 and below 90")
 }
 
-pub(super) fn weights(section: &str, weights: &StateWeights) -> Check {
+pub(super) fn weights(section: &str, weights: &PlanWeights) -> Check {
     let key = |name: &str| format!("{section}.weights.{name}");
     not_negative(key("x"), weights.x)?;
-    not_negative(key("z"), weights.z)?;
     not_negative(key("theta"), weights.theta)?;
-    not_negative(key("u"), weights.u)?;
-    not_negative(key("w"), weights.w)?;
     not_negative(key("q"), weights.q)?;
-    positive(key("delta"), weights.delta)
+    positive(key("delta"), weights.delta)?;
+    // Without a weight the fins of a plan are not unique.
+    positive(key("fins"), weights.fins)
 }
 
-/// The box in which a plan ends, but for the number of its nodes.
 pub(super) fn final_box(section: &str, end: &FinalBox) -> Check {
     let key = |name: &str| format!("{section}.final.{name}");
     positive(key("pitch_error_deg"), end.pitch_error_deg)?;
@@ -84,47 +82,8 @@ pub(super) fn solver(section: &str, solver: &SolverLimits) -> Check {
         solver.max_iterations,
         "from 1 to 1000",
     )?;
-    require(
-        solver.max_iterations_after_miss <= solver.max_iterations,
-        key("max_iterations_after_miss"),
-        solver.max_iterations_after_miss,
-        "at most max_iterations",
-    )?;
     positive(key("kkt_tolerance"), solver.kkt_tolerance)?;
-    positive(key("terminal_penalty"), solver.terminal_penalty)?;
-    require(
-        (1..=1000).contains(&solver.qp_max_iterations),
-        key("qp_max_iterations"),
-        solver.qp_max_iterations,
-        "from 1 to 1000",
-    )?;
-    share(key("guess_amplitude_rad"), solver.guess_amplitude_rad)?;
-    require(
-        (1..=10).contains(&solver.guess_half_waves),
-        key("guess_half_waves"),
-        solver.guess_half_waves,
-        "from 1 to 10",
-    )
-}
-
-pub(super) fn touchdown_limits(touchdown: &TouchdownBox) -> Check {
-    positive("touchdown_limits.x_m", touchdown.x_m)?;
-    require(
-        (-10.0..=10.0).contains(&touchdown.altitude_min_m),
-        "touchdown_limits.altitude_min_m",
-        touchdown.altitude_min_m,
-        "from -10 to 10",
-    )?;
-    require(
-        touchdown.altitude_max_m.is_finite() && touchdown.altitude_max_m > touchdown.altitude_min_m,
-        "touchdown_limits.altitude_max_m",
-        touchdown.altitude_max_m,
-        "finite and above touchdown_limits.altitude_min_m",
-    )?;
-    positive("touchdown_limits.pitch_error_deg", touchdown.pitch_error_deg)?;
-    positive("touchdown_limits.u_m_s", touchdown.u_m_s)?;
-    positive("touchdown_limits.w_m_s", touchdown.w_m_s)?;
-    positive("touchdown_limits.pitch_rate_deg_s", touchdown.pitch_rate_deg_s)
+    positive(key("terminal_penalty"), solver.terminal_penalty)
 }
 
 pub(super) fn arming(arming: &ArmingLimits) -> Check {

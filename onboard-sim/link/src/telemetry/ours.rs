@@ -16,12 +16,12 @@ use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
     TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct,
-    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPadCheckItem, TdPadCheckState,
-    TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
+    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLanding, TdLatch, TdLimit, TdMotor, TdPadCheckItem,
+    TdPadCheckState, TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
-use crate::vehicle::{Identity, VehicleKind, VehicleState, violations};
+use crate::vehicle::{Identity, VehicleKind, VehicleState, bits, violations};
 
 pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
     let (mode, time_s) = (state.mode(), state.time_s);
@@ -180,39 +180,38 @@ fn td_level(level: flight::guidance::powered::ControlLevel) -> TdControlLevel {
     }
 }
 
-fn td_status(status: nmpc::SolveStatus) -> TdSolverStatus {
-    use nmpc::SolveStatus as S;
+fn td_status(status: nmpc::Status) -> TdSolverStatus {
+    use nmpc::Status as S;
     match status {
         S::NotRun => TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN,
         S::Converged => TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
         S::IterationLimit => TdSolverStatus::TD_SOLVER_STATUS_ITERATION_LIMIT,
         S::Stalled => TdSolverStatus::TD_SOLVER_STATUS_STALLED,
         S::SubproblemFailed => TdSolverStatus::TD_SOLVER_STATUS_SUBPROBLEM_FAILED,
-        S::NotLandable => TdSolverStatus::TD_SOLVER_STATUS_NOT_LANDABLE,
-        S::BadInput => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
+        S::NotFinite => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
         S::WorkLimit => TdSolverStatus::TD_SOLVER_STATUS_WORK_LIMIT,
     }
 }
 
 pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessage> {
     let planned = state.planned()?;
-    let end = planned.end(state.mission().powered.landing_miss)?;
+    let end = planned.end(state.mission().powered.landing_miss);
     let violated = violations(&LandingVerdict::judge_plan(&state.limits(), &end));
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
         time_boot_ms: boot_ms(state.time_s),
-        time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s?) as i32,
-        x_m: end.x_m as f32,
-        altitude_m: end.z_m as f32,
-        pitch_rad: end.theta_rad as f32,
-        u_m_s: end.u_m_s as f32,
-        w_m_s: end.w_m_s as f32,
-        q_rad_s: end.q_rad_s as f32,
+        time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s) as i32,
+        distance_m: end.distance_m as f32,
+        height_m: end.height_m as f32,
+        vertical_m_s: end.vertical_m_s as f32,
+        lateral_m_s: end.lateral_m_s as f32,
+        tilt_rad: end.tilt_rad as f32,
+        rate_rad_s: end.rate_rad_s as f32,
         limits_violated: TdLimit::from_bits_truncate(violated),
     }))
 }
 
 pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
-    let (points_m, count) = state.planned()?.path_from_the_east()?;
+    let (points_m, count) = state.planned()?.path_from_the_east();
     Some(MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
         time_boot_ms: boot_ms(state.time_s),
         x: points_m.map(|(north_m, _)| centimetres(north_m)),
@@ -223,31 +222,29 @@ pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
 
 pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
     let judged = state.judged.as_ref()?;
-    let impact = &judged.impact;
+    let at = &judged.touchdown;
+    let violated = violations(&LandingVerdict::judge(&state.limits(), at));
+    let landing = judged.landing.flags().into_iter();
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
         time_boot_ms: boot_ms(state.time_s),
-        contact_ms: boot_ms(impact.time_s),
-        x_m: impact.state.x_m as f32,
-        altitude_m: impact.state.z_m as f32,
-        pitch_rad: impact.state.theta_rad as f32,
-        u_m_s: impact.state.u_m_s as f32,
-        w_m_s: impact.state.w_m_s as f32,
-        q_rad_s: impact.state.q_rad_s as f32,
-        limits_violated: TdLimit::from_bits_truncate(judged.violations()),
-        landed: u8::from(judged.landed),
+        contact_ms: boot_ms(judged.time_s),
+        distance_m: at.distance_m as f32,
+        vertical_m_s: at.vertical_m_s as f32,
+        lateral_m_s: at.lateral_m_s as f32,
+        tilt_rad: at.tilt_rad as f32,
+        rate_rad_s: at.rate_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(violated),
+        landing: TdLanding::from_bits_truncate(bits(landing) as u8),
     }))
 }
 
 pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
     let limits = state.limits();
     MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
-        x_m: limits.x_m as f32,
-        altitude_min_m: limits.altitude_min_m as f32,
-        altitude_max_m: limits.altitude_max_m as f32,
-        pitch_error_rad: limits.pitch_error_rad as f32,
-        u_m_s: limits.u_m_s as f32,
-        w_m_s: limits.w_m_s as f32,
-        q_rad_s: limits.pitch_rate_rad_s as f32,
+        vertical_m_s: limits.vertical_m_s as f32,
+        lateral_m_s: limits.lateral_m_s as f32,
+        tilt_rad: limits.tilt_rad as f32,
+        rate_rad_s: limits.rate_rad_s as f32,
         gimbal_limit_rad: state.mission().airframe.gimbal.limit_rad() as f32,
     })
 }
@@ -376,8 +373,6 @@ pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64) -> MavMessa
 
 #[cfg(test)]
 mod tests {
-    use nmpc::SolveStatus as S;
-
     use super::*;
 
     #[test]
@@ -399,24 +394,12 @@ mod tests {
     }
 
     #[test]
-    fn phases_levels_and_statuses_have_the_same_numbers_on_the_wire_and_in_flight() {
+    fn phases_and_levels_have_the_same_numbers_on_the_wire_and_in_flight() {
         for phase in Phase::ALL {
             assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
         }
         for level in flight::guidance::powered::ControlLevel::ALL {
             assert_eq!(td_level(level) as u32, u32::from(level.index()));
-        }
-        for status in [
-            S::NotRun,
-            S::Converged,
-            S::IterationLimit,
-            S::Stalled,
-            S::SubproblemFailed,
-            S::NotLandable,
-            S::BadInput,
-            S::WorkLimit,
-        ] {
-            assert_eq!(td_status(status) as u32, u32::from(status.index()));
         }
     }
 }

@@ -5,6 +5,7 @@
 //! stays where it was pushed. The force that crushes it is taken along the ground's normal: at 10 degrees it is 1.5 % more along
 //! the axis. A foot has no mass of its own: the body carries it, and the block stops a little more than it has to.
 
+use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
@@ -26,21 +27,13 @@ const STILL_S: f64 = 0.3;
 
 /// The first contact with the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Touchdown {
+pub struct FirstContact {
     /// Time since the start, s.
     pub time_s: f64,
     /// The last state before contact, at most a quarter of a millisecond earlier.
     pub state: RigidState,
-    /// Vertical velocity of the centre of gravity, up, m/s.
-    pub vertical_m_s: f64,
-    /// Horizontal speed of the centre of gravity, m/s.
-    pub lateral_m_s: f64,
-    /// Angle between nose and vertical, rad.
-    pub tilt_rad: f64,
-    /// Size of the rotation rate, roll included, rad/s.
-    pub rate_rad_s: f64,
-    /// Size of the rotation rate across the axis (pitch and yaw), rad/s.
-    pub cross_rate_rad_s: f64,
+    /// What the legs feel of it.
+    pub over_ground: Touchdown,
     pub thrust_n: f64,
     pub weight_n: f64,
 }

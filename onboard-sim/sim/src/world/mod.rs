@@ -29,7 +29,7 @@ pub mod whole;
 pub mod wind;
 
 pub use battery::Battery;
-pub use ground::{Rest, RestOutcome, Strain, Touchdown};
+pub use ground::{FirstContact, Rest, RestOutcome, Strain};
 pub use hanging::Hanging;
 pub use motor::TrueBurn;
 pub use truth::{AscentTruth, Truth};

@@ -33,7 +33,7 @@ pub fn step(
 fn tell(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
     match event {
         VehicleEvent::Text { severity, text } => endpoint.say(*severity, text),
-        VehicleEvent::Verdict { .. } => endpoint.tell_of_verdict(),
+        VehicleEvent::Verdict => endpoint.tell_of_verdict(),
         VehicleEvent::PhaseChanged { .. } | VehicleEvent::Planned { .. } => {}
     }
 }

@@ -68,11 +68,7 @@ pub(super) struct OnBoard {
 
 impl OnBoard {
     /// Opens the pipes in a folder; waits until the board has opened them, too.
-    pub(super) fn open(
-        folder: &Path,
-        (mission_toml, controller): (&str, &str),
-        on_the_air: OnTheAir,
-    ) -> Result<Self, BoardError> {
+    pub(super) fn open(folder: &Path, mission_toml: &str, on_the_air: OnTheAir) -> Result<Self, BoardError> {
         let opened = |name: &str, options: &OpenOptions| {
             let path = folder.join(name);
             options.open(&path).map_err(|source| BoardError::Pipe { path, source })
@@ -102,7 +98,6 @@ impl OnBoard {
         reading.map_err(|source| BoardError::Pipe { path: folder.join("answers"), source })?;
         let begin = Begin {
             toml: mission_toml.to_owned(),
-            controller: controller.to_owned(),
             flight: on_the_air.boot_number,
             on_the_air: Some(on_the_air),
             ..Begin::default()

@@ -161,10 +161,10 @@ pub enum FlyError {
 /// How a flight ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FlightEnd {
-    /// Landed inside the limits of the legs.
+    /// It stands undamaged.
     Landed,
-    /// On the ground, outside a limit.
-    OutsideLimits,
+    /// It is on the ground, and does not.
+    NotLanded,
     /// Aborted before or without a landing.
     Aborted,
     /// Arming or starting was refused.
@@ -268,19 +268,19 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
         budget_bytes_s: options.on_the_wire.serial_bytes_s,
         uid: options.on_the_wire.uid.get().into(),
     };
-    Ok(OnBoard::open(folder, (&recipe.mission_toml, recipe.controller.name()), on_the_air)?)
+    Ok(OnBoard::open(folder, &recipe.mission_toml, on_the_air)?)
 }
 
 /// How a flight has ended.
 fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
-    match (vehicle.judged().map(|judged| judged.landed), refused) {
+    match (vehicle.judged().map(|judged| judged.landing.stands), refused) {
         // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,
         (Some(true), _) => FlightEnd::Landed,
         (None, Some(reason)) => FlightEnd::Refused(reason),
         (None, None) if stopped => FlightEnd::Stopped,
-        // The verdict is outside a limit, or the vehicle never came down.
-        (Some(false) | None, _) => FlightEnd::OutsideLimits,
+        // It is damaged, or the vehicle never came down.
+        (Some(false) | None, _) => FlightEnd::NotLanded,
     }
 }
 

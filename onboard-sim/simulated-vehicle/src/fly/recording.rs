@@ -49,7 +49,7 @@ pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEv
     }
     for event in events {
         let record = match event {
-            VehicleEvent::Verdict { .. } => match vehicle.verdict_record() {
+            VehicleEvent::Verdict => match vehicle.verdict_record() {
                 Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
                 None => continue,
             },

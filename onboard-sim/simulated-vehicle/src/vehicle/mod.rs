@@ -15,7 +15,6 @@ use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
-use flight::rules::verdict::LandingVerdict;
 use flight::vehicle::mission::StartPoint;
 use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
@@ -24,7 +23,7 @@ use protocol::log::v1;
 use sim::outside::{Flown, Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
-pub use vehicle_link::vehicle::{BatteryFacts, Impact, Judged, MissionName, VehicleState};
+pub use vehicle_link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
 
 use self::ground::Ground;
 
@@ -266,14 +265,9 @@ impl Vehicle {
         self.computer().arming_checks()
     }
 
-    /// The touchdown limits with the values found, once the landing is judged: those of the legs.
+    /// The touchdown, once the landing is judged.
     pub fn judged(&self) -> Option<Judged> {
         self.ground.judged()
-    }
-
-    /// The landing judged by the landing paper's Table 2.
-    pub fn judged_by_table_2(&self) -> Option<Judged> {
-        self.ground.judged_by_table_2()
     }
 
     /// The simulated radio: its silence and its delay.
@@ -309,12 +303,7 @@ pub enum VehicleEvent {
         deadline_s: f64,
     },
     /// The vehicle touched down and its landing was judged.
-    Verdict {
-        /// The contact that was judged.
-        impact: Impact,
-        /// The verdict, limit by limit.
-        verdict: Box<LandingVerdict>,
-    },
+    Verdict,
 }
 
 impl From<CrewMessage> for VehicleEvent {

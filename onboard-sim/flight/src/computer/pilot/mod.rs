@@ -24,12 +24,10 @@ use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
-use crate::guidance::baseline::{Baseline, Law};
-use crate::guidance::powered::{ControlLevel, LandingSolved, Plane, PoweredGuidance, PoweredReport};
+use crate::guidance::powered::{ControlLevel, LandingSolved, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
 use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
-use crate::vehicle::dynamics::PlanarState;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -74,8 +72,6 @@ pub struct Pilot {
     ignited_at_s: Option<f64>,
     prediction: Prediction,
     powered: PoweredGuidance,
-    /// The law that flies the landing burn instead of a plan, if any.
-    baseline: Option<Baseline>,
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
@@ -126,7 +122,6 @@ impl Pilot {
             ignited_at_s: None,
             prediction: Prediction::default(),
             powered: model.guidance(),
-            baseline: None,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
@@ -160,14 +155,6 @@ impl Pilot {
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
     pub(super) fn detects_lift_off(&mut self, sensed: &Sensed) -> bool {
         self.ascent.detects_lift_off(axial_m_s2(sensed), self.model.mission.estimator.frame_s)
-    }
-
-    /// Sets the law that flies the landing burn from now on.
-    pub(crate) fn set_law(&mut self, law: Law) {
-        self.baseline = match law {
-            Law::Nmpc => None,
-            Law::Baseline(baseline) => Some(baseline),
-        };
     }
 
     /// The estimate of the last frame.
@@ -256,18 +243,6 @@ impl Pilot {
         }
     }
 
-    /// The states of the plan being flown and the step between them, s, if there is a plan. They lie in the plane of
-    /// the landing, in the frame that moves with the wind along that plane and coincided with the ground's when the
-    /// plan began.
-    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
-        self.powered.planned()
-    }
-
-    /// The plane of the landing, once it is chosen.
-    pub fn plane(&self) -> Option<&Plane> {
-        self.powered.plane()
-    }
-
     /// The mission it flies.
     pub fn mission(&self) -> &Mission {
         &self.model.mission
@@ -284,23 +259,8 @@ impl Pilot {
         let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
         let estimate = self.estimate.as_ref()?;
         let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
-        let (preferred, fallback) = self.model.situations_to_plan(estimate, &burning, &input.fins_rad);
-        before.powered.inspect(&self.powered, input.time_s, &estimate.state, &preferred, fallback.as_ref())
-    }
-}
-
-impl Pilot {
-    pub(crate) fn space_planned(
-        &self,
-        before: &Self,
-        mode: &Mode,
-        input: &Input<'_>,
-    ) -> Option<crate::guidance::powered::SpaceSolved> {
-        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
-        let estimate = self.estimate.as_ref()?;
-        let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
-        let (preferred, _) = self.model.situations_to_plan(estimate, &burning, &input.fins_rad);
-        before.powered.inspect_space(input.time_s, &estimate.state, &preferred)
+        let situation = self.model.situation_to_plan(estimate, &burning);
+        before.powered.inspect(input.time_s, &estimate.state, &situation)
     }
 }
 
@@ -409,14 +369,13 @@ pub(super) mod sample {
     use crate::computer::table::PhaseTable;
     use crate::computer::{Computer, Input, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
-    use crate::guidance::baseline::Law;
     use crate::rules::arming::Uplink;
     use crate::vehicle::rigid::RigidState;
 
     /// A phase table as it is right after the release.
     pub(super) fn released() -> PhaseTable {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
-        let computer = Computer::at_power_up(&mission, Law::Nmpc, &RigidState::upright(300.0));
+        let computer = Computer::at_power_up(&mission, &RigidState::upright(300.0));
         computer.released(0).into_table()
     }
 

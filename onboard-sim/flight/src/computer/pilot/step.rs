@@ -60,6 +60,11 @@ fn on_the_way_up(
     (measurements, VehicleNow { motor_burning: shaken, air_density_kg_m3: 0.0, ..*vehicle })
 }
 
+/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and keep the vehicle in the
+/// middle of that band.
+const FIN_SIGMAS: f64 = 1.0;
+const FIN_PLACE: f64 = 0.5;
+
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &Input<'_>) {
@@ -86,13 +91,12 @@ impl Pilot {
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Plans the landing in every tenth frame of a burn that no simpler law flies. Returns whether this was a frame to plan
-    /// or predict in.
+    /// Plans the landing in every tenth frame of the burn. Returns whether this was a frame to plan or predict in.
     pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) -> bool {
         let due = input.frame.is_multiple_of(FRAMES_PER_PLAN);
         let burning = self.burning(mode, input.time_s).filter(|_| mode.phase.in_landing_burn());
-        if let (Some(burning), Some(estimate), None, true) = (burning, self.estimate, &self.baseline, due) {
-            self.plan_landing(input.time_s, &estimate, &burning, &input.fins_rad);
+        if let (Some(burning), Some(estimate), true) = (burning, self.estimate, due) {
+            self.plan_landing(input.time_s, &estimate, &burning);
         }
         due && (mode.phase.in_descent() || mode.phase.in_landing_burn())
     }
@@ -100,36 +104,24 @@ impl Pilot {
     /// Points fins and gimbal.
     pub(in crate::computer) fn point(&mut self, mode: &Mode, input: &Input<'_>) -> Pointed {
         let flying = mode.phase.in_landing_burn();
-        let mut simpler = false;
         if let Some(estimate) = self.estimate {
             let estimate = &estimate;
             let thrusting = self.burning(mode, input.time_s);
             let burning = thrusting.as_ref().filter(|_| flying);
-            let by_baseline = burning.and_then(|burning| self.baseline_commands(burning.burning_s, estimate));
-            if let Some((gimbal_rad, fins_rad)) = by_baseline {
-                (self.gimbal_rad, self.fins_rad) = (gimbal_rad, fins_rad);
-                simpler = true;
-            } else {
-                self.gimbal_rad = match burning {
-                    Some(burning) => {
-                        self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
-                        self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
-                    }
-                    None => match thrusting.as_ref().filter(|_| self.balances(mode)) {
-                        Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
-                        None => [0.0; 2],
-                    },
-                };
-                let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-                self.fins_rad =
-                    self.fins(mode, estimate, &mass, self.density_kg_m3(estimate), burning.is_some());
-            }
+            self.gimbal_rad = match burning {
+                Some(burning) => {
+                    self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
+                    self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
+                }
+                None => match thrusting.as_ref().filter(|_| self.balances(mode)) {
+                    Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
+                    None => [0.0; 2],
+                },
+            };
+            let mass = self.model.mass_now(self.model.burning_s(input.time_s));
+            self.fins_rad = self.fins(mode, estimate, &mass, self.density_kg_m3(estimate), burning.is_some());
         }
-        let level = match flying {
-            true if simpler => ControlLevel::Stabiliser,
-            true => self.powered.report().level,
-            false => ControlLevel::Idle,
-        };
+        let level = if flying { self.powered.report().level } else { ControlLevel::Idle };
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
     }
 
@@ -147,12 +139,6 @@ impl Pilot {
     /// Of the air at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
         Air::at_height_m(self.model.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
-    }
-
-    /// Commands of the simpler law, if one flies the landing burn: gimbal and fins, rad.
-    fn baseline_commands(&mut self, burning_s: f64, estimate: &Estimate) -> Option<([f64; 2], [f64; 4])> {
-        let baseline = self.baseline.as_mut()?;
-        Some(baseline.commands_rad(burning_s, estimate, &self.model.motor))
     }
 
     fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
@@ -501,10 +487,9 @@ impl Pilot {
         Ok(effects)
     }
 
-    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning, fins_rad: &[f64; 4]) {
-        let state = &estimate.state;
-        let (preferred, fallback) = self.model.situations_to_plan(estimate, situation, fins_rad);
-        self.powered.plan(time_s, state, &preferred, fallback.as_ref());
+    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning) {
+        let planned = self.model.situation_to_plan(estimate, situation);
+        self.powered.plan(time_s, &estimate.state, &planned);
         if self.powered.fin_share(time_s).is_none() {
             self.fin_share = self.fin_share_of_band(estimate, situation);
         }
@@ -513,7 +498,7 @@ impl Pilot {
     /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
     fn fin_share_of_band(&self, estimate: &Estimate, situation: &Burning) -> f64 {
         let column = self.model.column(situation.density_kg_m3, self.model.mission.fin_soft_tilt_deg);
-        let sigmas = self.model.mission.fin_sigmas;
+        let sigmas = FIN_SIGMAS;
         let [weak, strong] =
             [-sigmas, sigmas].map(|sigmas| self.model.doubted_burn(situation.burning_s, sigmas));
         column.fin_share(
@@ -521,7 +506,7 @@ impl Pilot {
             situation.burning_s,
             estimate.state.velocity_m_s.z,
             estimate.state.position_m.z - self.model.feet_below_cg_m(&situation.mass),
-            self.model.mission.fin_place,
+            FIN_PLACE,
         )
     }
 
@@ -599,12 +584,11 @@ impl Pilot {
             body_behind_cg_m: mass.cg_station_m - 0.5 * self.model.airframe().body.length_m,
             time_to_go_s: self.prediction.ignition.command_in_s,
         };
-        let demand =
-            self.model.mission.descent.demand(&estimate.state, &situation, self.model.mission.steered);
+        let demand = self.model.mission.descent.demand(&estimate.state, &situation);
         let (moments, drag_area_m2, min_rad) = if burning {
             // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
-        } else if self.model.mission.steered && !lies_across_the_air(estimate) {
+        } else if !lies_across_the_air(estimate) {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())
         } else {
             return [fins.open_rad(); 4];

@@ -1,5 +1,5 @@
 //! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and drag.
-//! From that, the motor and the fin opening that a plan assumes.
+//! From that, the motor that a plan assumes.
 
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
@@ -8,7 +8,7 @@ use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::{MotorEstimate, MotorSample};
 use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation};
-use crate::guidance::vertical::{Band, Column, share_for};
+use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
@@ -169,17 +169,17 @@ impl VehicleModel {
     }
 }
 
-// The motor and the fin opening that a plan assumes.
+// The motor that a plan assumes.
 //
 // Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is therefore made for a
 // motor that is weaker than estimated, by the number of standard deviations that the mission sets as its caution. The
 // motor must not be so weak that no landing is possible: such a plan would turn the vehicle across the air to brake,
 // and spoil the landing for every stronger motor. So the plan takes the weakest of these motors that can still land
-// from here. The fins are assumed as open as they would be with that motor, because they follow the motor's estimate.
+// from here.
 //
 // High in the band of feasible heights, a hard landing in a plan has another cause: the plan has not found a way to sink
-// faster. There the motor as estimated is tried as well, and the guidance flies a hard plan rather than braking upright,
-// which helps a vehicle that is too low and makes this vehicle hover.
+// faster. There the guidance flies a hard plan rather than braking upright, which helps a vehicle that is too low and
+// makes this vehicle hover.
 
 /// Number of steps from full caution to none.
 const CAUTION_STEPS: u32 = 3;
@@ -187,45 +187,20 @@ const CAUTION_STEPS: u32 = 3;
 /// Above this place in the band, its middle, a vehicle is high.
 const HIGH_PLACE: f64 = 0.5;
 
-/// A motor, and how far open its fins would be on average until touchdown, 0 to 1.
-struct Assumed<'a> {
-    burn: Burn<'a>,
-    fin_share: f64,
-}
-
 impl VehicleModel {
-    /// The preferred situation to plan with, and a fallback for the case that its plan lands hard.
-    pub(super) fn situations_to_plan<'a>(
+    /// The situation to plan with.
+    pub(super) fn situation_to_plan<'a>(
         &'a self,
         estimate: &Estimate,
         burning: &Burning,
-        fins_rad: &[f64; 4],
-    ) -> (PoweredSituation<'a>, Option<PoweredSituation<'a>>) {
+    ) -> PoweredSituation<'a> {
         let column = self.column(burning.density_kg_m3, self.mission.fin_soft_tilt_deg);
         let height_m = estimate.state.position_m.z - self.feet_below_cg_m(&burning.mass);
         let band = |burn: &Burn<'_>| column.band(burn, burning.burning_s, estimate.state.velocity_m_s.z);
-        let fin_share = |band: Option<Band>| {
-            band.map_or(0.5, |band| share_for(self.mission.fin_place, band.place(height_m)))
-        };
         let estimated = self.burn();
-        let estimated_band = band(&estimated);
-        let high = match &estimated_band {
+        let high = match band(&estimated) {
             Some(band) => band.place(height_m) > HIGH_PLACE,
             None => column.falls_too_slowly(&estimated, burning.burning_s, estimate.state.velocity_m_s.z),
-        };
-        let situation = |assumed: Assumed<'a>| {
-            let largest_m2 = self.largest_fin_drag_area_m2();
-            let kept = self.mission.fins_kept;
-            // A plan in space opens the fins itself.
-            let fin_drag_area_m2 = if self.mission.powered.space.is_some() {
-                largest_m2
-            } else {
-                kept * self.fin_drag_area_m2(fins_rad) + (1.0 - kept) * assumed.fin_share * largest_m2
-            };
-            PoweredSituation {
-                high,
-                ..self.powered_situation(estimate, burning, assumed.burn, fin_drag_area_m2)
-            }
         };
         let caution_sigmas = self.caution_sigmas(burning.burning_s);
         // Without caution, only the motor as estimated is tried.
@@ -233,12 +208,13 @@ impl VehicleModel {
         let weaker = (0..steps).find_map(|step| {
             let share = 1.0 - f64::from(step) / f64::from(CAUTION_STEPS);
             let burn = self.doubted_burn(burning.burning_s, -caution_sigmas * share);
-            let found = band(&burn).filter(|band| band.place(height_m) >= 0.0)?;
-            Some(Assumed { burn, fin_share: fin_share(Some(found)) })
+            band(&burn).is_some_and(|band| band.place(height_m) >= 0.0).then_some(burn)
         });
-        let as_estimated = || Assumed { burn: estimated, fin_share: fin_share(estimated_band) };
-        let fallback = (high && weaker.is_some()).then(as_estimated).map(situation);
-        (situation(weaker.unwrap_or_else(as_estimated)), fallback)
+        let fins_m2 = self.largest_fin_drag_area_m2();
+        PoweredSituation {
+            high,
+            ..self.powered_situation(estimate, burning, weaker.unwrap_or(estimated), fins_m2)
+        }
     }
 
     /// By how many standard deviations a plan takes the motor to be weaker than estimated: the mission's full caution

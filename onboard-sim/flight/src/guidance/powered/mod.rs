@@ -1,35 +1,26 @@
-//! Phase 2 in space: from ignition to touchdown on a motor that cannot be throttled.
+//! Phase 2: from ignition to touchdown on a motor that cannot be throttled.
 //!
-//! A tick plans the landing in one vertical plane with the [NMPC](nmpc), in the frame that moves with the wind. The
-//! plan contains the thrust curve as estimated by [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of
-//! body and fins, a floor above the ground, and a free final time that is not before the thrust falls through the
-//! weight. Between ticks [`PoweredGuidance::aim`] reads the wanted direction of the nose from that plan, and leans it
-//! across the plane for the velocity there and the wind. The fins open and close with the place in the
-//! [band of feasible heights](crate::guidance::vertical): high in the band too much impulse is left, so they close.
-//!
-//! A mission with `[powered.space]` plans in `space` instead: the nose may lean in any direction, and the plan has the
-//! fins as well.
+//! A tick plans the landing with the [NMPC](nmpc): gimbal, fins and final time at once, from the plan of the tick before.
+//! The nose may lean in any direction. The plan contains the thrust curve as estimated by
+//! [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and fins, a floor above the ground, and a free
+//! final time that is not before the thrust falls through the weight. Between ticks the plan says where the nose points
+//! and how far the fins are open.
 //!
 //! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s.
 
+mod plan;
 mod report;
 mod situation;
-mod space;
 
 use alloc::vec::Vec;
 use nalgebra::Vector3;
-use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, FreeTimeWorkspace, Motor, solve_free_time_into};
-use nmpc::{Problem, SolveStatus};
+use nmpc::{Drag, End, Outcome, Problem, Push, SolverLimits, State, Status, Weights, Workspace};
 use serde::{Deserialize, Serialize};
 
-pub use self::report::{ControlLevel, LandingSolved, PoweredReport, PoweredSettings};
-use self::situation::{Ahead, Flown, largest_tilt_rad};
-pub use self::situation::{Plane, PoweredSituation};
-use self::space::SpaceGuidance;
-pub use self::space::{SpaceSettings, SpaceSolved};
+pub use self::plan::Plan;
+pub use self::report::{ControlLevel, PoweredReport, PoweredSettings};
+pub use self::situation::PoweredSituation;
 use crate::control::aim::Aim;
-use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::mission::{FinalBox, SolverLimits};
 use crate::vehicle::rigid::RigidState;
 
 /// Longest horizon, intervals: it sets the memory.
@@ -37,10 +28,6 @@ const MOST_INTERVALS: usize = 60;
 /// Shortest horizon, intervals: with fewer a plan cannot lean and come upright again.
 const LEAST_INTERVALS: usize = 6;
 
-/// Homing across the plane ends this long before touchdown, s: what leans later does not come upright in time.
-const HOMING_ENDS_S: f64 = 1.5;
-/// The distance for which it leans is limited to this, m.
-const HOMING_MOST_M: f64 = 6.0;
 /// Largest lean that corrects the velocity when a plan is flown to its end, rad: 3 degrees,
 /// well within what the legs take.
 const END_LEAN_MAX_RAD: f64 = 0.05;
@@ -48,49 +35,56 @@ const END_LEAN_MAX_RAD: f64 = 0.05;
 /// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take.
 const CONTACT_LEAN_RAD: f64 = 0.0873;
 
-/// Factor on the cost of tilt when a plan tilts too far. It holds for a vehicle that is high, too: with its far leans an abort
-/// that lights the motor high comes down hard even in a world without errors.
-const UPRIGHT_COST_FACTOR: f64 = 8.0;
-
-/// If the preferred plan touches down faster than this, m/s, the fallback is tried if there is one.
-const SOFT_M_S: f64 = -0.7;
-
 /// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the upright law brakes just as well.
 const HARD_M_S: f64 = -1.2;
 
-/// A plan that still tilts further than this is not flown, rad: its nose points below the horizon.
-const PLAN_TILT_MAX_RAD: f64 = 1.6;
+/// First change of the final time that is tried, s, the factor after one that was no better, and the smallest change.
+const FIRST_STEP_S: f64 = 0.1;
+const SHORTER: f64 = 0.3;
+const LEAST_STEP_S: f64 = 0.01;
 
-/// Velocity along the nose at the plan's touchdown, m/s; minus infinity without a plan.
-fn ended_m_s(plan: &FreeTimeSolution) -> f64 {
-    let finite = plan.solution.states.iter().all(PlanarState::is_finite);
-    plan.solution.states.last().filter(|_| finite).map_or(f64::NEG_INFINITY, |last| last.u_m_s)
-}
+/// Half the span of the central difference of the Lagrangian, s.
+const DIFFERENCE_S: f64 = 1e-4;
 
 /// The guidance and its memory.
 #[derive(Debug, Clone, Serialize)]
 pub struct PoweredGuidance {
     #[serde(skip)]
     settings: PoweredSettings,
-    plane: Option<Plane>,
-    flown: Option<Flown>,
     report: PoweredReport,
-    // The next search writes all of these before it reads them. (If a problem cannot be posed, the trial keeps an older
-    // final time, which is reported but decides nothing.)
+    flown: Option<Plan>,
+    // The next search writes these before it reads them.
     #[serde(skip)]
-    workspace: FreeTimeWorkspace,
+    workspace: Workspace,
     #[serde(skip)]
-    trial: FreeTimeSolution,
+    problem: Option<Problem>,
     #[serde(skip)]
-    set_aside: FreeTimeSolution,
+    trial: Plan,
+    #[serde(skip)]
+    found: Plan,
+    #[serde(skip)]
+    warm: Plan,
     /// Becomes the flown plan with the first plan.
     #[serde(skip)]
-    unused: Flown,
-    space: SpaceGuidance,
+    unused: Plan,
+    /// Intervals that all of these have room for. A landing that needs more gets longer ones, so that no flight allocates.
+    #[serde(skip)]
+    room: Option<usize>,
+}
+
+/// A landing that is planned again outside the flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LandingSolved {
+    /// The problem at the final time that was found, with its conditions, limits and motor.
+    pub problem: Problem,
+    /// Solved as in flight, from the previous plan; the iterations are those of all final times.
+    pub warm: (Outcome, Plan),
+    /// The problem solved cold.
+    pub cold: (Outcome, Plan),
 }
 
 impl PoweredGuidance {
-    /// Guidance without a plan, whose plans in a plane need no more memory than it has, however long the motor burns.
+    /// Guidance without a plan, whose plans need no more memory than it has, however long the motor burns.
     ///
     /// It plans a landing with the most intervals and forgets the plans, so that every buffer has its size.
     pub fn with_room(
@@ -104,33 +98,43 @@ impl PoweredGuidance {
         let latest_after_s = MOST_INTERVALS as f64 * settings.interval_s - carried_s;
         let mut planned = Self::new(PoweredSettings { solver, max_solves: 1, latest_after_s, ..settings });
         // Cold, warm, and cold again: the search swaps its buffers, and a warm plan is shorter.
-        planned.plan(0.0, state, situation, None);
-        planned.plan(0.0, state, situation, None);
-        planned.flown = None;
-        planned.space.forget();
-        planned.plan(0.0, state, situation, None);
-        planned.space.forget();
-        let Self { workspace, flown, space, .. } = planned;
-        let unused = flown.unwrap_or_default();
-        let set_aside =
-            FreeTimeSolution { solution: unused.plan.solution.clone(), ..FreeTimeSolution::default() };
-        let trial = set_aside.clone();
-        Self { workspace, trial, set_aside, unused, space, ..Self::new(settings) }
+        planned.plan(0.0, state, situation);
+        planned.plan(0.0, state, situation);
+        planned.forget();
+        planned.plan(0.0, state, situation);
+        planned.forget();
+        Self { settings, report: PoweredReport::idle(), ..planned }
     }
 
     /// Guidance without a plan.
     pub fn new(settings: PoweredSettings) -> Self {
         Self {
             settings,
-            plane: None,
-            flown: None,
             report: PoweredReport::idle(),
-            workspace: FreeTimeWorkspace::default(),
-            trial: FreeTimeSolution::default(),
-            set_aside: FreeTimeSolution::default(),
-            unused: Flown::default(),
-            space: SpaceGuidance::default(),
+            flown: None,
+            workspace: Workspace::default(),
+            problem: None,
+            trial: Plan::default(),
+            found: Plan::default(),
+            warm: Plan::default(),
+            unused: Plan::default(),
+            room: None,
         }
+    }
+
+    /// Forgets its plans, and keeps their room: no plan has more intervals than the last.
+    fn forget(&mut self) {
+        if let Some(flown) = self.flown.take() {
+            self.room = Some(flown.inputs().len());
+            self.trial = flown.clone();
+            self.unused = flown;
+        }
+    }
+
+    /// The same memory with other settings.
+    #[must_use]
+    pub(crate) fn reconfigured(&self, settings: &PoweredSettings) -> Self {
+        Self { settings: *settings, ..self.clone() }
     }
 
     /// The report of the last tick.
@@ -138,63 +142,14 @@ impl PoweredGuidance {
         &self.report
     }
 
+    /// The plan that is flown.
+    pub fn planned(&self) -> Option<&Plan> {
+        self.flown.as_ref()
+    }
+
     /// Time until the flown plan ends, s.
     pub fn left_s(&self, time_s: f64) -> Option<f64> {
-        self.space.left_s(time_s).or_else(|| self.flown.as_ref().map(|flown| flown.left_s(time_s)))
-    }
-
-    /// Plans the landing from a state at a time. If the preferred problem ends in a hard landing, it tries the
-    /// fallback.
-    pub fn plan(
-        &mut self,
-        time_s: f64,
-        state: &RigidState,
-        preferred: &PoweredSituation<'_>,
-        fallback: Option<&PoweredSituation<'_>>,
-    ) {
-        let plane = *self.plane.get_or_insert_with(|| {
-            Plane::choose(&state.position_m, &state.velocity_m_s, &preferred.wind_m_s)
-        });
-        if self.is_flown_out(time_s) {
-            return;
-        }
-        let nothing = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
-        if let Some(space) = &self.settings.space {
-            let planned = self.space.plan(time_s, &plane, state, preferred, &self.settings, space);
-            self.report = planned.unwrap_or(nothing);
-            return;
-        }
-        let Some((problem, situation)) = self.solve_either(time_s, &plane, state, preferred, fallback) else {
-            self.report = nothing;
-            return;
-        };
-        self.take(time_s, &problem, situation);
-    }
-
-    /// Solves the landing into the trial: the preferred problem, unless it ends hard and the fallback ends softer.
-    fn solve_either<'s, 'a>(
-        &mut self,
-        time_s: f64,
-        plane: &Plane,
-        state: &RigidState,
-        preferred: &'s PoweredSituation<'a>,
-        fallback: Option<&'s PoweredSituation<'a>>,
-    ) -> Option<(FreeTimeProblem, &'s PoweredSituation<'a>)> {
-        self.workspace.allow(self.settings.max_passes);
-        let mut problem = self.pose(plane, state, preferred)?;
-        self.solve(time_s, &mut problem, preferred);
-        let ended_m_s = ended_m_s(&self.trial);
-        let posed = fallback
-            .filter(|_| ended_m_s < SOFT_M_S && !self.workspace.is_spent())
-            .and_then(|fallback| Some((self.pose(plane, state, fallback)?, fallback)));
-        let Some((mut other, fallback)) = posed else { return Some((problem, preferred)) };
-        core::mem::swap(&mut self.trial, &mut self.set_aside);
-        self.solve(time_s, &mut other, fallback);
-        if ended_m_s < self::ended_m_s(&self.trial) {
-            return Some((other, fallback));
-        }
-        core::mem::swap(&mut self.trial, &mut self.set_aside);
-        Some((problem, preferred))
+        self.flown.as_ref().map(|plan| plan.left_s(time_s))
     }
 
     /// Whether the plan ends so soon that it is flown to its end without a new plan.
@@ -202,119 +157,129 @@ impl PoweredGuidance {
         self.left_s(time_s).is_some_and(|left_s| left_s < self.settings.flown_out_s)
     }
 
-    /// Solves a problem into the trial, from the flown plan.
-    fn solve(&mut self, time_s: f64, problem: &mut FreeTimeProblem, situation: &PoweredSituation<'_>) {
-        let earlier = self.flown.as_ref().map(|flown| (&flown.plan, time_s - flown.begins_s));
-        if !self.flown.as_ref().is_some_and(|flown| flown.upright) {
-            solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
-            let tilts = largest_tilt_rad(&self.trial) > self.settings.tilt_max_deg.to_radians();
-            if !tilts || self.workspace.is_spent() {
-                return;
-            }
-        }
-        // A loop satisfies the equations, but no vehicle can fly it in air. Solve with a higher cost of tilt. While that
-        // lands it is kept: the other cost would lead back to the loop, in each tick.
-        problem.landing.state_weights[2] *= UPRIGHT_COST_FACTOR;
-        solve_free_time_into(problem, &Ahead(situation), earlier, &mut self.workspace, &mut self.trial);
-    }
-
-    fn pose(
-        &self,
-        plane: &Plane,
-        state: &RigidState,
-        situation: &PoweredSituation<'_>,
-    ) -> Option<FreeTimeProblem> {
-        let wind_m_s = situation.wind_m_s.dot(&plane.along);
-        let initial = plane.project(state, situation.feet_below_cg_m, wind_m_s);
-        let along_m_s = state.velocity_m_s.dot(&plane.along);
-        let settings = &self.settings;
-        let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, initial.z_m)?;
-        let horizon_s = self.flown.as_ref().map_or(latest_s, |flown| flown.plan.final_time_s.min(latest_s));
-        let intervals =
-            (libm::ceil(horizon_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS);
-        let step_s = horizon_s / intervals as f64;
-        let target_x_m = if situation.lands_in_place {
-            here_m(initial.x_m, along_m_s, horizon_s)
-        } else {
-            settings.homing.target_m(initial.x_m, along_m_s, horizon_s)
-        };
-        let settled_nodes = (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
-        let landing = Problem {
-            model: situation.model(),
-            initial,
-            step_s: settings.interval_s,
-            thrust_n: Vec::new(),
-            mass_kg: Vec::new(),
-            target: PlanarState { x_m: target_x_m, ..Plane::rest(wind_m_s) },
-            state_weights: settings.weights.state_diagonal(),
-            input_weight: settings.weights.delta,
-            gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
-            x_final_m: settings.x_final_m,
-            final_box: Some(FinalBox { settled_nodes, ..settings.final_box }),
-            altitude_min_m: Some(0.0),
-            floor_rise_m_s: settings.floor_rise_m_s,
-            // The plan itself shows how soft the landing can be; a bound from vertical thrust would only hide it.
-            touchdown_speed_max_m_s: f64::MAX,
-            solver: settings.solver,
-        };
-        Some(FreeTimeProblem {
-            landing,
-            intervals,
-            earliest_s,
-            latest_s,
-            target_drift_m_s: -wind_m_s,
-            max_solves: settings.max_solves,
-        })
-    }
-
-    /// Keeps the trial as the flown plan if it is good enough.
-    fn take(&mut self, time_s: f64, problem: &FreeTimeProblem, situation: &PoweredSituation<'_>) {
-        let solution = &self.trial.solution;
-        let largest_tilt_rad = largest_tilt_rad(&self.trial);
-        let usable = !solution.inputs_rad.is_empty()
-            && solution.states.iter().all(PlanarState::is_finite)
-            && largest_tilt_rad < PLAN_TILT_MAX_RAD
-            && solution.inputs_rad.iter().all(|input| input.is_finite());
-        // Too low for any landing: a plan would turn the body across the air to brake, and gain the same speed sideways.
-        let too_low = !situation.high && solution.states.last().is_some_and(|last| last.u_m_s < HARD_M_S);
-        let lands = solution.status == SolveStatus::Converged
-            && solution.condition_miss <= self.settings.landing_miss;
-        let left_s = self.flown.as_ref().map(|flown| flown.left_s(time_s));
-        let level = ControlLevel::of_plan(usable, left_s, too_low, lands);
-        let touchdown = solution.states.last().copied().unwrap_or_default();
-        self.report = PoweredReport {
-            level,
-            status: solution.status,
-            iterations: solution.iterations,
-            passes: self.workspace.passes(),
-            kkt_stationarity: solution.kkt_stationarity,
-            kkt_feasibility: solution.kkt_feasibility,
-            cost: solution.cost,
-            condition_miss: solution.condition_miss,
-            touchdown_in_s: self.trial.final_time_s,
-            touchdown,
-            largest_tilt_rad,
-        };
-        if !usable {
+    /// Plans the landing from a state at a time, and keeps the plan if it is finite.
+    pub fn plan(&mut self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) {
+        if self.is_flown_out(time_s) {
             return;
         }
-        let step_s = self.trial.final_time_s / problem.intervals as f64;
-        let per_newton = situation.arm_m / situation.inertia_kg_m2;
-        let ahead = Ahead(situation);
-        let flown = self.flown.get_or_insert_with(|| core::mem::take(&mut self.unused));
-        flown.begins_s = time_s;
-        flown.upright = lands && problem.landing.state_weights[2] > self.settings.weights.theta;
-        flown.turning_rad_s2.clear();
-        flown.turning_rad_s2.extend(
-            (0..problem.intervals)
-                .map(|k| per_newton * ahead.mean_thrust_n(k as f64 * step_s, (k + 1) as f64 * step_s)),
-        );
-        core::mem::swap(&mut flown.plan, &mut self.trial);
+        let Some(outcome) = self.search(time_s, state, situation) else {
+            self.report = PoweredReport { level: ControlLevel::Stabiliser, ..PoweredReport::idle() };
+            return;
+        };
+        let usable = self.found.is_finite();
+        // Too low for any landing: upright brakes just as well. High above the ground it would stop the vehicle there.
+        let too_low = !situation.high && self.found.end_m_s() < HARD_M_S;
+        let lands = outcome.status == Status::Converged && outcome.miss <= self.settings.landing_miss;
+        self.report = PoweredReport {
+            level: ControlLevel::of_plan(usable, self.left_s(time_s), too_low, lands),
+            status: outcome.status,
+            iterations: outcome.iterations,
+            passes: self.workspace.passes(),
+            kkt_stationarity: outcome.stationarity,
+            kkt_feasibility: outcome.feasibility,
+            cost: outcome.cost,
+            condition_miss: outcome.miss,
+            touchdown_in_s: self.found.length_s(),
+            touchdown_m_s: self.found.end_m_s(),
+            largest_tilt_rad: self.found.largest_tilt_rad(),
+        };
+        if usable {
+            core::mem::swap(
+                self.flown.get_or_insert_with(|| core::mem::take(&mut self.unused)),
+                &mut self.found,
+            );
+        }
     }
 
-    /// Share of the fins' drag area that the plan has at a time, if it is one in space.
+    /// Searches the path and the final time into `found`. The outcome has the iterations of all solves; there is none if the
+    /// thrust never carries the vehicle.
+    ///
+    /// By the envelope theorem the derivative of the Lagrangian by the final time says on which side a better one lies.
+    fn search(
+        &mut self,
+        time_s: f64,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+    ) -> Option<Outcome> {
+        let settings = self.settings;
+        let height_m = state.position_m.z - situation.feet_below_cg_m;
+        let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, height_m)?;
+        let mut final_time_s = self.left_s(time_s).unwrap_or(earliest_s).clamp(earliest_s, latest_s);
+        let most = self.room.unwrap_or(MOST_INTERVALS);
+        let intervals =
+            (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, most);
+
+        let pushes = self.problem.take().map_or_else(|| Vec::with_capacity(MOST_INTERVALS), |old| old.pushes);
+        let mut problem = Problem { pushes, ..posed(situation, &settings, state) };
+        let stretch = |problem: &mut Problem, to_s: f64| {
+            stretch(problem, situation, &settings, to_s, intervals);
+        };
+        stretch(&mut problem, final_time_s);
+        let is_warm = self
+            .flown
+            .as_ref()
+            .is_some_and(|flown| self.warm.take_last(flown, intervals, problem.end.settled_nodes));
+        let warm = is_warm.then(|| self.warm.start());
+        self.workspace.allow(settings.max_passes);
+        let mut best = nmpc::solve(&mut self.workspace, &problem, warm.as_ref());
+        self.found.read(&self.workspace, &problem, time_s);
+
+        let mut iterations = best.iterations;
+        let mut step_s = FIRST_STEP_S;
+        for _ in 1..settings.max_solves {
+            if self.workspace.is_spent() {
+                break;
+            }
+            let mut lagrangian = |at_s: f64| {
+                stretch(&mut problem, at_s);
+                nmpc::lagrangian(&mut self.workspace, &problem, &self.found.start())
+            };
+            let slope = lagrangian(final_time_s + DIFFERENCE_S) - lagrangian(final_time_s - DIFFERENCE_S);
+            let to_s = if slope > 0.0 { final_time_s - step_s } else { final_time_s + step_s };
+            let to_s = to_s.clamp(earliest_s, latest_s);
+            if !slope.is_finite() || (to_s - final_time_s).abs() < LEAST_STEP_S {
+                break;
+            }
+            stretch(&mut problem, to_s);
+            let outcome = nmpc::solve(&mut self.workspace, &problem, Some(&self.found.start()));
+            iterations += outcome.iterations;
+            if outcome.merit < best.merit {
+                self.trial.read(&self.workspace, &problem, time_s);
+                core::mem::swap(&mut self.trial, &mut self.found);
+                (best, final_time_s) = (outcome, to_s);
+            } else {
+                step_s *= SHORTER;
+            }
+        }
+        self.problem = Some(problem);
+        Some(Outcome { iterations, ..best })
+    }
+
+    /// Solves the landing that [`plan`](Self::plan) solves, outside the flight; `None` if there is none. `self` is the
+    /// memory before the plan.
+    pub(crate) fn inspect(
+        &self,
+        time_s: f64,
+        state: &RigidState,
+        situation: &PoweredSituation<'_>,
+    ) -> Option<LandingSolved> {
+        if self.is_flown_out(time_s) {
+            return None;
+        }
+        let mut again = self.clone();
+        let outcome = again.search(time_s, state, situation)?;
+        let (mut problem, plan) = (again.problem?, again.found);
+        stretch(&mut problem, situation, &self.settings, plan.length_s(), plan.inputs().len());
+        let mut workspace = Workspace::default();
+        let cold = nmpc::solve(&mut workspace, &problem, None);
+        let mut cold_plan = Plan::default();
+        cold_plan.read(&workspace, &problem, time_s);
+        Some(LandingSolved { problem, warm: (outcome, plan), cold: (cold, cold_plan) })
+    }
+
+    /// Share of the fins' drag area that the plan has at a time.
     pub fn fin_share(&self, time_s: f64) -> Option<f64> {
-        let planned = self.space.fin_share(time_s)?;
+        let planned = self.flown.as_ref()?.fin_share(time_s)?;
         // Too low for any landing: brake.
         Some(if self.report.level == ControlLevel::Stabiliser { 1.0 } else { planned })
     }
@@ -328,63 +293,157 @@ impl PoweredGuidance {
         if quiet_s > 0.0 && situation.touches_within(quiet_s, state) {
             return Aim::leaning_at_most(&state.nose_in_world(), CONTACT_LEAN_RAD);
         }
-        self.planned_aim(time_s, state, situation)
-    }
-
-    fn planned_aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
         let thrust_n = situation.burn.thrust_n(situation.burning_s);
         let level_m_s2 = |push_m_s2: f64| {
-            let most = self.settings.across_lean_max_deg.to_radians();
+            let most = self.settings.upright_lean_max_deg.to_radians();
             libm::atan(push_m_s2 * situation.mass_kg() / thrust_n.max(1.0)).clamp(-most, most)
         };
+        let decay = self.settings.upright_decay_per_s;
+        let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
+        if let Some(aim) = flown.and_then(|plan| {
+            self.planned_aim(plan, time_s, state, |astray_m_s| level_m_s2(-decay * astray_m_s))
+        }) {
+            return aim;
+        }
+        // Upright, with a lean against the sideways velocity.
         let air_m_s2 = situation.air_m_s2(state);
-        let decay = self.settings.across_decay_per_s;
         let lean = |direction: &Vector3<f64>| {
             libm::tan(level_m_s2(-decay * state.velocity_m_s.dot(direction) - air_m_s2.dot(direction)))
         };
-        if self.report.level != ControlLevel::Stabiliser
-            && let Some(aim) =
-                self.space.aim(time_s, state, &self.settings, |astray_m_s| level_m_s2(-decay * astray_m_s))
-        {
-            return aim;
+        let nose = Vector3::z() + Vector3::x() * lean(&Vector3::x()) + Vector3::y() * lean(&Vector3::y());
+        Aim::at(nose / nose.norm())
+    }
+
+    /// The direction that a plan wants at a time; `None` after its end. `push` makes a lean, as a tangent, from a velocity to
+    /// be lost.
+    fn planned_aim(
+        &self,
+        plan: &Plan,
+        time_s: f64,
+        state: &RigidState,
+        push: impl Fn(f64) -> f64,
+    ) -> Option<Aim> {
+        let settings = &self.settings;
+        let aim = plan.aim(time_s)?;
+        let left_s = plan.left_s(time_s);
+        if left_s < settings.quiet_s {
+            return Some(Aim::at(state.nose_in_world()));
         }
-        let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
-        let Some((flown, plane)) = flown.zip(self.plane.as_ref()) else {
-            // Upright, with a lean against the sideways velocity.
-            let nose = Vector3::z() + Vector3::x() * lean(&Vector3::x()) + Vector3::y() * lean(&Vector3::y());
-            return Aim::at(nose / nose.norm());
-        };
-        let (theta_rad, q_rad_s, turning_rad_s2) = flown.elevation(time_s);
-        let left_s = flown.left_s(time_s);
-        if left_s < self.settings.quiet_s {
-            return Aim::at(state.nose_in_world());
+        if left_s >= settings.flown_out_s {
+            return Some(aim);
         }
-        // Across the plane the vehicle homes to the pad while there is time, unless homing is off.
-        let homing_per_s2 = if situation.lands_in_place { 0.0 } else { self.settings.across_homing_per_s2 };
-        let homing = homing_per_s2
-            * ((left_s - HOMING_ENDS_S) / HOMING_ENDS_S).clamp(0.0, 1.0)
-            * state.position_m.dot(&plane.across).clamp(-HOMING_MOST_M, HOMING_MOST_M);
-        let along = &plane.along;
         // A plan that is flown to its end needs a correction of the velocity.
-        let along_rad = if left_s < self.settings.flown_out_s {
-            let astray_m_s =
-                state.velocity_m_s.dot(along) - flown.along_m_s(time_s, situation.wind_m_s.dot(along));
-            level_m_s2(-decay * astray_m_s).clamp(-END_LEAN_MAX_RAD, END_LEAN_MAX_RAD)
-        } else {
-            0.0
-        };
-        let across = libm::tan(level_m_s2(
-            -decay * state.velocity_m_s.dot(&plane.across) - air_m_s2.dot(&plane.across) - homing,
-        ));
-        Aim {
-            nose_in_world: plane.nose(theta_rad - along_rad, across),
-            rate_in_world_rad_s: plane.turning(q_rad_s),
-            acceleration_in_world_rad_s2: plane.turning(turning_rad_s2),
-        }
+        let [x_m_s, y_m_s] = plan.level_m_s(time_s);
+        let lean = |astray_m_s: f64| push(astray_m_s).clamp(-END_LEAN_MAX_RAD, END_LEAN_MAX_RAD);
+        let nose = aim.nose_in_world
+            + Vector3::x() * lean(state.velocity_m_s.x - x_m_s)
+            + Vector3::y() * lean(state.velocity_m_s.y - y_m_s);
+        Some(Aim { nose_in_world: nose / nose.norm(), ..aim })
     }
 }
 
-// Chooses the landing point of a plan along its plane.
+// Poses the landing of a tick for the solver.
+
+/// The state of a landing in space.
+fn initial(state: &RigidState, feet_below_cg_m: f64) -> State {
+    let nose = state.nose_in_world();
+    let p = libm::asin(nose.x.clamp(-1.0, 1.0));
+    let r = libm::atan2(nose.y, nose.z);
+    let moving = (state.world_from_body * state.rate_rad_s).cross(&nose);
+    let (sin_r, cos_r) = libm::sincos(r);
+    let cos_p = libm::cos(p).max(1e-3);
+    let (position, velocity) = (&state.position_m, &state.velocity_m_s);
+    [
+        position.x,
+        position.y,
+        position.z - feet_below_cg_m,
+        velocity.x,
+        velocity.y,
+        velocity.z,
+        p,
+        r,
+        moving.x / cos_p,
+        (moving.y * cos_r - moving.z * sin_r) / cos_p,
+    ]
+}
+
+/// The landing of a tick, except what follows from its final time.
+fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &RigidState) -> Problem {
+    let per_m = 0.5 * situation.air_density_kg_m3;
+    let end = &settings.final_box;
+    let initial = initial(state, situation.feet_below_cg_m);
+    Problem {
+        initial,
+        step_s: settings.interval_s,
+        pushes: Vec::new(),
+        drag: Drag {
+            fins: per_m * situation.fin_drag_area_m2,
+            axial: per_m * situation.body_drag_area_m2,
+            crossflow: per_m * situation.crossflow_area_m2,
+        },
+        wind_m_s: [situation.wind_m_s.x, situation.wind_m_s.y],
+        gravity_m_s2: situation.gravity_m_s2,
+        target_m: [0.0; 2],
+        weights: Weights {
+            place: settings.weights.x,
+            lean: settings.weights.theta,
+            rate: settings.weights.q,
+            gimbal: settings.weights.delta,
+            fins: settings.weights.fins,
+        },
+        gimbal_limit_rad: settings.gimbal_deg.to_radians().min(situation.gimbal_limit_rad),
+        lean_max_rad: settings.tilt_max_deg.to_radians(),
+        end: End {
+            vertical_m_s: [end.u_min_m_s, end.u_max_m_s],
+            lateral_m_s: end.w_m_s,
+            lean_rad: end.pitch_error_deg.to_radians(),
+            rate_rad_s: end.pitch_rate_deg_s.to_radians(),
+            settled_nodes: 1,
+        },
+        floor_rise_m_s: settings.floor_rise_m_s,
+        guess_lean_rad: settings.guess_lean_deg.to_radians(),
+        // The first quarter of the turn brakes the motion sideways.
+        guess_towards_rad: libm::atan2(-initial[4], -initial[3]),
+        solver: settings.solver,
+    }
+}
+
+/// Fills in what follows from the final time, s from now, and the number of intervals. It allocates only if there never
+/// were as many.
+fn stretch(
+    problem: &mut Problem,
+    situation: &PoweredSituation<'_>,
+    settings: &PoweredSettings,
+    final_time_s: f64,
+    intervals: usize,
+) {
+    let step_s = final_time_s / intervals as f64;
+    problem.step_s = step_s;
+    problem.pushes.clear();
+    problem.pushes.extend((0..intervals).map(|k| {
+        let (from_s, to_s) = (k as f64 * step_s, (k + 1) as f64 * step_s);
+        let (thrust_n, mass_kg) =
+            (situation.mean_thrust_n(from_s, to_s), situation.mean_mass_kg(from_s, to_s));
+        Push {
+            thrust_m_s2: thrust_n / mass_kg,
+            turning_rad_s2: thrust_n * situation.arm_m / situation.inertia_kg_m2,
+            per_kg: 1.0 / mass_kg,
+        }
+    }));
+    let target_m = |place_m: f64, velocity_m_s: f64| {
+        if situation.lands_in_place {
+            here_m(place_m, velocity_m_s, final_time_s)
+        } else {
+            settings.homing.target_m(place_m, velocity_m_s, final_time_s)
+        }
+    };
+    let from = &problem.initial;
+    problem.target_m = [target_m(from[0], from[3]), target_m(from[1], from[4])];
+    problem.end.settled_nodes =
+        (libm::round(settings.settled_s / step_s) as usize + 1).min(intervals / 2).max(1);
+}
+
+// Chooses the landing point of a plan, in each level direction alone.
 
 /// Limits of the homing to the pad: a plan lands only as near as necessary, and diverts no farther than a moderate lean
 /// reaches.
@@ -398,7 +457,7 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// The landing point along the plane, m from the pad, at a velocity of `along_m_s` with `left_s` to go.
+    /// The landing point in one direction, m from the pad, at a velocity of `along_m_s` with `left_s` to go.
     fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
         let free_m = here_m(x_m, along_m_s, left_s);
         let reach_m = self.reach_m_s2 * left_s * left_s;
@@ -423,7 +482,7 @@ mod tests {
     // What the guidance flies when no plan is good.
 
     /// A vehicle in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3 m/s: it has to turn away more
-    /// thrust than it can without hovering. mk2 plans in a plane, mk3 in space.
+    /// thrust than it can without hovering.
     fn too_high(mission: &str, high: bool) -> PoweredGuidance {
         let mission = builtin(mission).unwrap().unwrap();
         let feet_below_cg_m = 0.44;
@@ -453,7 +512,7 @@ mod tests {
         };
         // Without a bound: a cold search that is cut short has not found yet how hard this ends.
         let mut guidance = PoweredGuidance::new(PoweredSettings { max_passes: None, ..mission.powered });
-        guidance.plan(0.0, &state, &situation, None);
+        guidance.plan(0.0, &state, &situation);
         guidance
     }
 
@@ -461,7 +520,7 @@ mod tests {
     fn a_vehicle_that_is_high_flies_a_hard_plan_and_does_not_brake_upright() {
         for mission in ["mk2", "mk3"] {
             let low = too_high(mission, false);
-            assert!(low.report().touchdown.u_m_s < HARD_M_S, "{mission}: {:?}", low.report());
+            assert!(low.report().touchdown_m_s < HARD_M_S, "{mission}: {:?}", low.report());
             assert_eq!(low.report().level, ControlLevel::Stabiliser, "{mission}");
 
             let high = too_high(mission, true);

@@ -1,15 +1,10 @@
-//! What the landing burn is set to and what it reports: its settings in a mission, the report of a tick, and how a replay
-//! reads and changes the guidance.
+//! What the landing burn is set to and what it reports: its settings in a mission, and the report of a tick.
 
-use nmpc::free_time::{FreeTimeProblem, FreeTimeSolution, pose, solve_free_time};
-use nmpc::{Problem, SolveStatus};
+use nmpc::{SolverLimits, Status};
 use serde::{Deserialize, Serialize};
 
-use super::situation::Ahead;
-use super::{Homing, Plane, PoweredGuidance, PoweredSituation, SpaceSettings};
-use crate::vehicle::dynamics::PlanarState;
-use crate::vehicle::mission::{FinalBox, SolverLimits, StateWeights};
-use crate::vehicle::rigid::RigidState;
+use super::Homing;
+use crate::vehicle::mission::{FinalBox, PlanWeights};
 
 /// What decides where the nose points; the levels in flight are ordered from best to worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -83,7 +78,7 @@ pub struct PoweredReport {
     /// The source of the nose's direction.
     pub level: ControlLevel,
     /// How the last solve ended.
-    pub status: SolveStatus,
+    pub status: Status,
     /// Iterations over all final times tried.
     pub iterations: usize,
     /// Work of the tick: the solver's passes over an interval, as in [`PoweredSettings::max_passes`].
@@ -98,8 +93,8 @@ pub struct PoweredReport {
     pub condition_miss: f64,
     /// Time to the planned touchdown, s.
     pub touchdown_in_s: f64,
-    /// The planned state at touchdown; velocities are through the air.
-    pub touchdown: PlanarState,
+    /// Vertical velocity at the planned touchdown, m/s.
+    pub touchdown_m_s: f64,
     /// Largest planned tilt, rad.
     pub largest_tilt_rad: f64,
 }
@@ -109,7 +104,7 @@ impl PoweredReport {
     pub fn idle() -> Self {
         Self {
             level: ControlLevel::Idle,
-            status: SolveStatus::NotRun,
+            status: Status::NotRun,
             iterations: 0,
             passes: 0,
             kkt_stationarity: 0.0,
@@ -117,13 +112,11 @@ impl PoweredReport {
             cost: 0.0,
             condition_miss: 0.0,
             touchdown_in_s: 0.0,
-            touchdown: PlanarState::default(),
+            touchdown_m_s: 0.0,
             largest_tilt_rad: 0.0,
         }
     }
 }
-
-// The settings of the landing burn in a mission.
 
 /// The settings of the landing burn.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -132,15 +125,15 @@ pub struct PoweredSettings {
     /// Largest length of a planned interval, s.
     pub interval_s: f64,
     /// Weights of the plan.
-    pub weights: StateWeights,
-    /// A plan that tilts further than this is planned again with more weight on being upright, degrees.
+    pub weights: PlanWeights,
+    /// Size of the lean of the cold guesses, degrees.
+    pub guess_lean_deg: f64,
+    /// Largest lean of a plan in north and in west, degrees.
     pub tilt_max_deg: f64,
     /// Largest planned gimbal angle on either side, degrees; the attitude loop has the rest of the travel.
     pub gimbal_deg: f64,
-    /// Choice of the landing point along the plane.
+    /// Choice of the landing point.
     pub homing: Homing,
-    /// Largest horizontal distance from that point at the end, m.
-    pub x_final_m: f64,
     /// Box in which the plan ends; its lateral speed is over the ground.
     #[serde(rename = "final")]
     pub final_box: FinalBox,
@@ -160,99 +153,16 @@ pub struct PoweredSettings {
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
     /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times
-    /// ([`stages::Workspace::allow`](nmpc::free_time::FreeTimeWorkspace::allow)): the best plan until then stands, and the next
-    /// tick goes on from it. Without it there is no bound.
+    /// (`stages::Workspace::allow`): the best plan until then stands, and the next tick goes on from it. Without it there is
+    /// no bound.
     #[serde(default)]
     pub max_passes: Option<usize>,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
     pub landing_miss: f64,
-    /// Decay rate of the velocity across the plane, 1/s.
-    pub across_decay_per_s: f64,
-    /// Acceleration towards the pad across the plane per metre, 1/s^2.
-    pub across_homing_per_s2: f64,
-    /// Largest lean across the plane, degrees.
-    pub across_lean_max_deg: f64,
-    /// If it is there, the landing is planned in space, not in a plane.
-    #[serde(default)]
-    pub space: Option<SpaceSettings>,
+    /// Without a plan, and at the end of one, the vehicle leans against a velocity that is to be lost: decay rate, 1/s.
+    pub upright_decay_per_s: f64,
+    /// Largest such lean, degrees.
+    pub upright_lean_max_deg: f64,
     /// Limits of the solver.
     pub solver: SolverLimits,
 }
-
-// Reads the guidance's memory and changes its settings, for a replay.
-
-/// A landing that is planned again outside the flight.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LandingSolved {
-    /// The problem at the final time of the warm plan, with its conditions, limits and motor.
-    pub problem: Problem,
-    /// Solved as in flight, from the previous plan.
-    pub warm: FreeTimeSolution,
-    /// Solved cold.
-    pub cold: FreeTimeSolution,
-}
-
-impl PoweredGuidance {
-    /// The plane of the landing, once there is one.
-    pub fn plane(&self) -> Option<&Plane> {
-        self.plane.as_ref()
-    }
-
-    /// The planned planar states and the step between them, s, if there is a plan. They are in the frame that moves
-    /// with the air along the plane; [`Plane::over_ground`] converts them.
-    pub fn planned(&self) -> Option<(&[PlanarState], f64)> {
-        if let Some(in_space) = self.space.projected() {
-            return Some(in_space);
-        }
-        let flown = self.flown.as_ref()?;
-        Some((&flown.plan.solution.states, flown.plan.solution.step_s))
-    }
-
-    /// The same memory with other settings.
-    #[must_use]
-    pub(crate) fn reconfigured(&self, settings: &PoweredSettings) -> Self {
-        Self { settings: *settings, ..self.clone() }
-    }
-
-    /// Solves the landing that [`plan`](Self::plan) solves, outside the flight; `None` if there is none. `self` is the
-    /// memory before the plan, `decided` the memory after it.
-    pub(crate) fn inspect(
-        &self,
-        decided: &Self,
-        time_s: f64,
-        state: &RigidState,
-        preferred: &PoweredSituation<'_>,
-        fallback: Option<&PoweredSituation<'_>>,
-    ) -> Option<LandingSolved> {
-        let plane = decided.plane?;
-        if self.is_flown_out(time_s) || self.settings.space.is_some() {
-            return None;
-        }
-        let mut again = self.clone();
-        let (posed, situation) = again.solve_either(time_s, &plane, state, preferred, fallback)?;
-        let (ahead, warm) = (Ahead(situation), again.trial);
-        let cold = solve_free_time(&posed, &ahead, None);
-        Some(LandingSolved { problem: at_final_time(&posed, &ahead, warm.final_time_s), warm, cold })
-    }
-}
-
-impl PoweredGuidance {
-    pub(crate) fn inspect_space(
-        &self,
-        time_s: f64,
-        state: &RigidState,
-        preferred: &PoweredSituation<'_>,
-    ) -> Option<super::SpaceSolved> {
-        let space = self.settings.space.as_ref().filter(|_| !self.is_flown_out(time_s))?;
-        self.space.inspect(time_s, state, preferred, &self.settings, space)
-    }
-}
-
-/// The problem of one final time.
-fn at_final_time(posed: &FreeTimeProblem, ahead: &Ahead<'_, '_>, final_time_s: f64) -> Problem {
-    let mut problem = posed.landing.clone();
-    pose(posed, ahead, final_time_s, &mut problem);
-    problem
-}
-
-// The guidance's memory, for the pilot's digest.

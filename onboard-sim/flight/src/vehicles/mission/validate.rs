@@ -58,16 +58,12 @@ pub(super) fn validate(mission: &Mission) -> Check {
     aim(&mission.aim)?;
     ranges::arming(&mission.arming)?;
     ranges::gate(&mission.gate)?;
-    ranges::touchdown_limits(&mission.touchdown_limits)?;
     legs(&mission.leg_limits)
 }
 
 fn hedges(mission: &Mission) -> Check {
     not_negative("caution_sigmas", mission.caution_sigmas)?;
     positive("caution_fades_s", mission.caution_fades_s)?;
-    not_negative("fin_sigmas", mission.fin_sigmas)?;
-    share("fin_place", mission.fin_place)?;
-    share("fins_kept", mission.fins_kept)?;
     angle_below_right("soft_tilt_deg", mission.soft_tilt_deg)?;
     angle_below_right("fin_soft_tilt_deg", mission.fin_soft_tilt_deg)?;
     not_negative("settle_s", mission.settle_s)
@@ -120,13 +116,6 @@ fn powered(settings: &PoweredSettings) -> Check {
     angle_below_right("powered.gimbal_deg", settings.gimbal_deg)?;
     positive("powered.homing.near_m", settings.homing.near_m)?;
     not_negative("powered.homing.reach_m_s2", settings.homing.reach_m_s2)?;
-    positive("powered.x_final_m", settings.x_final_m)?;
-    require(
-        settings.final_box.settled_nodes >= 1,
-        "powered.final.settled_nodes",
-        settings.final_box.settled_nodes,
-        "1 or more",
-    )?;
     ranges::final_box("powered", &settings.final_box)?;
     not_negative("powered.floor_rise_m_s", settings.floor_rise_m_s)?;
     not_negative("powered.latest_after_s", settings.latest_after_s)?;
@@ -147,14 +136,9 @@ fn powered(settings: &PoweredSettings) -> Check {
         "1 or more",
     )?;
     positive("powered.landing_miss", settings.landing_miss)?;
-    not_negative("powered.across_decay_per_s", settings.across_decay_per_s)?;
-    not_negative("powered.across_homing_per_s2", settings.across_homing_per_s2)?;
-    angle_below_right("powered.across_lean_max_deg", settings.across_lean_max_deg)?;
-    if let Some(space) = &settings.space {
-        angle_below_right("powered.space.guess_lean_deg", space.guess_lean_deg)?;
-        // Without a weight the fins of a plan are not unique.
-        positive("powered.space.fin_weight", space.fin_weight)?;
-    }
+    not_negative("powered.upright_decay_per_s", settings.upright_decay_per_s)?;
+    angle_below_right("powered.upright_lean_max_deg", settings.upright_lean_max_deg)?;
+    angle_below_right("powered.guess_lean_deg", settings.guess_lean_deg)?;
     ranges::solver("powered", &settings.solver)
 }
 

@@ -8,6 +8,7 @@
 mod build;
 mod riding;
 
+use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::RigidState;
@@ -17,7 +18,7 @@ pub use self::build::WorldError;
 use self::riding::Stack;
 use crate::world::aero::{Configuration, Flow, Load, Parachute, Plume, Shape};
 use crate::world::body::{Inertia, Loads};
-use crate::world::ground::{Ground, Rest, RestOutcome, Touchdown};
+use crate::world::ground::{FirstContact, Ground, Rest, RestOutcome};
 use crate::world::hanging::Hanging;
 use crate::world::motor::Motor;
 use crate::world::servo::{Linkage, Servo};
@@ -84,7 +85,7 @@ pub struct World {
     mass: MassProperties,
     specific_force_m_s2: Vector3<f64>,
     angular_acceleration_rad_s2: Vector3<f64>,
-    touchdown: Option<Touchdown>,
+    touchdown: Option<FirstContact>,
     rest: Option<Rest>,
     /// The booster with all that belongs to it, until it is separated.
     stack: Option<Box<Stack>>,
@@ -329,16 +330,12 @@ impl World {
         self.angular_acceleration_rad_s2 = angular_acceleration / parts as f64;
     }
 
-    fn touchdown_at(&self, time_s: f64, state: &RigidState) -> Touchdown {
-        let (velocity, rate) = (&state.velocity_m_s, &state.rate_rad_s);
-        Touchdown {
+    fn touchdown_at(&self, time_s: f64, state: &RigidState) -> FirstContact {
+        FirstContact {
             time_s,
             state: *state,
-            vertical_m_s: velocity.z,
-            lateral_m_s: libm::hypot(velocity.x, velocity.y),
-            tilt_rad: state.tilt_rad(),
-            rate_rad_s: rate.norm_squared().sqrt(),
-            cross_rate_rad_s: libm::hypot(rate.y, rate.z),
+            // The foot that touches the ground has no height.
+            over_ground: Touchdown::over_ground(state, 0.0),
             thrust_n: self.motor.thrust_n(time_s),
             weight_n: self.weight_n(),
         }
@@ -507,7 +504,7 @@ impl World {
     }
 
     /// The first contact with the ground, if there was one.
-    pub fn touchdown(&self) -> Option<&Touchdown> {
+    pub fn touchdown(&self) -> Option<&FirstContact> {
         self.touchdown.as_ref()
     }
 

@@ -355,7 +355,7 @@ fn a_new_station_gets_the_limits() {
         Ok(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => Some(limits),
         _ => None,
     });
-    assert!((limits.unwrap().u_m_s - 1.0).abs() < 1e-6, "of the legs");
+    assert!((limits.unwrap().vertical_m_s - 1.0).abs() < 1e-6, "of the legs");
 }
 
 #[test]

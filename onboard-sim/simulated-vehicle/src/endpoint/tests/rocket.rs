@@ -308,7 +308,7 @@ fn a_link_that_is_lost_changes_nothing_about_the_flight() {
     let mut whole = Airborne::let_go("field");
     whole.run_while(|rocket| !rocket.is_over());
     assert_eq!(lost.rocket.judged(), whole.rocket.judged());
-    assert!(lost.rocket.judged().unwrap().landed);
+    assert!(lost.rocket.judged().unwrap().landing.stands);
 }
 
 /// Outcome: the request is carried out later by the delay; its answer comes later by twice the delay.

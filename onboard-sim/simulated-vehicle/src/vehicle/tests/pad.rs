@@ -50,7 +50,7 @@ fn from_the_pad_it_passes_every_phase_and_lands() {
             assert!(said(&events, words), "{words}: {events:?}");
         }
         assert!(!said(&events, "no ascent is flown"));
-        assert!(rocket.judged().unwrap().landed, "{dispersion}");
+        assert!(rocket.judged().unwrap().landing.stands, "{dispersion}");
         let fell_from_m = rocket.sortie.fell_from().position_m.z;
         assert!((270.0..335.0).contains(&fell_from_m), "{fell_from_m}");
     }
@@ -93,7 +93,7 @@ fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events).last(), Some(&Phase::Touchdown));
         assert!(phases(&events).contains(&Phase::Chute) && !phases(&events).contains(&Phase::Ignition));
-        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        let impact_m_s = rocket.judged().unwrap().touchdown.vertical_m_s;
         assert!(impact_m_s.abs() < 10.0, "{impact_m_s}");
     }
 }
@@ -134,7 +134,7 @@ fn an_abort_between_the_light_and_the_lift_off_ends_under_the_parachute() {
     let seen = [Phase::PadIdle, Phase::Boost, Phase::Coast, Phase::Chute, Phase::Touchdown];
     assert_eq!(phases(&events), seen);
     assert!(said(&events, "LIFT-OFF") && rocket.sortie.world().thrust_begins_s().is_none());
-    let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+    let impact_m_s = rocket.judged().unwrap().touchdown.vertical_m_s;
     assert!(impact_m_s.abs() < 10.0, "{impact_m_s}");
 }
 
@@ -221,7 +221,7 @@ fn a_booster_that_does_not_separate_inhibits_the_motor_and_opens_the_parachute()
     assert!(rocket.mode().interlocks.landing_motor_inhibited);
     let world = rocket.sortie.world();
     assert!(world.booster_attached() && world.thrust_begins_s().is_none());
-    let impact_m_s = world.touchdown().unwrap().vertical_m_s;
+    let impact_m_s = world.touchdown().unwrap().over_ground.vertical_m_s;
     assert!(impact_m_s > -10.0, "{impact_m_s}");
     assert_eq!(world.rest().unwrap().outcome, RestOutcome::BodyStrike);
 }
@@ -246,7 +246,7 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
             seen[rose + 1..].iter().any(|phase| matches!(phase, Phase::Deploy | Phase::Chute)),
             "{fault}: {seen:?}"
         );
-        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
+        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.touchdown.vertical_m_s);
         assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
         // Apogee was felt within half a second of the true one.
         let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
@@ -279,7 +279,7 @@ fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
         assert!(expected.is_empty() || seen == expected, "{fault}: {seen:?}");
         let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
         assert!(believed_m_s.contains(&fall_m_s), "{fault}: {fall_m_s} m/s, {seen:?}");
-        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.impact.state.u_m_s);
+        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.touchdown.vertical_m_s);
         assert!(impact_m_s.abs() < 15.0, "{fault}: {impact_m_s} m/s, {seen:?}");
     }
 }
@@ -307,7 +307,7 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
         assert!(seen.contains(&way_down), "{asked:?}: {seen:?}");
         let inhibited = rocket.mode().interlocks.abort_latched;
         assert_eq!(inhibited, way_down == Phase::Chute, "{asked:?}");
-        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        let impact_m_s = rocket.judged().unwrap().touchdown.vertical_m_s;
         assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
     }
 }
@@ -327,7 +327,7 @@ fn below_a_drone_it_swings_is_armed_and_falls_when_it_is_let_go() {
             Phase::Touchdown
         ]
     );
-    assert!(rocket.judged().unwrap().landed);
+    assert!(rocket.judged().unwrap().landing.stands);
 }
 
 #[test]
@@ -363,7 +363,7 @@ fn released_before_it_was_cleared_it_inhibits_the_motor_and_opens_the_parachute(
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown], "{asked:?}");
         assert!(said(&events, "RELEASED before it was cleared"));
         assert!(rocket.mode().interlocks.landing_motor_inhibited);
-        let impact_m_s = rocket.judged().unwrap().impact.state.u_m_s;
+        let impact_m_s = rocket.judged().unwrap().touchdown.vertical_m_s;
         assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
     }
 }
@@ -408,7 +408,7 @@ fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
     rocket.request(Asked::Arm);
     rocket.request(Asked::Start);
     rocket.run_until(Vehicle::is_over);
-    assert!(rocket.judged().is_some_and(|judged| judged.landed));
+    assert!(rocket.judged().is_some_and(|judged| judged.landing.stands));
 }
 
 /// In the air it flies on. Under power it holds the nose upright until its next plan, which is one plan period away.
@@ -430,7 +430,7 @@ fn a_reset_in_every_phase_of_the_flight_is_flown_through() {
             ],
             "{phase}"
         );
-        assert!(rocket.judged().is_some_and(|judged| judged.landed), "{phase}");
+        assert!(rocket.judged().is_some_and(|judged| judged.landing.stands), "{phase}");
         assert!(!said(&events, "DISARMED"), "{phase}");
     }
 }

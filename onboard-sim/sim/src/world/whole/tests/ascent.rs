@@ -143,7 +143,7 @@ fn a_stack_that_falls_back_ends_in_a_body_strike() {
         world.step(&LIT);
     }
     assert_eq!(world.rest().map(|rest| rest.outcome), Some(RestOutcome::BodyStrike));
-    assert!(world.touchdown().is_some_and(|touchdown| touchdown.vertical_m_s < -15.0));
+    assert!(world.touchdown().is_some_and(|touchdown| touchdown.over_ground.vertical_m_s < -15.0));
 }
 
 #[test]

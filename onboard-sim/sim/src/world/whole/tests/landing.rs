@@ -35,7 +35,7 @@ fn a_standing_vehicle_rests_on_its_legs_and_its_accelerometer_measures_gravity()
     assert!(felt.norm() < 1e-6, "{felt}");
     let touchdown = world.touchdown().unwrap();
     let fallen_m_s = (2.0 * STANDARD_GRAVITY_M_S2 * 0.02).sqrt();
-    assert!((touchdown.vertical_m_s + fallen_m_s).abs() < 0.01, "{touchdown:?}");
+    assert!((touchdown.over_ground.vertical_m_s + fallen_m_s).abs() < 0.01, "{touchdown:?}");
 }
 
 /// Landings at each limit of the legs' verdict, one at a time, and at the vertical and lateral limits together.
@@ -69,7 +69,7 @@ fn a_fast_or_leaning_landing_tips_over() {
 fn after_a_fall_from_height_the_body_hits_the_ground() {
     let mut world = approaching(30.0, [0.0, -20.0], 0.0, 0.0);
     assert_eq!(until_rest(&mut world).outcome, RestOutcome::BodyStrike);
-    assert!(world.touchdown().unwrap().vertical_m_s < -25.0);
+    assert!(world.touchdown().unwrap().over_ground.vertical_m_s < -25.0);
 }
 
 /// Legs without damping return the energy: the vehicle bounces to the height it fell from. Damping takes the energy.

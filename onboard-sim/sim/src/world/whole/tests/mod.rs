@@ -103,7 +103,7 @@ fn val_landing_paper_fig_5() {
     // The air gets denser on the way down, so the speed lags a little behind the terminal speed, at which the drag
     // equals the weight.
     let felt_m_s2 = felt_before_contact.norm();
-    let speed_m_s = -world.touchdown().unwrap().vertical_m_s;
+    let speed_m_s = -world.touchdown().unwrap().over_ground.vertical_m_s;
     let terminal_m_s = speed_m_s * (STANDARD_GRAVITY_M_S2 / felt_m_s2).sqrt();
     assert!((terminal_m_s - 39.4).abs() < 0.05, "{terminal_m_s} m/s");
     assert!((speed_m_s - terminal_m_s).abs() < 0.2, "{speed_m_s} m/s, terminal {terminal_m_s}");

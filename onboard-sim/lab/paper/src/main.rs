@@ -1,0 +1,55 @@
+//! `paper`: the landing paper's experiments beside ours.
+
+mod study;
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Parser;
+
+use crate::study::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
+use crate::study::figures::{figures, stability_figures};
+
+/// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
+#[derive(Parser)]
+#[command(name = "paper", after_help = "Example: paper --out figures")]
+struct Arguments {
+    /// As JSON.
+    #[arg(long, conflicts_with = "stability")]
+    json: bool,
+    /// Instead of the tables, map from which tilts the paper's vehicle settles in a passive fall, over the opening of its
+    /// fins, with the static margin that explains it.
+    #[arg(long)]
+    stability: bool,
+    /// Write the figures of what is printed as SVG into this folder, which must not be there: Figures 5 to 9, or the map.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+fn main() -> anyhow::Result<()> {
+    let Arguments { json, stability, out: folder } = Arguments::parse();
+    let mut out = std::io::stdout().lock();
+    let figures = if stability {
+        let stability = Stability::new(CG_STATION_M)?;
+        study::write_stability(&mut out, &stability, &Stability::new(HEAVY_TAIL_STATION_M)?)?;
+        stability_figures(&stability)?
+    } else {
+        let experiments = study::experiments();
+        let printed = study::as_printed();
+        if json {
+            writeln!(out, "{:#}", study::to_json(&experiments, &printed))?;
+        } else {
+            study::write_tables(&mut out, &experiments, &printed)?;
+        }
+        figures(&experiments.rows)?
+    };
+    let Some(folder) = folder else { return Ok(()) };
+    std::fs::create_dir(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for (name, svg) in figures {
+        let path = folder.join(name);
+        std::fs::write(&path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+        writeln!(std::io::stderr(), "{}", path.display())?;
+    }
+    Ok(())
+}

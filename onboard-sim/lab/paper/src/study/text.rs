@@ -1,0 +1,326 @@
+//! Prints the tables and the map of `paper --stability`, for people and as JSON.
+
+use std::io::{self, Write};
+
+use paper::plane::dynamics::PlanarState;
+use serde_json::{Value, json};
+
+use super::fall::HEIGHT_M;
+use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
+use super::objective::chord;
+use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
+
+/// Writes Tables 3 to 6 and the results of the printed equations.
+///
+/// # Errors
+/// The output cannot be written.
+pub(crate) fn write_tables(
+    out: &mut impl Write,
+    experiments: &Experiments,
+    printed: &AsPrinted,
+) -> io::Result<()> {
+    let rows = &experiments.rows;
+    writeln!(out, "Final states: the landing paper's, and ours with its cost, conditions and start")?;
+    writeln!(out, "(consistent equations, T = 33.3 N). Verdict by the paper's Table 2.")?;
+    for table in Table::ALL {
+        writeln!(out)?;
+        writeln!(out, "{}", table.title())?;
+        writeln!(
+            out,
+            "{:<16} {:<11} {:>9} {:>10} {:>9} {:>8} {:>8} {:>8} {:>9}  Table 2",
+            "", "", "x m", "z m", "pitch deg", "u m/s", "w m/s", "q deg/s", "J"
+        )?;
+        for row in rows.iter().filter(|row| row.case.table == table) {
+            write_row(out, row)?;
+        }
+    }
+    let landed = |pick: fn(&Row) -> bool| rows.iter().filter(|row| pick(row)).count();
+    writeln!(out)?;
+    writeln!(
+        out,
+        "inside Table 2: open loop {} of {n}, closed loop {} of {n}; the paper {} of the {} rows it prints",
+        landed(|row| row.open_loop.landed()),
+        landed(|row| row.closed_loop.landed()),
+        landed(|row| row.paper_landed == Some(true)),
+        landed(|row| row.paper_landed.is_some()),
+        n = rows.len(),
+    )?;
+    write_objective(out, &experiments.objective)?;
+    write_printed(out, printed)
+}
+
+/// The paper's J beside every definition tried.
+fn write_objective(out: &mut impl Write, objective: &Objective) -> io::Result<()> {
+    let value =
+        |value: &Option<f64>| value.map_or_else(|| format!("{:>12}", "-"), |value| format!("{value:>12.3}"));
+    let line = |out: &mut dyn Write, name: &str, values: &[Option<f64>]| {
+        let ratio = |place: usize| {
+            let (first, other) = (values.first().copied().flatten(), values.get(place).copied().flatten());
+            first.zip(other).map_or(f64::NAN, |(first, other)| other / first)
+        };
+        let row: String = values.iter().map(value).collect();
+        writeln!(out, "{name:<56} {row}   1 : {:.2} : {:.2}", ratio(1), ratio(2))
+    };
+    writeln!(out)?;
+    let weights = objective.weights.iter().map(|p| format!("{:>12}", format!("P = {p}")));
+    let weights = weights.collect::<Vec<_>>().concat();
+    writeln!(out, "{:<56} {weights}   ratios 0.5 : 1 : 2", "J of Table 3")?;
+    line(out, "the paper", &objective.paper)?;
+    line(out, "Eq. 28 at the paper's own final states", &objective.at_paper_finals)?;
+    writeln!(out, "ours, by")?;
+    for definition in &objective.definitions {
+        let values: Vec<Option<f64>> = definition.values.iter().copied().map(Some).collect();
+        line(out, &format!("  {}", definition.name), &values)?;
+    }
+    let [Some(half), Some(one), Some(two), ..] = objective.paper[..] else { return Ok(()) };
+    writeln!(
+        out,
+        "No definition gives the paper's column. Three optima cannot, whatever A and B >= 0 are in J = A + P B:"
+    )?;
+    writeln!(
+        out,
+        "  the landing of P = 1 costs at most {:.2} with P = 2, so a landing of {two} is no optimum;",
+        2.0 * one
+    )?;
+    writeln!(
+        out,
+        "  the least J is concave in P, so between {half} and {two} it is at least {:.2} at P = 1, not {one}.",
+        chord(1.0, [(0.5, half), (2.0, two)])
+    )?;
+    writeln!(
+        out,
+        "  Both hold if the last row is the P = 5 of the paper's Fig. 6, not the P = 2 of its Table 3."
+    )
+}
+
+fn write_row(out: &mut impl Write, row: &Row) -> io::Result<()> {
+    let name = row.case.name();
+    match row.case.paper {
+        Some(paper) => {
+            let verdict = if row.paper_landed == Some(true) { "inside" } else { "OUTSIDE" };
+            write_state(out, &name, "paper", &paper.state(), None, verdict)?;
+        }
+        None => writeln!(out, "{name:<16} {:<11} not printed", "paper")?,
+    }
+    write_finish(out, "open loop", &row.open_loop)?;
+    write_finish(out, "closed loop", &row.closed_loop)
+}
+
+fn write_finish(out: &mut impl Write, which: &str, finish: &Finish) -> io::Result<()> {
+    let verdict = match (finish.landed(), finish.converged) {
+        (true, true) => "inside".to_owned(),
+        (true, false) => "inside, not converged".to_owned(),
+        (false, _) => format!("OUTSIDE: {}", finish.broken.join(", ")),
+    };
+    write_state(out, "", which, &finish.state, Some(finish.cost), &verdict)
+}
+
+fn write_state(
+    out: &mut impl Write,
+    name: &str,
+    which: &str,
+    state: &PlanarState,
+    cost: Option<f64>,
+    verdict: &str,
+) -> io::Result<()> {
+    let cost = cost.map_or_else(String::new, |cost| format!("{cost:.2}"));
+    writeln!(
+        out,
+        "{name:<16} {which:<11} {:>9.3} {:>10.1e} {:>9.2} {:>8.3} {:>8.4} {:>8.3} {cost:>9}  {verdict}",
+        state.x_m,
+        state.z_m,
+        state.theta_rad.to_degrees(),
+        state.u_m_s,
+        state.w_m_s,
+        state.q_rad_s.to_degrees(),
+    )
+}
+
+fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
+    writeln!(out)?;
+    writeln!(out, "As printed")?;
+    writeln!(
+        out,
+        "  {} N: NOT LANDABLE. Upright under full thrust all the way, which no other input can beat, the",
+        printed.thrust_n
+    )?;
+    writeln!(
+        out,
+        "  vehicle still touches down at {:.2} m/s; a landing allows {} m/s.",
+        printed.best_touchdown_speed_m_s, printed.limit_m_s
+    )?;
+    let [by_printed, by_corrected] = printed.energy_error_j_kg;
+    writeln!(
+        out,
+        "  Eq. 18-22 do not conserve energy: one second of coasting at 30 deg of tilt changes it by {by_printed:+.2} J/kg"
+    )?;
+    writeln!(out, "  (the corrected equations: {by_corrected:+.1e} J/kg).")?;
+    let converged = if printed.promise_converged { "" } else { " (not converged)" };
+    writeln!(
+        out,
+        "  A solver that uses them predicts with {} N to be at z = {:.3} m after the burn, moving at {:+.2} m/s,",
+        printed.thrust_n,
+        printed.promised.z_m.abs(),
+        printed.promised_vertical_m_s
+    )?;
+    writeln!(
+        out,
+        "  {:.0} deg from upright, having come back up from {:.2} m{converged}.",
+        (printed.promised.theta_rad.to_degrees() - 90.0).abs(),
+        printed.promised_lowest_m
+    )?;
+    match printed.happens {
+        Some(contact) => {
+            let (_, vertical_m_s) = contact.ground_velocity_m_s();
+            writeln!(
+                out,
+                "  The vehicle that flies this plan hits the ground at {vertical_m_s:+.2} m/s, {:.0} deg from upright.",
+                (contact.theta_rad.to_degrees() - 90.0).abs()
+            )
+        }
+        None => writeln!(out, "  The vehicle that flies this plan is still in the air 5 s after the burn."),
+    }
+}
+
+/// Writes the map, the highest opening first, and the static margins; and what becomes of the same vehicle with a heavy
+/// tail.
+///
+/// # Errors
+/// The output cannot be written.
+pub(crate) fn write_stability(
+    out: &mut impl Write,
+    stability: &Stability,
+    heavy_tail: &Stability,
+) -> io::Result<()> {
+    writeln!(
+        out,
+        "The paper's vehicle (centre of gravity {} m above the nozzle) falling passively from rest at {HEIGHT_M} m,",
+        stability.cg_station_m
+    )?;
+    writeln!(
+        out,
+        "tilted at the start in {} directions about its axis: # settles in all, o in some, . flips in all",
+        ROLLS_DEG.len()
+    )?;
+    writeln!(out, "fins deg")?;
+    for (opening, opening_deg) in OPENINGS_DEG.iter().enumerate().rev() {
+        let signs = (0..TILTS_DEG.len()).map(|tilt| stability.fate(opening, tilt).sign());
+        let signs: String = signs.flat_map(|sign| [' ', ' ', sign]).collect();
+        writeln!(out, "{opening_deg:>8} |{signs}")?;
+    }
+    let ticks = TILTS_DEG.map(|tilt_deg| format!("{tilt_deg:>3}")).concat();
+    writeln!(out, "{:>8}  {ticks}  tilt at the start, deg", "")?;
+    let cells = stability.fates.len();
+    writeln!(
+        out,
+        "{} of {cells} cells settle, {} depend on the direction, {} flip",
+        stability.count(Fate::Settles),
+        stability.count(Fate::DependsOnRoll),
+        stability.count(Fate::Flips)
+    )?;
+    writeln!(out)?;
+    writeln!(
+        out,
+        "Static margin: centre of pressure above the centre of gravity, mm (above 0: stable); worst and best plane"
+    )?;
+    let angles = ANGLES_DEG.map(|angle_deg| format!("{:>14}", format!("{angle_deg} deg"))).concat();
+    writeln!(out, "fins deg {angles}  to the wind")?;
+    for (opening_deg, margins_m) in OPENINGS_DEG.iter().zip(&stability.margins_m).rev() {
+        let margins = margins_m.iter().map(|[least_m, most_m]| {
+            format!("{:>14}", format!("{:+.0} {:+.0}", 1e3 * least_m, 1e3 * most_m))
+        });
+        writeln!(out, "{opening_deg:>8} {}", margins.collect::<Vec<_>>().concat())?;
+    }
+    writeln!(
+        out,
+        "The fins' force across the axis grows with the sine of the angle, the body's, which acts at its middle, 0.17 m"
+    )?;
+    writeln!(out, "below the centre of gravity, with its square: beyond some angle the body wins.")?;
+    writeln!(out)?;
+    writeln!(
+        out,
+        "With the centre of gravity {} m above the nozzle, a quarter of the length from the tail instead of the nose, every",
+        heavy_tail.cg_station_m
+    )?;
+    writeln!(
+        out,
+        "margin is {:.0} mm larger: {} of {cells} cells settle.",
+        1e3 * (stability.cg_station_m - heavy_tail.cg_station_m),
+        heavy_tail.count(Fate::Settles)
+    )
+}
+
+/// Everything as one JSON value; units in the names, angles in degrees as in the paper.
+pub(crate) fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
+    json!({
+        "rows": experiments.rows.iter().map(row_json).collect::<Vec<_>>(),
+        "objective": objective_json(&experiments.objective),
+        "as_printed": {
+            "thrust_n": printed.thrust_n,
+            "landable": printed.best_touchdown_speed_m_s <= printed.limit_m_s,
+            "best_touchdown_speed_m_s": printed.best_touchdown_speed_m_s,
+            "limit_m_s": printed.limit_m_s,
+            "coasting_energy_error_j_kg": {
+                "as_printed": printed.energy_error_j_kg[0],
+                "consistent": printed.energy_error_j_kg[1],
+            },
+            "promised": state_json(&printed.promised),
+            "promised_vertical_m_s": printed.promised_vertical_m_s,
+            "promised_lowest_m": printed.promised_lowest_m,
+            "promise_converged": printed.promise_converged,
+            "happens": printed.happens.as_ref().map(state_json),
+        },
+    })
+}
+
+fn objective_json(objective: &Objective) -> Value {
+    let ours = objective
+        .definitions
+        .iter()
+        .map(|definition| json!({ "definition": definition.name.trim_start(), "values": definition.values }));
+    json!({
+        "input_weights": objective.weights,
+        "paper": objective.paper,
+        "cost_rate_at_the_papers_final_states": objective.at_paper_finals,
+        "ours": ours.collect::<Vec<_>>(),
+    })
+}
+
+fn row_json(row: &Row) -> Value {
+    json!({
+        "table": row.case.table.title(),
+        "case": row.case.name(),
+        "start": {
+            "pitch_deg": row.case.pitch_deg,
+            "w_m_s": row.case.w_m_s,
+            "pitch_rate_deg_s": row.case.pitch_rate_deg_s,
+        },
+        "input_weight": row.case.input_weight,
+        "paper": row.case.paper.map(|paper| json!({
+            "state": state_json(&paper.state()),
+            "inside_table_2": row.paper_landed,
+        })),
+        "open_loop": finish_json(&row.open_loop),
+        "closed_loop": finish_json(&row.closed_loop),
+    })
+}
+
+fn finish_json(finish: &Finish) -> Value {
+    json!({
+        "state": state_json(&finish.state),
+        "cost": finish.cost,
+        "converged": finish.converged,
+        "inside_table_2": finish.landed(),
+    })
+}
+
+fn state_json(state: &PlanarState) -> Value {
+    json!({
+        "x_m": state.x_m,
+        "z_m": state.z_m,
+        "pitch_deg": state.theta_rad.to_degrees(),
+        "u_m_s": state.u_m_s,
+        "w_m_s": state.w_m_s,
+        "pitch_rate_deg_s": state.q_rad_s.to_degrees(),
+    })
+}
