@@ -106,7 +106,7 @@ struct Pair {
 
 impl Pair {
     fn of(solved: &LandingSolved) -> Self {
-        let (problem, plan) = (&solved.problem, &solved.warm.1);
+        let LandingSolved { problem, plan, .. } = solved;
         let (states, inputs) = (plan.states(), plan.inputs());
         let [p, r, _] = inputs[0];
         Self {

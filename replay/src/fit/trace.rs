@@ -167,7 +167,7 @@ impl Trace {
                 naming.push(stamped.data);
             }
             match stamped.entry {
-                Entry::Verdict(verdict) => landed = Some(verdict.landed),
+                Entry::Verdict(verdict) => landed = Some(verdict.landing.stands),
                 Entry::Telemetry(_) => telemetry = true,
                 Entry::ComputerStart(start) => flights += usize::from(start.released),
                 Entry::ComputerFrame(frame) => waiting = frame.in_flight(),

@@ -176,10 +176,10 @@ pub struct ReflyReport {
     pub recorded: Option<VerdictFacts>,
     /// The verdict now; `None` if the vehicle did not come down in a minute.
     pub reflown: Option<VerdictFacts>,
-    /// Whether the verdict changed between landed and not landed; `None` if either is unknown.
+    /// Whether one of the two stands undamaged and the other does not; `None` if either is unknown.
     pub verdict_changed: Option<bool>,
-    /// The smallest distance to a touchdown limit, as a fraction of the limit: 1 in the middle of the range, 0 on the
-    /// limit, negative outside. Height is left out, because contact is at the ground. `None` without a contact.
+    /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
+    /// it, negative outside. `None` without a contact.
     pub margin: Option<f64>,
     /// Frames that the controller ran.
     pub frames: usize,
@@ -255,7 +255,7 @@ pub fn refly_flight(
         .extend(verdict.iter().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict.clone())))));
     let [recorded, reflown] =
         [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
-    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
     let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
     let mut report = ReflyReport {
         kind: "closed loop: flown again in simulation",
@@ -428,13 +428,9 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Res
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
 pub fn margin(verdict: &VerdictFacts) -> f64 {
-    let fractions = verdict.limits.iter().filter(|limit| limit.name != "altitude").map(|limit| {
-        let half_width = 0.5 * (limit.maximum - limit.minimum);
-        let fraction = (limit.value - limit.minimum).min(limit.maximum - limit.value) / half_width;
-        // A NaN counts as infinitely far outside.
-        if fraction.is_nan() { f64::NEG_INFINITY } else { fraction }
-    });
-    fractions.fold(f64::INFINITY, f64::min)
+    let left = verdict.deciding().map(|limit| 1.0 - limit.share());
+    // A NaN counts as infinitely far outside.
+    left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(f64::INFINITY, f64::min)
 }
 
 /// Writes a re-flown flight as a log that every command accepts.

@@ -22,7 +22,7 @@ fn recording() -> Recording {
 
 #[test]
 fn the_logged_flight_landed_and_verifies() {
-    assert!(LANDED.landed && recording().verdict.unwrap().landed);
+    assert!(LANDED.landed && recording().verdict.unwrap().landing.stands);
     let report = only(verify(&LANDED.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
 }
