@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a table that cannot be read is a failed test")]
 
 use paper::plane::dynamics::PlanarState;
-use paper::plane::{SolveStatus, solve};
 use paper::problem::{HORIZON, problem, start};
+use paper::plane::{SolveStatus, solve};
 
 /// The table; its header says how it was made.
 const TABLE: &str = include_str!("data/casadi_ipopt.csv");

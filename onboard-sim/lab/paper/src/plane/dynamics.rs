@@ -20,6 +20,7 @@
 //!
 //! In wind, let the frame move with the air: `(u, w)` and the positions are then relative to it.
 
+
 /// The set of planar equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {

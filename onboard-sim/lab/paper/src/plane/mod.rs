@@ -25,6 +25,7 @@ pub use self::problem::best_touchdown_speed_m_s;
 pub use problem::{FinalBox, Problem, SolverLimits};
 pub use workspace::Workspace;
 
+
 use crate::plane::dynamics::PlanarState;
 
 /// Largest miss of an end or path condition of a path that lands, m, rad, m/s or rad/s.

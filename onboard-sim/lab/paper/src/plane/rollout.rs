@@ -1,5 +1,6 @@
 //! States and cost of a sequence of inputs.
 
+
 use super::Problem;
 use super::problem::Condition;
 use crate::plane::dynamics::along;

@@ -2,8 +2,8 @@
 //! really happens.
 
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
-use paper::plane::{LANDING_MISS, Problem, Solution, SolveStatus};
 use paper::problem::{HORIZON, PRINTED_THRUST_N, model, problem, start};
+use paper::plane::{LANDING_MISS, Problem, Solution, SolveStatus};
 
 use super::{Finish, Sample};
 

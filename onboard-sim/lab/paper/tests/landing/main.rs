@@ -4,11 +4,11 @@
 mod robust;
 
 use paper::plane::dynamics::{ModelKind, PlanarState};
+use paper::problem::{HORIZON, PRINTED_THRUST_N, THRUST_N, model, problem, settled, start as nominal_start};
 use paper::plane::rollout::Trajectory;
 use paper::plane::{
     Problem, Solution, SolveStatus, WarmStart, Workspace, best_touchdown_speed_m_s, solve, solve_into,
 };
-use paper::problem::{HORIZON, PRINTED_THRUST_N, THRUST_N, model, problem, settled, start as nominal_start};
 
 fn pitched(deg: f64) -> PlanarState {
     PlanarState { theta_rad: deg.to_radians(), ..nominal_start() }
