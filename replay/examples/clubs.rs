@@ -59,7 +59,10 @@ impl World {
             let ignition_delay_s = delay_s.max(0.02);
             let truth = Truth { impulse_scale, burn_time_scale, ignition_delay_s, ..drawn.truth };
             let draw = Draw { truth, ..drawn };
-            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw, law.clone())?.run().legs)
+            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw, law.clone())?
+                .run()
+                .landing
+                .stands)
         };
         let landed = in_parallel(&motors, one, &|_| {});
         let flights = motors.into_iter().zip(landed).map(|((_, motor), landed)| Ok((motor, landed?)));
