@@ -82,7 +82,11 @@ fn an_abort_under_thrust_lands_on_the_ground_below_and_reports_that_no_cut_off_e
     assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);
     assert!(ended.output.contains("landing on the ground below"), "{}", ended.output);
     assert!(!ended.output.contains("CHUTE"), "{}", ended.output);
-    assert!(ended.output.contains("ABORTED, then LANDED"), "the verdict stands beside it: {}", ended.output);
+    assert!(
+        ended.output.contains("ABORTED, then STANDS UNDAMAGED"),
+        "the verdict stands beside it: {}",
+        ended.output
+    );
 }
 
 #[test]

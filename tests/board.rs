@@ -59,7 +59,7 @@ fn a_board_with_a_radio_of_its_own_is_armed_started_and_lands() {
     }
     let world = chain.wait();
     assert_eq!(world.code, Some(0), "{}", world.output);
-    assert!(world.output.contains("LANDED"), "{}", world.output);
+    assert!(world.output.contains("STANDS UNDAMAGED"), "{}", world.output);
     expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 

@@ -55,10 +55,10 @@ fn a_first_flight_goes_as_its_page_says() {
         }
         screen.type_by_hand(b"SSTART\r");
         // The words of the first start are still there: only the question whether a person typed is waited for.
-        screen.confirm_if_asked("LANDED inside every limit");
+        screen.confirm_if_asked("STANDS UNDAMAGED, inside");
     }
-    screen.wait_for("LANDED inside every limit");
-    screen.wait_for("LANDED; may be approached");
+    screen.wait_for("STANDS UNDAMAGED, inside");
+    screen.wait_for("STANDS UNDAMAGED; may be approached");
     vehicle.signal(Signal::SIGINT);
     let flown = vehicle.wait();
     assert_eq!(flown.code, Some(0), "{}", flown.output);

@@ -43,7 +43,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     // The same verdict, in the words for what a station can know.
     let [own, heard] = ["vehicle.mcap", "ground.mcap"].map(|log| replay(folder, &["info", log]));
     for info in [&own, &heard] {
-        assert!(fact(info, "verdict").contains("LANDED"), "{}", info.output);
+        assert!(fact(info, "verdict").contains("STANDS UNDAMAGED"), "{}", info.output);
     }
     for phase in ["POWERED", "TOUCHDOWN"] {
         assert!(heard.output.contains(phase), "{phase}: {}", heard.output);
@@ -53,7 +53,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     for log in ["vehicle", "ground"] {
         replay(folder, &["report", &format!("{log}.mcap")]);
         let page = std::fs::read_to_string(folder.join(format!("{log}.html"))).unwrap();
-        assert!(page.contains("LANDED") && page.contains("touchdown"), "{log}");
+        assert!(page.contains("STANDS UNDAMAGED") && page.contains("touchdown"), "{log}");
     }
 
     // Each row of the station's tables is a row that the vehicle's log says it sent.

@@ -137,8 +137,8 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
         launch.ann.wait_within(TAP_EVERY, flies).is_some()
     });
     assert!(released, "{}", launch.ann.window().rows().join("\n"));
-    launch.ann.wait_for("LANDED");
-    launch.bob.wait_for("LANDED");
+    launch.ann.wait_for("STANDS UNDAMAGED");
+    launch.bob.wait_for("STANDS UNDAMAGED");
 }
 
 #[test]

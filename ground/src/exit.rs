@@ -6,14 +6,14 @@ use crate::model::FlightSoFar;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Landed inside every limit, or closed by the crew before a flight began.
+    /// It stands undamaged, or closed by the crew before a flight began.
     Landed = 0,
     /// Something failed: a file, a socket, the simulator.
     Error = 1,
     /// The command line was not understood.
     Usage = 2,
-    /// The flight ended outside a limit.
-    OutsideLimits = 3,
+    /// The flight ended otherwise.
+    NotLanded = 3,
     /// Arming or start was refused, or the flight was aborted.
     RefusedOrAborted = 4,
     /// The end of the flight was not seen: link lost, nothing heard, time limit, or closed in flight.
@@ -28,10 +28,10 @@ Examples:
   ground --replay last
 
 Exit codes:
-  0  landed inside every limit (full screen: also when closed before any flight began)
+  0  it stands undamaged (full screen: also when closed before any flight began)
   1  an error: a file, a socket, the simulator
   2  the command line was not understood
-  3  the flight ended outside a limit
+  3  the flight ended otherwise
   4  arming or start was refused, or the flight was aborted
   5  the end of the flight was not seen: link lost, nothing heard, time-out, or closed in flight";
 
@@ -41,11 +41,11 @@ pub fn decide(outcome: &FlightSoFar, interactive: bool) -> Exit {
         Exit::Error
     } else if outcome.aborted_at.is_some() {
         Exit::RefusedOrAborted
-    } else if let Some((landed, _)) = outcome.verdict {
-        if landed { Exit::Landed } else { Exit::OutsideLimits }
+    } else if let Some((stands, _)) = outcome.verdict {
+        if stands { Exit::Landed } else { Exit::NotLanded }
     } else if outcome.started {
         // At rest without a verdict: the vehicle came down under a parachute or without a landing burn.
-        if outcome.safed_at.is_some() { Exit::OutsideLimits } else { Exit::NotSeen }
+        if outcome.safed_at.is_some() { Exit::NotLanded } else { Exit::NotSeen }
     } else if outcome.refusal.is_some() {
         Exit::RefusedOrAborted
     } else if interactive {
@@ -70,12 +70,12 @@ mod tests {
             (
                 FlightSoFar { verdict: Some((false, Duration::ZERO)), ..landed.clone() },
                 false,
-                Exit::OutsideLimits,
+                Exit::NotLanded,
             ),
             (FlightSoFar { aborted_at: at, ..landed.clone() }, false, Exit::RefusedOrAborted),
             (FlightSoFar { error: Some("socket".to_owned()), ..landed }, false, Exit::Error),
             (FlightSoFar { started: true, ..none.clone() }, true, Exit::NotSeen),
-            (FlightSoFar { started: true, safed_at: at, ..none.clone() }, false, Exit::OutsideLimits),
+            (FlightSoFar { started: true, safed_at: at, ..none.clone() }, false, Exit::NotLanded),
             (
                 FlightSoFar { refusal: Some(("ARM denied".to_owned(), Duration::ZERO)), ..none.clone() },
                 false,
@@ -91,14 +91,9 @@ mod tests {
 
     #[test]
     fn the_help_names_every_code() {
-        for exit in [
-            Exit::Landed,
-            Exit::Error,
-            Exit::Usage,
-            Exit::OutsideLimits,
-            Exit::RefusedOrAborted,
-            Exit::NotSeen,
-        ] {
+        for exit in
+            [Exit::Landed, Exit::Error, Exit::Usage, Exit::NotLanded, Exit::RefusedOrAborted, Exit::NotSeen]
+        {
             assert!(HELP.contains(&format!("\n  {}  ", exit as u8)));
         }
     }

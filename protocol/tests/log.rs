@@ -101,14 +101,14 @@ fn both_zeros_and_every_nan_survive() {
     for bits in
         [0.0f64.to_bits(), (-0.0f64).to_bits(), f64::NAN.to_bits(), 0x7FF0_0000_0000_0001, u64::MAX, 1]
     {
-        let state = v1::PlanarState { u_m_s: f64::from_bits(bits), ..v1::PlanarState::default() };
+        let limit = v1::LimitResult { value: f64::from_bits(bits), ..v1::LimitResult::default() };
         let truth = flight_v1::TruthSample {
             fins_actual_rad: vec![f64::from_bits(bits)],
             ..flight_v1::TruthSample::default()
         };
-        let state = v1::PlanarState::decode(state.encode_to_vec().as_slice()).unwrap();
+        let limit = v1::LimitResult::decode(limit.encode_to_vec().as_slice()).unwrap();
         let truth = flight_v1::TruthSample::decode(truth.encode_to_vec().as_slice()).unwrap();
-        assert_eq!(state.u_m_s.to_bits(), bits);
+        assert_eq!(limit.value.to_bits(), bits);
         assert_eq!(truth.fins_actual_rad[0].to_bits(), bits);
     }
 }

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Output};
-use flight::guidance::powered::{ControlLevel, LandingSolved};
+use flight::guidance::powered::{ControlLevel, LandingSolved, Plan};
 use flight::rules::phase::Phase;
-use flight::vehicle::dynamics::PlanarState;
 use flight::vehicle::mission::Mission;
 pub use flight_log::again::FrameError;
 use flight_log::again::{RecordedComputer, mission_flown};
 use flight_log::frame::{LoggedInput, level_of, phase_of, start_to_log};
-use nmpc::SolveStatus;
+use nmpc::Status;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
 
@@ -166,7 +165,7 @@ impl LoggedComputer {
     pub fn decided(&self, frame: &ComputerFrame) -> Decided {
         let output = &frame.output;
         let report = self.pilot().report();
-        let planned = report.status != SolveStatus::NotRun;
+        let planned = report.status != Status::NotRun;
         Decided {
             gimbal_rad: output.gimbal_rad.clone(),
             fins_rad: output.fins_rad.clone(),
@@ -179,20 +178,9 @@ impl LoggedComputer {
     }
 }
 
-/// Tells a new plan from an earlier plan that is still being flown; frames must come in order.
-#[derive(Debug, Clone, Default)]
-pub struct NewPlans {
-    flown: Vec<PlanarState>,
-}
-
-impl NewPlans {
-    /// The plan that a flight computer made in the frame it has just run, in which `level` decided: states relative to
-    /// the air in the plane of the landing, and the time between them, s. `None` if it flies an earlier plan or none.
-    pub fn made<'p>(&mut self, pilot: &'p Pilot, level: u32) -> Option<(&'p [PlanarState], f64)> {
-        let planned = level != u32::from(ControlLevel::Idle.index());
-        let (states, step_s) =
-            pilot.planned().filter(|(states, _)| planned && *states != self.flown.as_slice())?;
-        self.flown = states.to_vec();
-        Some((states, step_s))
-    }
+/// The plan that a flight computer made in the frame it has just run, in which `level` decided; `None` if it flies an
+/// earlier plan or none.
+pub fn new_plan(pilot: &Pilot, time_s: f64, level: u32) -> Option<&Plan> {
+    let planned = level != u32::from(ControlLevel::Idle.index());
+    pilot.powered().planned().filter(|plan| planned && plan.begins_s() >= time_s)
 }

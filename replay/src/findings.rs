@@ -82,9 +82,9 @@ fn section(sign: Sign) -> &'static str {
 /// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
 fn broken(verdict: &VerdictFacts, findings: &Findings) -> Option<String> {
     // A vehicle that comes down under its parachute is judged by nothing else.
-    let judged = verdict.limits.iter().all(|limit| limit.maximum > limit.minimum);
+    let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);
     let mut broken: Vec<(&VerdictLimit, f64)> =
-        verdict.limits.iter().filter(|limit| !limit.passed).map(|limit| (limit, limit.share())).collect();
+        verdict.deciding().filter(|limit| !limit.passed).map(|limit| (limit, limit.share())).collect();
     broken.retain(|_| judged);
     broken.sort_by(|a, b| b.1.total_cmp(&a.1));
     let ((worst, share), others) = broken.split_first()?;

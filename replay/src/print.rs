@@ -39,8 +39,7 @@ pub(crate) struct LimitRow<'a> {
 pub(crate) fn verdict_words(verdict: Option<&VerdictFacts>, none: &str) -> String {
     match verdict {
         None => none.to_owned(),
-        Some(verdict) if verdict.landed => format!("LANDED at {}", verdict.contact()),
-        Some(verdict) => format!("NOT LANDED at {}", verdict.contact()),
+        Some(verdict) => format!("{} at {}", verdict.landing.word(), verdict.contact()),
     }
 }
 
@@ -53,7 +52,7 @@ pub(crate) fn verdict_rows<'a>(
     outside: &str,
 ) -> Vec<LimitRow<'a>> {
     let value = |verdict: Option<&VerdictFacts>, name: &str| {
-        let found = verdict.and_then(|verdict| verdict.limits.iter().find(|limit| limit.name == name));
+        let found = verdict.and_then(|verdict| verdict.of_the_legs().find(|limit| limit.name == name));
         found.map_or_else(
             || "-".to_owned(),
             |found| {
@@ -63,7 +62,8 @@ pub(crate) fn verdict_rows<'a>(
         )
     };
     let mut limits: Vec<&VerdictLimit> = Vec::new();
-    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(|verdict| &verdict.limits) {
+    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(|verdict| verdict.of_the_legs())
+    {
         if !limits.iter().any(|known| known.name == limit.name) {
             limits.push(limit);
         }

@@ -131,7 +131,7 @@ impl Lines {
 /// Whether an event is about the flight rather than about how it was commanded: a demonstration without a screen is read by somebody
 /// who wants to see what flies. The log has every event.
 fn is_of_the_flight(event: &Event) -> bool {
-    let told = ["demonstration", "phase ", Ending::Landed.word()];
+    let told = ["demonstration", "phase ", Ending::Stands.word()];
     let by_ground = event.speaker == Speaker::Ground && event.level == EventLevel::Info;
     let of_the_solver = event.text.starts_with("controller level");
     (!by_ground || told.iter().any(|words| event.text.starts_with(words))) && !of_the_solver
@@ -189,15 +189,11 @@ pub fn closing(
 }
 
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
-    let mut text = String::from("landing verdict, against the vehicle's limits\n");
+    let mut text = String::from("touchdown, against the design envelope of its legs\n");
     for row in limit_rows(&verdict.touchdown, model.vehicle.limits().as_ref()) {
         let word = if row.kept { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
-        let _ = writeln!(
-            text,
-            "  {word} {:<8} {value:>9} {:<6} limit {} {}",
-            row.name, row.unit, row.limit, row.unit
-        );
+        let _ = writeln!(text, "  {word} {:<8} {value:>9} {:<6} {}", row.name, row.unit, row.limit);
     }
     if let Some(ending) = Ending::of(&model.vehicle, now) {
         let _ = writeln!(text, "{}", ending.sentence(&model.vehicle));

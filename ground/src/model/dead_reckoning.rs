@@ -472,12 +472,12 @@ mod tests {
     fn under_thrust_it_follows_the_plan_and_stays_at_its_end() {
         let mut vehicle = moving(TdPhase::TD_PHASE_POWERED, [2.0, 1.0, -10.0], None);
         let touchdown = Touchdown {
-            x_m: 0.0,
-            altitude_m: 0.0,
-            pitch_rad: 1.57,
-            u_m_s: 0.0,
-            w_m_s: 0.0,
-            q_rad_s: 0.0,
+            distance_m: 0.0,
+            height_m: 0.0,
+            vertical_m_s: 0.0,
+            lateral_m_s: 0.0,
+            tilt_rad: 0.0,
+            rate_rad_s: 0.0,
             violated: TdLimit::empty(),
         };
         vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s: 4.0, touchdown }, SEEN));

@@ -480,7 +480,7 @@ pub struct FlightSoFar {
     pub aborted_at: Option<Duration>,
     /// The last arming or start was refused: the reason and the time.
     pub refusal: Option<(String, Duration)>,
-    /// The vehicle's verdict (whether it landed inside every limit) and its time.
+    /// The vehicle's verdict (whether it stands undamaged) and its time.
     pub verdict: Option<(bool, Duration)>,
     /// When the vehicle reached SAFED after a flight.
     pub safed_at: Option<Duration>,

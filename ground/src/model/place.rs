@@ -149,8 +149,8 @@ impl Model {
             }
             // A verdict tells the distance from the pad, and no direction.
             (None, Some(Sample { value, received_at })) => {
-                let spot = Spot { error_m: value.touchdown.x_m.abs() + HEARD_ERROR_M, ..Spot::default() };
-                (spot, value.touchdown.altitude_m, received_at)
+                let spot = Spot { error_m: value.touchdown.distance_m + HEARD_ERROR_M, ..Spot::default() };
+                (spot, value.touchdown.height_m, received_at)
             }
             (None, None) => return None,
         };
@@ -172,7 +172,7 @@ impl Model {
     /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
     /// anywhere inside the fence of its mission. `None` if it has reported no fence.
     pub fn meant_to_come_down(&self) -> Option<Spot> {
-        let fence_m = f64::from(self.vehicle.limits()?.x_m);
+        let fence_m = f64::from(self.vehicle.limits()?.fence_m);
         let predicted = self.vehicle.descent().map(|descent| descent.value);
         let known =
             |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdAbortEffect, TdChute, TdHold,
-    TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+    TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLanding, TdLatch,
+    TdLimit, TdMotor, TdPhase,
 };
 use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
@@ -351,14 +351,16 @@ const WRECKED_FROM_M_S: f64 = 10.0;
 /// take 50 s.
 const SURELY_DOWN_AFTER: Duration = Duration::from_mins(2);
 
-/// The four ends of a flight.
+/// The ends of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// It stands, inside every limit.
-    Landed,
+    /// It stands undamaged.
+    Stands,
+    /// It stands, and is taken as damaged.
+    Upright,
     /// It came down under an open parachute.
     UnderParachute,
-    /// It met the ground outside a limit.
+    /// It met the ground and did not stay upright.
     Hard,
     /// It is a wreck, or it fell silent in flight and must be down.
     Lost,
@@ -368,7 +370,8 @@ impl Ending {
     /// The word that every screen uses.
     pub fn word(self) -> &'static str {
         match self {
-            Self::Landed => "LANDED",
+            Self::Stands => "STANDS UNDAMAGED",
+            Self::Upright => "UPRIGHT",
             Self::UnderParachute => "DOWN UNDER THE PARACHUTE",
             Self::Hard => "HARD LANDING",
             Self::Lost => "LOST",
@@ -390,12 +393,14 @@ impl Ending {
     }
 
     fn judged(vehicle: &Vehicle, verdict: &Verdict) -> Self {
-        let (along_m_s, across_m_s) = (verdict.touchdown.u_m_s, verdict.touchdown.w_m_s);
-        if verdict.landed {
-            Self::Landed
-        } else if hangs_on_its_chute(vehicle) && along_m_s.abs() < WRECKED_FROM_M_S {
+        let Touchdown { vertical_m_s, .. } = verdict.touchdown;
+        if verdict.landing.contains(TdLanding::TD_LANDING_STANDS) {
+            Self::Stands
+        } else if hangs_on_its_chute(vehicle) && vertical_m_s.abs() < WRECKED_FROM_M_S {
             Self::UnderParachute
-        } else if libm::hypot(along_m_s, across_m_s) < WRECKED_FROM_M_S {
+        } else if verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT) {
+            Self::Upright
+        } else if verdict.touchdown.speed_m_s() < WRECKED_FROM_M_S {
             Self::Hard
         } else {
             Self::Lost
@@ -409,23 +414,25 @@ impl Ending {
 
     /// What is known of this end: what follows the word.
     pub fn detail(self, vehicle: &Vehicle) -> String {
-        let verdict = vehicle.verdict().map(|verdict| verdict.value);
-        let speed_m_s = verdict.map(|verdict| libm::hypot(verdict.touchdown.u_m_s, verdict.touchdown.w_m_s));
-        match (self, verdict) {
-            (Self::Landed, _) if vehicle.limits().as_ref().is_some_and(are_of_legs) => {
-                " inside every limit of the legs".to_owned()
-            }
-            (Self::Landed, _) => " inside every limit".to_owned(),
-            (Self::UnderParachute, Some(verdict)) => {
-                format!(", sinking at {:.1} m/s", verdict.touchdown.u_m_s.abs())
-            }
-            (Self::Hard, Some(verdict)) => match verdict.touchdown.violations() {
-                Some(names) => format!(": outside {names}"),
+        let Some(Sample { value: Verdict { landing, touchdown }, .. }) = vehicle.verdict() else {
+            let silent = ": it fell silent in flight and must be down";
+            return if self == Self::Lost { silent.to_owned() } else { String::new() };
+        };
+        let side = |bit| if landing.contains(bit) { "inside" } else { "outside" };
+        let at_contact = || {
+            let [envelope, table_2] =
+                [TdLanding::TD_LANDING_ENVELOPE, TdLanding::TD_LANDING_TABLE_2].map(side);
+            format!(", {envelope} the design envelope of its legs, {table_2} Table 2")
+        };
+        match self {
+            Self::Stands => at_contact(),
+            Self::Upright => format!(", taken as damaged{}", at_contact()),
+            Self::UnderParachute => format!(", sinking at {:.1} m/s", touchdown.vertical_m_s.abs()),
+            Self::Hard => match touchdown.violations() {
+                Some(names) => format!(": not upright, outside {names}"),
                 None => ": it did not stay upright".to_owned(),
             },
-            (Self::Lost, Some(_)) => format!(": hit the ground at {:.0} m/s", speed_m_s.unwrap_or_default()),
-            (Self::Lost, None) => ": it fell silent in flight and must be down".to_owned(),
-            (Self::UnderParachute | Self::Hard, None) => String::new(),
+            Self::Lost => format!(": hit the ground at {:.0} m/s", touchdown.speed_m_s()),
         }
     }
 }
@@ -452,32 +459,35 @@ fn is_silent_and_down(vehicle: &Vehicle, now: Duration) -> bool {
 /// A state at touchdown, predicted or reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touchdown {
-    pub x_m: f64,
-    pub altitude_m: f64,
-    /// Pitch from the horizontal, rad; pi/2 is upright.
-    pub pitch_rad: f64,
-    /// Axial speed, towards the nose, m/s.
-    pub u_m_s: f64,
-    pub w_m_s: f64,
-    pub q_rad_s: f64,
-    /// The limits that the vehicle reports as violated.
+    /// Level distance from the target, m.
+    pub distance_m: f64,
+    /// Height of the feet, m.
+    pub height_m: f64,
+    /// Vertical speed, up, m/s.
+    pub vertical_m_s: f64,
+    /// Speed over the ground, m/s.
+    pub lateral_m_s: f64,
+    /// Angle between nose and vertical, rad.
+    pub tilt_rad: f64,
+    /// Size of the rotation rate, rad/s.
+    pub rate_rad_s: f64,
+    /// The limits that the vehicle reports as violated: those of the design envelope of its legs, and a plan's height.
     pub violated: TdLimit,
 }
 
 /// The limits of a touchdown in the order of the state: the word on screens and the vehicle's bit.
 pub const LIMITS: [(&str, TdLimit); 6] = [
-    ("distance", TdLimit::TD_LIMIT_X),
-    ("height", TdLimit::TD_LIMIT_ALTITUDE),
-    ("tilt", TdLimit::TD_LIMIT_PITCH),
-    ("sink", TdLimit::TD_LIMIT_AXIAL_SPEED),
+    ("distance", TdLimit::TD_LIMIT_DISTANCE),
+    ("height", TdLimit::TD_LIMIT_HEIGHT),
+    ("sink", TdLimit::TD_LIMIT_VERTICAL_SPEED),
     ("drift", TdLimit::TD_LIMIT_LATERAL_SPEED),
-    ("turn", TdLimit::TD_LIMIT_PITCH_RATE),
+    ("tilt", TdLimit::TD_LIMIT_TILT),
+    ("turn", TdLimit::TD_LIMIT_RATE),
 ];
 
 impl Touchdown {
-    /// The angle from upright, rad.
-    pub fn tilt_rad(&self) -> f64 {
-        (self.pitch_rad - std::f64::consts::FRAC_PI_2).abs()
+    pub fn speed_m_s(&self) -> f64 {
+        libm::hypot(self.vertical_m_s, self.lateral_m_s)
     }
 
     /// The names of the violated limits; `None` if there is none.
@@ -486,18 +496,6 @@ impl Touchdown {
         let names: Vec<&str> = violated.map(|(name, _)| *name).collect();
         (!names.is_empty()).then(|| names.join(", "))
     }
-}
-
-/// What the landing legs withstand: lean, rad; vertical and horizontal speed, m/s; rotation rate, rad/s.
-const LEGS: [f64; 4] = [10.0 * DEGREE, 1.0, 0.7, 30.0 * DEGREE];
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Limits sent as `f32` match within this relative error.
-const SAME_SHARE: f64 = 1e-5;
-
-/// Whether these limits are what the landing legs withstand.
-pub fn are_of_legs(limits: &TD_TOUCHDOWN_LIMITS_DATA) -> bool {
-    let sent = [limits.pitch_error_rad, limits.u_m_s, limits.w_m_s, limits.q_rad_s];
-    sent.into_iter().zip(LEGS).all(|(sent, own)| (f64::from(sent) - own).abs() <= SAME_SHARE * own)
 }
 
 // Why the landing motor is inhibited for good.

@@ -6,7 +6,7 @@ use mavlink::MessageData;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
     SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
+    TD_PREDICTED_PATH_DATA, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 pub use protocol::told::{phase_from_number, phase_of};
@@ -53,8 +53,15 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
         }
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
-            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
-            let touchdown = touchdown(state, data.limits_violated);
+            let touchdown = Touchdown {
+                distance_m: data.distance_m.into(),
+                height_m: data.height_m.into(),
+                vertical_m_s: data.vertical_m_s.into(),
+                lateral_m_s: data.lateral_m_s.into(),
+                tilt_rad: data.tilt_rad.into(),
+                rate_rad_s: data.rate_rad_s.into(),
+                violated: data.limits_violated,
+            };
             let time_to_go_s = f64::from(data.time_to_go_ms) / 1_000.0;
             vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s, touchdown }, now));
         }
@@ -104,9 +111,17 @@ impl Vehicle {
 
     /// The vehicle's own verdict on its landing.
     pub fn verdict(&self) -> Option<Sample<Verdict>> {
-        self.converted(|data: &TD_LANDING_VERDICT_DATA| {
-            let state = [data.x_m, data.altitude_m, data.pitch_rad, data.u_m_s, data.w_m_s, data.q_rad_s];
-            Verdict { landed: data.landed == 1, touchdown: touchdown(state, data.limits_violated) }
+        self.converted(|data: &TD_LANDING_VERDICT_DATA| Verdict {
+            landing: data.landing,
+            touchdown: Touchdown {
+                distance_m: data.distance_m.into(),
+                height_m: 0.0,
+                vertical_m_s: data.vertical_m_s.into(),
+                lateral_m_s: data.lateral_m_s.into(),
+                tilt_rad: data.tilt_rad.into(),
+                rate_rad_s: data.rate_rad_s.into(),
+                violated: data.limits_violated,
+            },
         })
     }
 
@@ -191,12 +206,6 @@ fn path(data: &TD_PREDICTED_PATH_DATA) -> Vec<(f64, f64)> {
     let metres = |cm: i16| f64::from(cm) / 100.0;
     let points = data.x.iter().zip(&data.altitude).map(|(x, altitude)| (metres(*x), metres(*altitude)));
     points.take(usize::from(data.count)).collect()
-}
-
-/// Distance, altitude, pitch, axial and lateral speed and pitch rate at touchdown, as both messages tell them.
-fn touchdown(state: [f32; 6], violated: TdLimit) -> Touchdown {
-    let [x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = state.map(f64::from);
-    Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated }
 }
 
 /// The text of a field of characters, without what a terminal would act on.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use mavlink::{MavlinkVersion, Message as _, MessageData};
 use protocol::dialect::{
     MavMessage, PARAM_VALUE_DATA, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase, TdRole,
+    TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
 use protocol::told::Told;
@@ -103,8 +103,7 @@ impl FlownMission {
 /// The vehicle's own verdict on its landing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// Whether it landed inside every limit.
-    pub landed: bool,
+    pub landing: TdLanding,
     /// The state at contact.
     pub touchdown: Touchdown,
 }
@@ -190,7 +189,7 @@ impl Vehicle {
         self.last()
     }
 
-    /// What counts as a landing for this vehicle.
+    /// The design envelope of its legs, and how far its gimbal goes.
     pub fn limits(&self) -> Option<TD_TOUCHDOWN_LIMITS_DATA> {
         self.last().map(|limits| limits.value)
     }
@@ -325,8 +324,7 @@ impl Vehicle {
 
     /// The speed of the predicted touchdown, m/s.
     pub fn predicted_speed_m_s(&self) -> Option<Sample<f64>> {
-        self.prediction
-            .map(|prediction| prediction.map(|p| libm::hypot(p.touchdown.u_m_s, p.touchdown.w_m_s)))
+        self.prediction.map(|prediction| prediction.map(|p| p.touchdown.speed_m_s()))
     }
 
     /// Speeds along the body axes, with the age of the older of attitude and velocity.

@@ -177,7 +177,7 @@ fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, 
     if vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT)) {
         found.push((AlarmKind::NoLight, "NO LIGHT: the motor did not light".to_owned()));
     }
-    if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Landed) {
+    if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Stands) {
         found.push((AlarmKind::NotLanded, ending.sentence(vehicle)));
     }
     let powered = vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED);
@@ -293,7 +293,7 @@ fn call_ending(model: &mut Model, now: Duration) {
         return;
     }
     if let Some(ending) = ending {
-        let bells = if ending == Ending::Landed { EVENT } else { WRONG };
+        let bells = if ending == Ending::Stands { EVENT } else { WRONG };
         call(model, Amount::Few, ending.word().to_lowercase(), bells);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TdAct, TdHold, TdPhase};
+use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TdAct, TdHold, TdLanding, TdPhase};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 
@@ -256,12 +256,13 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
 }
 
 fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
-    let level = if verdict.landed { EventLevel::Info } else { EventLevel::Error };
+    let stands = verdict.landing.contains(TdLanding::TD_LANDING_STANDS);
+    let level = if stands { EventLevel::Info } else { EventLevel::Error };
     let ending = Ending::of(&model.vehicle, now);
     let text = ending.map_or_else(String::new, |ending| ending.sentence(&model.vehicle));
     model.say(now, Speaker::Ground, level, text);
     model.outcome.started = true;
-    model.outcome.verdict = Some((verdict.landed, now));
+    model.outcome.verdict = Some((stands, now));
     model.outbox.push(Action::SyncLog);
 }
 

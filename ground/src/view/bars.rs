@@ -75,7 +75,7 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         return draw_line(frame, inside, theme.line(" no prediction", TextRole::Label));
     };
     let words = match at.value.violations() {
-        None => theme.line(" inside every limit ", TextRole::Good),
+        None => theme.line(" inside the envelope ", TextRole::Good),
         Some(names) => theme.line(format!(" OUTSIDE {names} "), TextRole::Alarm),
     };
     let words =
@@ -111,7 +111,8 @@ fn limit(
     let style = theme.ground().fg(theme.ink(Ink::Limit));
     let bar_at =
         Rect { x: at.x + BEFORE_BAR, width: at.width.saturating_sub(BEFORE_BAR + limit_columns), ..at };
-    bar([0.0, LIMIT_AT * row.used], ink, Some((LIMIT_AT, style)), frame, bar_at);
+    let mark = row.used.is_finite().then_some((LIMIT_AT, style));
+    bar([0.0, LIMIT_AT * row.used], ink, mark, frame, bar_at);
     if limit_columns > 0 {
         let words = theme.either_side(&format!(" {} {}", row.limit, row.unit));
         draw_line(

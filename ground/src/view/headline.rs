@@ -9,6 +9,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use super::band::{Item, draw_band, draw_word, number, word};
+use super::panels::ending_role;
 use super::pictures::map::comes_down;
 use super::top_lines::{level, readiness};
 use super::{STALE_MARK, TextRole, Theme};
@@ -260,12 +261,15 @@ const BESIDE_COLUMNS: u16 = 112;
 
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {
-    let (text, role) = match Ending::of(&model.vehicle, now) {
-        Some(Ending::Landed) => ("LANDED", TextRole::Good),
-        Some(Ending::UnderParachute) => ("PARACHUTE", TextRole::Caution),
-        Some(Ending::Hard) => ("HARD", TextRole::Alarm),
-        Some(Ending::Lost) => ("LOST", TextRole::Alarm),
-        None => ("NO VERDICT", TextRole::Caution),
+    let (ending, role) = ending_role(model, now).unzip();
+    let text = match ending {
+        Some(Ending::Stands) => "STANDS",
+        Some(Ending::Upright) => "UPRIGHT",
+        Some(Ending::UnderParachute) => "PARACHUTE",
+        Some(Ending::Hard) => "HARD",
+        Some(Ending::Lost) => "LOST",
+        None => "NO VERDICT",
     };
+    let role = role.unwrap_or(TextRole::Caution);
     word("", text, text.len() as u16, role)
 }

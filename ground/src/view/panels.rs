@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLimit, TdSolverStatus,
+    TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit, TdSolverStatus,
 };
 use ratatui::text::Line;
 
 use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
 use crate::model::{
-    BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, are_of_legs,
+    BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, Verdict,
     dead_reckoning::{Basis, is_unheard, predict_position},
     words,
 };
@@ -166,8 +166,7 @@ pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static 
     if let Some(verdict) = model.vehicle.verdict() {
         let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
         rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
-        let by_legs = model.vehicle.limits().as_ref().is_some_and(are_of_legs);
-        return (if by_legs { "Verdict by the legs" } else { "Verdict" }, rows);
+        return ("Touchdown", rows);
     }
     let Some(prediction) = model.vehicle.prediction else {
         return ("Touchdown predicted", vec![theme.line("no prediction", TextRole::Label)]);
@@ -182,7 +181,7 @@ pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static 
         theme.label(" s"),
     ]));
     rows.push(match prediction.value.touchdown.violations() {
-        None => theme.line("inside every limit", TextRole::Good),
+        None => theme.line("inside the envelope", TextRole::Good),
         Some(names) => theme.line(format!("OUTSIDE {names}"), TextRole::Alarm),
     });
     ("Touchdown predicted", rows)
@@ -191,10 +190,11 @@ pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static 
 /// How the flight ended.
 pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
     let ending = Ending::of(&model.vehicle, now)?;
+    let inside = |verdict: Sample<Verdict>| verdict.value.landing.contains(TdLanding::TD_LANDING_ENVELOPE);
     let role = match ending {
-        Ending::Landed => TextRole::Good,
-        Ending::UnderParachute => TextRole::Caution,
-        Ending::Hard | Ending::Lost => TextRole::Alarm,
+        Ending::Stands if model.vehicle.verdict().is_some_and(inside) => TextRole::Good,
+        Ending::Stands | Ending::UnderParachute => TextRole::Caution,
+        Ending::Upright | Ending::Hard | Ending::Lost => TextRole::Alarm,
     };
     Some((ending, role))
 }
@@ -213,7 +213,7 @@ fn limit_lines(
             theme.span(word, word_role),
             theme.label(format!(" {:<8}", row.name)),
             theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
-            theme.label(format!(" {} {}", theme.either_side(&row.limit), row.unit)),
+            theme.label(format!(" {} {}", row.unit, theme.either_side(&row.limit))),
         ])
     };
     rows.iter().map(line).collect()
@@ -229,41 +229,34 @@ pub struct LimitRow {
     pub value: f64,
     /// The unit of value and limit.
     pub unit: &'static str,
-    /// The limit as text; `--` until the vehicle has reported it.
+    /// The limit with its unit; `--` until the vehicle has reported it, empty where there is none.
     pub limit: String,
-    /// How much of the limit is used: 0 for a perfect landing, 1 at the limit; NaN until it is reported.
+    /// How much of the limit is used: 0 for a perfect landing, 1 at the limit; NaN without one.
     pub used: f64,
     /// Whether the vehicle says that the limit is kept.
     pub kept: bool,
 }
 
-/// The six limits in the order of the state. Limits and judgement are the vehicle's own.
+/// A touchdown and the design envelope of the legs. Limits and judgement are the vehicle's own.
 pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
     let told = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
         limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
     };
-    let (lowest_m, highest_m) = (told(|l| l.altitude_min_m), told(|l| l.altitude_max_m));
-    // From the ground towards the edge on its side; one edge may be the ground itself.
-    let edge_m = match at.altitude_m {
-        0.0 => f64::INFINITY,
-        below if below < 0.0 => lowest_m.abs(),
-        _ => highest_m.abs(),
-    };
     let degrees = f64::to_degrees;
     let rows = [
-        (at.x_m.abs(), told(|l| l.x_m), "m"),
-        (at.altitude_m, edge_m, "m"),
-        (degrees(at.tilt_rad()), degrees(told(|l| l.pitch_error_rad)), "deg"),
-        (-at.u_m_s, told(|l| l.u_m_s), "m/s"),
-        (at.w_m_s.abs(), told(|l| l.w_m_s), "m/s"),
-        (degrees(at.q_rad_s.abs()), degrees(told(|l| l.q_rad_s)), "deg/s"),
+        (at.distance_m, f64::NAN, "m"),
+        (at.height_m, f64::NAN, "m"),
+        (-at.vertical_m_s, told(|l| l.vertical_m_s), "m/s"),
+        (at.lateral_m_s, told(|l| l.lateral_m_s), "m/s"),
+        (degrees(at.tilt_rad), degrees(told(|l| l.tilt_rad)), "deg"),
+        (degrees(at.rate_rad_s), degrees(told(|l| l.rate_rad_s)), "deg/s"),
     ];
     std::array::from_fn(|place| {
         let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
         let limit = match bit {
+            TdLimit::TD_LIMIT_DISTANCE | TdLimit::TD_LIMIT_HEIGHT => String::new(),
             _ if limits.is_none() => "--".to_owned(),
-            TdLimit::TD_LIMIT_ALTITUDE => format!("{}..{}", shortest(lowest_m), shortest(highest_m)),
-            _ => format!("±{}", shortest(most)),
+            _ => format!("±{} {unit}", shortest(most)),
         };
         LimitRow { name, value, unit, limit, used: value.abs() / most, kept: !at.violated.contains(bit) }
     })
@@ -326,58 +319,42 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
 #[cfg(test)]
 mod limit_rows_tests {
     use super::*;
-    use std::f64::consts::FRAC_PI_2;
 
-    fn limit_words(limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> Vec<String> {
-        let touchdown = Touchdown {
-            x_m: 0.0,
-            altitude_m: 0.0,
-            pitch_rad: FRAC_PI_2,
-            u_m_s: 0.0,
-            w_m_s: 0.0,
-            q_rad_s: 0.0,
+    const LIMITS: TD_TOUCHDOWN_LIMITS_DATA = TD_TOUCHDOWN_LIMITS_DATA {
+        vertical_m_s: 1.5,
+        lateral_m_s: 0.6,
+        tilt_rad: 0.1,
+        rate_rad_s: 0.2,
+        fence_m: 120.0,
+        gimbal_limit_rad: 0.1,
+    };
+
+    /// So much of every limit, sinking.
+    fn at(share: f64) -> Touchdown {
+        Touchdown {
+            distance_m: 3.0,
+            height_m: 0.0,
+            vertical_m_s: -1.5 * share,
+            lateral_m_s: 0.6 * share,
+            tilt_rad: 0.1 * share,
+            rate_rad_s: 0.2 * share,
             violated: TdLimit::empty(),
-        };
-        limit_rows(&touchdown, limits).into_iter().map(|row| row.limit).collect()
+        }
     }
 
     #[test]
     fn limits_are_the_vehicles_own_and_unknown_before_it_reports_them() {
-        assert_eq!(limit_words(None), ["--"; 6]);
-        let limits = TD_TOUCHDOWN_LIMITS_DATA {
-            x_m: 3.0,
-            altitude_min_m: -0.1,
-            altitude_max_m: 0.25,
-            pitch_error_rad: 7.5_f32.to_radians(),
-            u_m_s: 1.5,
-            w_m_s: 0.6,
-            q_rad_s: 12.0_f32.to_radians(),
-            gimbal_limit_rad: 0.1,
-        };
-        assert_eq!(limit_words(Some(&limits)), ["±3", "-0.1..0.25", "±7.5", "±1.5", "±0.6", "±12"]);
+        let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
+        assert_eq!(words(None), ["", "", "--", "--", "--", "--"]);
+        assert_eq!(words(Some(&LIMITS)), ["", "", "±1.5 m/s", "±0.6 m/s", "±5.7 deg", "±11.5 deg/s"]);
     }
 
     #[test]
     fn every_limit_is_used_from_a_perfect_landing_to_its_edge() {
-        let limits = TD_TOUCHDOWN_LIMITS_DATA {
-            x_m: 3.0,
-            altitude_min_m: -0.1,
-            altitude_max_m: 0.3,
-            pitch_error_rad: 0.1,
-            u_m_s: 1.5,
-            w_m_s: 0.6,
-            q_rad_s: 0.2,
-            gimbal_limit_rad: 0.1,
-        };
-        let at = |x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s| {
-            let violated = TdLimit::empty();
-            let at = Touchdown { x_m, altitude_m, pitch_rad, u_m_s, w_m_s, q_rad_s, violated };
-            limit_rows(&at, Some(&limits)).map(|row| row.used)
-        };
-        let upright = std::f64::consts::FRAC_PI_2;
-        let close = |found: [f64; 6], expected: f64| found.iter().all(|used| (used - expected).abs() < 1e-6);
-        assert!(close(at(0.0, 0.0, upright, 0.0, 0.0, 0.0), 0.0));
-        assert!(close(at(-3.0, -0.1, upright - 0.1, -1.5, 0.6, -0.2), 1.0));
-        assert!(close(at(6.0, 0.6, upright + 0.2, 3.0, 1.2, 0.4), 2.0));
+        for share in [0.0, 1.0, 2.0] {
+            let used = limit_rows(&at(share), Some(&LIMITS)).map(|row| row.used);
+            assert!(used[..2].iter().all(|used| used.is_nan()), "they have no limit");
+            assert!(used[2..].iter().all(|used| (used - share).abs() < 1e-6), "{used:?}");
+        }
     }
 }

@@ -3,20 +3,20 @@
 use ground::key::Key;
 use ground::model::Ending;
 use protocol::dialect::{
-    MavSeverity, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+    MavSeverity, TdAbortEffect, TdChute, TdHold, TdInterlock, TdLanding, TdLatch, TdLimit, TdMotor, TdPhase,
 };
 
 use crate::rig::Rig;
 use crate::screens::{counting, descending, powered};
 
 /// A verdict on a vehicle that fell from the descent: vertical and horizontal speed at contact, m/s.
-fn judged(speeds_m_s: [f32; 2], landed: bool, violated: TdLimit, chute: TdChute) -> Rig {
+fn judged(speeds_m_s: [f32; 2], landing: TdLanding, violated: TdLimit, chute: TdChute) -> Rig {
     let mut rig = descending();
-    rig.limits_of_legs();
+    rig.limits();
     rig.descent_with(0.0, 0.0, chute);
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     let [down_m_s, across_m_s] = speeds_m_s;
-    rig.contact([12.0, 1.5, -down_m_s, across_m_s, 0.0], landed, violated);
+    rig.contact([12.0, 0.07, -down_m_s, across_m_s, 0.0], landing, violated);
     rig.run(0.5);
     rig
 }
@@ -25,20 +25,33 @@ fn ending(rig: &Rig) -> Option<Ending> {
     Ending::of(&rig.model.vehicle, rig.now)
 }
 
-/// Each of the four ends has its own word on the review, on the landing page, in the events, in the alarm and on small
+/// Each of the ends has its own word on the review, on the landing page, in the events, in the alarm and on small
 /// screens.
 #[test]
-fn four_ends_have_four_words_everywhere() {
+fn each_end_has_its_word_everywhere() {
     use TdChute::{TD_CHUTE_OPEN as OPEN, TD_CHUTE_STOWED as STOWED};
-    let sink = TdLimit::TD_LIMIT_AXIAL_SPEED;
+    const STANDS: TdLanding = TdLanding::TD_LANDING_STANDS;
+    const UPRIGHT: TdLanding = TdLanding::TD_LANDING_UPRIGHT;
+    let sink = TdLimit::TD_LIMIT_VERTICAL_SPEED;
     let cases = vec![
-        (judged([0.4, 0.1], true, TdLimit::empty(), STOWED), "LANDED inside every limit of the legs"),
-        (judged([6.1, 9.0], false, sink, OPEN), "DOWN UNDER THE PARACHUTE, sinking at 6.1 m/s"),
         (
-            judged([2.4, 0.3], false, sink | TdLimit::TD_LIMIT_PITCH, STOWED),
-            "HARD LANDING: outside tilt, sink",
+            judged([0.2, 0.05], TdLanding::all(), TdLimit::empty(), STOWED),
+            "STANDS UNDAMAGED, inside the design envelope of its legs, inside Table 2",
         ),
-        (judged([39.0, 2.0], false, sink, STOWED), "LOST: hit the ground at 39 m/s"),
+        (
+            judged([1.4, 0.1], STANDS | UPRIGHT, sink, STOWED),
+            "STANDS UNDAMAGED, outside the design envelope of its legs, outside Table 2",
+        ),
+        (
+            judged([1.4, 0.1], UPRIGHT, sink, STOWED),
+            "UPRIGHT, taken as damaged, outside the design envelope of its legs, outside Table 2",
+        ),
+        (judged([6.1, 9.0], UPRIGHT, sink, OPEN), "DOWN UNDER THE PARACHUTE, sinking at 6.1 m/s"),
+        (
+            judged([2.4, 0.3], TdLanding::empty(), sink | TdLimit::TD_LIMIT_TILT, STOWED),
+            "HARD LANDING: not upright, outside sink, tilt",
+        ),
+        (judged([39.0, 2.0], TdLanding::empty(), sink, STOWED), "LOST: hit the ground at 39 m/s"),
     ];
     for (mut rig, sentence) in cases {
         let word = ending(&rig).expect("it is down").word();
@@ -48,22 +61,21 @@ fn four_ends_have_four_words_everywhere() {
             let screen = rig.screen(80, 24);
             let reason = screen.lines().nth(3).unwrap_or_default();
             assert!(reason.contains(&format!("{word}; do not approach")), "{digit}: {screen}");
-            assert!(!screen.contains("NOT LANDED") && !screen.contains("Table 2"), "{screen}");
         }
         rig.key(Key::Char('4'));
         assert!(rig.screen(80, 24).contains(&format!(" {sentence}")), "{}", rig.screen(80, 24));
         let alarms: Vec<_> = rig.model.alarms.list().iter().map(|alarm| alarm.text.as_str()).collect();
-        assert_eq!(alarms.contains(&sentence), word != "LANDED", "{alarms:?}");
+        assert_eq!(alarms.contains(&sentence), word != "STANDS UNDAMAGED", "{alarms:?}");
     }
 }
 
 /// A canopy that was thrown out too late does not make an impact a descent under a parachute.
 #[test]
 fn an_impact_with_a_parachute_that_did_not_fill_is_lost() {
-    let violated = TdLimit::TD_LIMIT_AXIAL_SPEED;
-    let rig = judged([22.0, 1.0], false, violated, TdChute::TD_CHUTE_OPEN);
+    let violated = TdLimit::TD_LIMIT_VERTICAL_SPEED;
+    let rig = judged([22.0, 1.0], TdLanding::empty(), violated, TdChute::TD_CHUTE_OPEN);
     assert_eq!(ending(&rig), Some(Ending::Lost));
-    let rig = judged([0.9, 0.2], false, TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
+    let rig = judged([0.9, 0.2], TdLanding::empty(), TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
     assert!(rig.events().contains("HARD LANDING: it did not stay upright"), "{}", rig.events());
 }
 
@@ -188,7 +200,7 @@ fn a_text_is_the_reason_of_a_latch_without_one() {
 /// The link is lost at T-1.8 s, and the vehicle launches unheard.
 fn unheard() -> Rig {
     let mut rig = counting();
-    rig.limits_of_legs();
+    rig.limits();
     rig.countdown_ms = 1_800;
     rig.run(0.1);
     rig.speaks = false;
@@ -231,7 +243,7 @@ fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.run(1.0);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("LANDED; do not approach for 55 s"), "{screen}");
+    assert!(screen.contains("STANDS UNDAMAGED; do not approach for 55 s"), "{screen}");
     rig.state(40.7, 0.0, 0.0, 0.0, 89.0);
     let find = rig.screen(80, 24);
     assert!(find.contains("41 m, bearing 000 deg") && !find.contains("IN THE AIR?"), "{find}");
@@ -283,8 +295,8 @@ fn a_hold_in_the_silence_takes_the_warning_back() {
 /// The review begins with what the vehicle found, first in time; what has not arrived is said.
 #[test]
 fn the_review_says_what_went_wrong() {
-    let sink = TdLimit::TD_LIMIT_AXIAL_SPEED;
-    let mut rig = judged([2.4, 0.3], false, sink, TdChute::TD_CHUTE_STOWED);
+    let sink = TdLimit::TD_LIMIT_VERTICAL_SPEED;
+    let mut rig = judged([2.4, 0.3], TdLanding::empty(), sink, TdChute::TD_CHUTE_STOWED);
     rig.key(Key::Char('4'));
     assert!(!rig.screen(120, 36).contains("what went wrong"), "an older vehicle says nothing of it");
     rig.finding(1, 3, 15.75, "landing motor's impulse 0.867 of the mission's");
@@ -300,7 +312,7 @@ fn the_review_says_what_went_wrong() {
     rig.finding(2, 3, 25.0, "battery down to 6.50 V");
     assert!(!rig.screen(120, 36).contains("not heard yet"));
 
-    let mut rig = judged([0.4, 0.1], true, TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
+    let mut rig = judged([0.4, 0.1], TdLanding::all(), TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
     rig.finding(0, 0, 0.0, "");
     rig.key(Key::Char('4'));
     assert!(rig.screen(120, 36).contains("nothing found"), "{}", rig.screen(120, 36));

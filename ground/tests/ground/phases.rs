@@ -73,7 +73,7 @@ fn regress_landed() {
 fn regress_not_landed() {
     let mut rig = powered();
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
-    rig.verdict(false, TdLimit::TD_LIMIT_AXIAL_SPEED | TdLimit::TD_LIMIT_PITCH);
+    rig.verdict(false, TdLimit::TD_LIMIT_VERTICAL_SPEED | TdLimit::TD_LIMIT_TILT);
     rig.run(0.5);
     snapshot("not_landed", &rig);
 }
@@ -107,7 +107,7 @@ fn in_phase(
     lean: (f64, f64),
 ) -> Rig {
     let mut rig = armed();
-    rig.limits_of_legs();
+    rig.limits();
     rig.run(10.0);
     rig.phase = phase;
     rig.abort_effect = effect;

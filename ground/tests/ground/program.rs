@@ -101,7 +101,7 @@ fn a_landing_ends_with_code_0_and_names_its_log() {
     let output = ground(directory.path(), &["--speed", "4", "--start", "apogee"]);
     let text = out(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", err(&output));
-    for words in ["phase PAD_ARMED -> ", "countdown started", "ground contact", "LANDED"] {
+    for words in ["phase PAD_ARMED -> ", "countdown started", "ground contact", "STANDS UNDAMAGED"] {
         assert!(text.contains(words), "{words} is missing in\n{text}");
     }
     assert!(text.lines().count() <= 40, "it is read by somebody who wants to see what flies:\n{text}");
@@ -145,7 +145,7 @@ fn a_landing_ends_with_code_0_and_names_its_log() {
         "ARM observed",
         "START observed",
         "phase PAD_ARMED -> ",
-        "LANDED",
+        "STANDS UNDAMAGED",
     ] {
         assert!(replayed.contains(words), "{words} is missing in\n{replayed}");
     }
@@ -201,7 +201,7 @@ fn the_telemetry_log_contains_the_same_flight() {
         let output = ground(directory.path(), &["--replay", file]);
         assert_eq!(output.status.code(), Some(0), "{file}: {}", err(&output));
         let lines = out(&output);
-        lines.lines().filter(|line| line.starts_with("  ok") || line.starts_with("LANDED")).count()
+        lines.lines().filter(|line| line.starts_with("  ok") || line.starts_with("STANDS UNDAMAGED")).count()
     };
     assert_eq!((verdict("f.mcap"), verdict("f.tlog")), (7, 7));
     let output = ground(directory.path(), &["--log", "none", "--tlog", "g.tlog"]);

@@ -149,7 +149,7 @@ fn a_run_without_auto_sends_no_command() {
 #[test]
 fn a_run_without_a_screen_ends_after_the_verdict() {
     for (landed, violated, expected) in
-        [(true, TdLimit::empty(), Exit::Landed), (false, TdLimit::TD_LIMIT_AXIAL_SPEED, Exit::OutsideLimits)]
+        [(true, TdLimit::empty(), Exit::Landed), (false, TdLimit::TD_LIMIT_VERTICAL_SPEED, Exit::NotLanded)]
     {
         let mut rig = Rig::new(settings(false, false));
         rig.phase = TdPhase::TD_PHASE_POWERED;

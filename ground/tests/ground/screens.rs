@@ -70,7 +70,7 @@ fn limits_are_shown_once_the_vehicle_has_reported_them() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('3'));
     rig.actuators(0);
-    rig.plan(TdLimit::TD_LIMIT_AXIAL_SPEED);
+    rig.plan(TdLimit::TD_LIMIT_VERTICAL_SPEED);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("NO sink      0.05"), "{screen}");
     let large = rig.screen(140, 45);

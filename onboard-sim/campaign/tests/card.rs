@@ -7,6 +7,7 @@ use campaign::motors::range_safety::{
     FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
 use campaign::motors::source::Candidate;
+use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 use sim::recipe::Recipe;
@@ -18,7 +19,8 @@ fn rule() -> Rule {
 
 fn impact(way: Way, number: usize, along_m: f64, across_m: f64, landed: bool) -> Impact {
     let (place_m, course) = (Some([along_m, across_m]), Course::default());
-    Impact { way, number: number as u64, place_m, downwind_rad: 0.0, landed, course }
+    let landing = Landing { stands: landed, ..Landing::default() };
+    Impact { way, number: number as u64, place_m, downwind_rad: 0.0, landing, course }
 }
 
 /// Flights in winds from 0 m/s on, each with its places in two ways.
@@ -65,10 +67,10 @@ proptest! {
     #[test]
     fn a_rate_is_the_share_of_the_flights_as_planned_and_nothing_else(flown in flown(FEWEST as usize..200)) {
         for ((_, impacts), wind) in flown.iter().zip(in_winds(&flown, &rule())) {
-            let landed = wind.landed.unwrap();
+            let landed = wind.landed.unwrap().stands;
             let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
             prop_assert_eq!(landed.of, planned.clone().count() as u64);
-            prop_assert_eq!(landed.count, planned.filter(|impact| impact.landed).count() as u64);
+            prop_assert_eq!(landed.count, planned.filter(|impact| impact.landing.stands).count() as u64);
             prop_assert!(landed.low <= landed.share && landed.share <= landed.high);
         }
     }
@@ -289,7 +291,7 @@ fn a_card_says_at_which_masses_nine_of_ten_land() {
     assert!(masses.len() > 2 && masses.is_sorted_by(|a, b| a.0 < b.0), "{masses:?}");
     let own_kg = recipe.mission.airframe.mass.loaded_kg;
     let own = masses.iter().position(|(kg, _)| (kg - own_kg).abs() < 1e-12).unwrap();
-    assert!(masses[own].1.share >= 0.9, "{masses:?}");
+    assert!(masses[own].1.stands.share >= 0.9, "{masses:?}");
     // Only the ends may be masses at which fewer land.
-    assert!(masses[1..masses.len() - 1].iter().all(|(_, landed)| landed.share >= 0.9), "{masses:?}");
+    assert!(masses[1..masses.len() - 1].iter().all(|(_, landed)| landed.stands.share >= 0.9), "{masses:?}");
 }

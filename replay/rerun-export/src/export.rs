@@ -3,6 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
+use flight::rules::verdict::TABLE_2;
 use flight::vehicle::mission::Mission;
 use re_lenses::{CastTo, Lens, LensBuilderError, LensError, Lenses, OutputMode, Selector, default_runtime};
 use re_mcap::{DecoderRegistry, McapFile, TopicFilter};
@@ -172,7 +173,7 @@ impl Survey {
         pad.push(vec![[0.0, -length_m, 0.0], [0.0, length_m, 0.0]]);
         recording.log_static(at("pad"), &lines(pad, PAD))?;
         if let Some(mission) = &self.mission {
-            let limit = circle(mission.touchdown_limits.x_m as f32);
+            let limit = circle(TABLE_2.distance_m as f32);
             recording.log_static(at("pad/limit"), &lines(vec![limit], LIMIT))?;
         }
         recording.log_static(at("flown"), &lines(vec![self.path_m.clone()], flown))

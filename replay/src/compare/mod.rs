@@ -150,14 +150,11 @@ pub fn compare(
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
-    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
-    if tolerances.verdict_must_agree() && landed(&verdicts.0) != landed(&verdicts.1) {
-        let word = |landed: Option<bool>| match landed {
-            Some(true) => "landed",
-            Some(false) => "not landed",
-            None => "no verdict",
-        };
-        let (then, now) = (word(landed(&verdicts.0)), word(landed(&verdicts.1)));
+    let word = |verdict: &Option<VerdictFacts>| {
+        verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
+    };
+    let (then, now) = (word(&verdicts.0), word(&verdicts.1));
+    if tolerances.verdict_must_agree() && then != now {
         failures.push(format!("the verdicts differ: {then} and {now}"));
     }
     Ok(Comparison {

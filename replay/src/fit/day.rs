@@ -339,7 +339,7 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Resul
             ..drawn.truth
         };
         let draw = Draw { truth, ..drawn };
-        Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().legs)
+        Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().landing.stands)
     };
     let stopwatch = Stopwatch::start();
     let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));

@@ -495,7 +495,9 @@ fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
         return Ok(());
     };
     row(output, "", &format!("touchdown at {}", info.clocks.words(verdict.contact())))?;
-    for (whose, limits) in [("", &verdict.limits), ("Table 2: ", &verdict.table_2)] {
+    for (whose, limits) in
+        [("", &verdict.borne), ("envelope: ", &verdict.envelope), ("Table 2: ", &verdict.table_2)]
+    {
         for limit in limits.iter().filter(|limit| !limit.passed) {
             let (name, unit) = (shown(&limit.name), shown(&limit.unit));
             let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));

@@ -1,13 +1,13 @@
 //! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
 
+use flight::rules::verdict::{FlightEnding, Landing, UNDER_PARACHUTE};
 use protocol::dialect::{
-    MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdPhase,
+    MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdLimit, TdPhase,
 };
 use protocol::frame::{Frame, Framer};
 use protocol::log::reader::LogChannel;
 use protocol::log::record::TOPIC_RAW_RX;
 use protocol::log::v1;
-use sim::ending::{FlightEnding, UNDER_PARACHUTE};
 
 use serde::Serialize;
 
@@ -15,24 +15,23 @@ use super::{Clock, ClockTime, Entry, StampedEntry};
 
 /// A value of the verdict whose limit no message has given.
 const NOT_TOLD: f64 = f64::NAN;
-/// Limits up to these are the landing paper's Table 2: m/s along and across the axis.
-const TABLE_2_M_S: [f64; 2] = [0.4, 0.1];
-const ROUNDING: f64 = 1e-6;
+const DEGREES: f64 = 180.0 / core::f64::consts::PI;
 
 /// The landing verdict, as recorded or heard.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictFacts {
-    /// Whether the vehicle landed within the limits that decide.
-    pub landed: bool,
+    pub landing: Landing,
     /// How the flight ended, in one sentence.
     pub ending: String,
     /// Time of contact, s.
     pub time_s: f64,
     /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
     pub clock: Clock,
-    /// The limits that decide: those of the legs.
-    pub limits: Vec<VerdictLimit>,
-    /// The landing paper's Table 2, if `limits` are those of the legs and the log has it.
+    /// At contact, by the design envelope of the legs.
+    pub envelope: Vec<VerdictLimit>,
+    /// What legs that can give way have borne, and what else went wrong; a ground station hears nothing of it.
+    pub borne: Vec<VerdictLimit>,
+    /// At contact, by the landing paper's Table 2; a ground station hears no limits of it.
     pub table_2: Vec<VerdictLimit>,
 }
 
@@ -79,13 +78,25 @@ impl VerdictFacts {
             limits.collect()
         };
         Self {
-            landed: verdict.landed,
+            landing: landing_of(&verdict.landing),
             ending: verdict.ending.clone().unwrap_or_default(),
             time_s: verdict.time_s,
             clock: Clock::Flight,
-            limits: facts(&verdict.limits),
+            envelope: facts(&verdict.envelope),
+            borne: facts(&verdict.borne),
             table_2: facts(&verdict.table_2),
         }
+    }
+
+    /// The limits that decide whether it stands undamaged: of legs that can give way what they bore, else their envelope.
+    pub fn deciding(&self) -> impl Iterator<Item = &VerdictLimit> {
+        let give_way = self.borne.iter().any(|limit| limit.maximum > limit.minimum);
+        self.envelope.iter().filter(move |_| !give_way).chain(&self.borne)
+    }
+
+    /// The limits of the legs at contact, and what they bore then.
+    pub(crate) fn of_the_legs(&self) -> impl Iterator<Item = &VerdictLimit> {
+        self.envelope.iter().chain(&self.borne)
     }
 
     /// The verdict that was found in a log.
@@ -143,78 +154,73 @@ impl Heard {
     /// The verdict as a record; its time counts from power-up.
     pub(crate) fn verdict(&self) -> Option<v1::LandingVerdict> {
         let verdict = self.verdict.as_ref()?;
-        let limits = self.limits.as_ref();
         let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
-            limits.map_or(NOT_TOLD, |all| f64::from(limit(all)))
+            self.limits.as_ref().map_or(NOT_TOLD, |limits| f64::from(limit(limits)))
         };
-        let [u_m_s, w_m_s] = [told(|l| l.u_m_s), told(|l| l.w_m_s)];
-        let is_table_2 = u_m_s <= TABLE_2_M_S[0] + ROUNDING && w_m_s <= TABLE_2_M_S[1] + ROUNDING;
-        let names = if is_table_2 {
-            ["x", "altitude", "pitch error", "u", "w", "pitch rate"]
-        } else {
-            ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"]
-        };
-        let upright_deg = (f64::from(verdict.pitch_rad) - core::f64::consts::FRAC_PI_2).to_degrees();
-        let turning_deg_s = f64::from(verdict.q_rad_s).to_degrees();
-        let (tilt_deg, rate_deg_s) =
-            (told(|l| l.pitch_error_rad).to_degrees(), told(|l| l.q_rad_s).to_degrees());
-        // In the order of the verdict's bits.
-        let rows: [(&str, f64, f64, f64); 6] = [
-            ("m", f64::from(verdict.x_m), -told(|l| l.x_m), told(|l| l.x_m)),
-            ("m", f64::from(verdict.altitude_m), told(|l| l.altitude_min_m), told(|l| l.altitude_max_m)),
-            ("deg", if is_table_2 { upright_deg } else { upright_deg.abs() }, -tilt_deg, tilt_deg),
-            ("m/s", f64::from(verdict.u_m_s), -u_m_s, u_m_s),
-            ("m/s", f64::from(verdict.w_m_s), -w_m_s, w_m_s),
-            ("deg/s", turning_deg_s, -rate_deg_s, rate_deg_s),
+        let rows = [
+            (
+                "vertical speed",
+                verdict.vertical_m_s,
+                told(|l| l.vertical_m_s),
+                TdLimit::TD_LIMIT_VERTICAL_SPEED,
+            ),
+            ("lateral speed", verdict.lateral_m_s, told(|l| l.lateral_m_s), TdLimit::TD_LIMIT_LATERAL_SPEED),
+            ("tilt", verdict.tilt_rad, told(|l| l.tilt_rad), TdLimit::TD_LIMIT_TILT),
+            ("rotation rate", verdict.rate_rad_s, told(|l| l.rate_rad_s), TdLimit::TD_LIMIT_RATE),
         ];
-        let limit =
-            |(place, (unit, value, minimum, maximum)): (usize, (&str, f64, f64, f64))| v1::LimitResult {
-                name: names[place].to_owned(),
-                value,
-                minimum,
-                maximum,
-                unit: unit.to_owned(),
-                passed: verdict.limits_violated.bits() & (1 << place) == 0,
+        let limits = rows.map(|(name, value, maximum, bit)| {
+            let (factor, unit) = match bit {
+                TdLimit::TD_LIMIT_TILT => (DEGREES, "deg"),
+                TdLimit::TD_LIMIT_RATE => (DEGREES, "deg/s"),
+                _ => (1.0, "m/s"),
             };
-        let limits: Vec<v1::LimitResult> = rows.into_iter().enumerate().map(limit).collect();
+            let is_signed = bit == TdLimit::TD_LIMIT_VERTICAL_SPEED;
+            v1::LimitResult {
+                name: name.to_owned(),
+                value: factor * f64::from(value),
+                minimum: if is_signed { -maximum } else { 0.0 },
+                maximum: factor * maximum,
+                unit: unit.to_owned(),
+                passed: !verdict.limits_violated.contains(bit),
+            }
+        });
         let broken = limits.iter().find(|limit| !limit.passed).map(|limit| limit.name.as_str());
-        let landed = verdict.landed != 0;
+        let landing = v1::Landing {
+            stands: verdict.landing.contains(TdLanding::TD_LANDING_STANDS),
+            upright: verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT),
+            envelope: verdict.landing.contains(TdLanding::TD_LANDING_ENVELOPE),
+            table_2: verdict.landing.contains(TdLanding::TD_LANDING_TABLE_2),
+        };
         let ending = FlightEnding {
             aborted: self.aborted,
-            landed,
-            table_2: is_table_2.then_some(landed),
+            landing: landing_of(&landing),
             failure: if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken },
         };
         Some(v1::LandingVerdict {
             time_s: f64::from(verdict.contact_ms) / 1e3,
-            state: v1::PlanarState {
-                x_m: f64::from(verdict.x_m),
-                z_m: f64::from(verdict.altitude_m),
-                theta_rad: f64::from(verdict.pitch_rad),
-                u_m_s: f64::from(verdict.u_m_s),
-                w_m_s: f64::from(verdict.w_m_s),
-                q_rad_s: f64::from(verdict.q_rad_s),
-            },
             ending: Some(ending.to_string()),
-            limits,
-            landed,
-            table_2: Vec::new(),
+            landing,
+            envelope: limits.into(),
+            ..v1::LandingVerdict::default()
         })
     }
 }
 
-/// Why a recorded verdict cannot be one: it judges each limit, and the vehicle has landed if all are kept.
+fn landing_of(recorded: &v1::Landing) -> Landing {
+    let v1::Landing { stands, upright, envelope, table_2 } = *recorded;
+    Landing { stands, upright, envelope, table_2 }
+}
+
+/// Why a recorded verdict cannot be one: each of its words is what its limits say.
 pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
-    let v1::LandingVerdict { time_s, state, limits, landed, table_2, ending: _ } = verdict;
-    let v1::PlanarState { x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s } = state;
-    let numbers = [time_s, x_m, z_m, theta_rad, u_m_s, w_m_s, q_rad_s];
-    if numbers.into_iter().any(|number| !number.is_finite()) {
-        return Some("its time and its state are not all numbers".to_owned());
+    let v1::LandingVerdict { time_s, landing, envelope, borne, table_2, ending: _ } = verdict;
+    if !time_s.is_finite() {
+        return Some("its time is no number".to_owned());
     }
-    if limits.is_empty() {
+    if envelope.is_empty() || table_2.is_empty() {
         return Some("it has no limits".to_owned());
     }
-    let wrong = limits.iter().chain(table_2).find(|limit| {
+    let wrong = envelope.iter().chain(borne).chain(table_2).find(|limit| {
         let v1::LimitResult { value, minimum, maximum, passed, .. } = limit;
         // What breaks at a limit may be outside in the moment it reaches it.
         let inside =
@@ -225,13 +231,14 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
         let said = if *passed { "inside" } else { "outside" };
         return Some(format!("{name} {value:?} is said to be {said} {minimum:?} to {maximum:?}"));
     }
-    let kept = limits.iter().all(|limit| limit.passed);
-    (*landed != kept).then(|| {
-        let [landed, kept] =
-            [(*landed, "landed", "not landed"), (kept, "every limit was kept", "a limit was broken")]
-                .map(|(holds, yes, no)| if holds { yes } else { no });
-        format!("it says {landed}, and {kept}")
-    })
+    let kept = |limits: &[v1::LimitResult]| limits.iter().all(|limit| limit.passed);
+    // Legs that cannot give way have borne nothing that is told: their envelope decides.
+    let sound = kept(borne) && (!borne.is_empty() || landing.envelope);
+    let told = [sound && landing.upright, landing.upright, kept(envelope), kept(table_2)];
+    let said = landing_of(landing).flags();
+    let place = (0..4).find(|place| told[*place] != said[*place])?;
+    let is_not = if said[place] { "it says" } else { "it does not say" };
+    Some(format!("{is_not} `{}`, against its limits", Landing::WORDS[place]))
 }
 
 impl Verdicts {

@@ -32,7 +32,6 @@ use protocol::log::writer::LogHeader;
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
-use sim::world::whole::WorldError;
 
 use self::rerun::Rerun;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
@@ -103,35 +102,18 @@ pub enum ReflyError {
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The requested start is not in the log.
+    /// The log does not say how its flight was flown, this build does not know it, the requested start is not in it, or a fault cannot
+    /// be added or left out.
     #[error("{name}: {reason}")]
-    Start {
+    Refused {
         /// The file.
         name: String,
-        /// What was requested and what the log has.
+        /// What is missing or unknown, and what the log has.
         reason: String,
     },
-    /// The flight cannot be set up.
+    /// The flight cannot be set up, or its world cannot be changed this way.
     #[error(transparent)]
     Flight(#[from] SetUpError),
-    /// The world cannot be changed this way at the start.
-    #[error(transparent)]
-    World(#[from] WorldError),
-    /// The log does not say how its flight was flown, or this build does not know it.
-    #[error("{name}: cannot be flown again from its start: {reason}")]
-    Recipe {
-        /// The file.
-        name: String,
-        /// What is missing or unknown.
-        reason: String,
-    },
-    /// A fault cannot be added or left out.
-    #[error("{name}: {reason}")]
-    Fault {
-        /// The file.
-        name: String,
-        reason: String,
-    },
     /// A setting of the controller given to the plant, or the other way round, or one that does not change in flight.
     #[error("{setting}: {belongs}")]
     Misplaced {
@@ -176,10 +158,10 @@ pub struct ReflyReport {
     pub recorded: Option<VerdictFacts>,
     /// The verdict now; `None` if the vehicle did not come down in a minute.
     pub reflown: Option<VerdictFacts>,
-    /// Whether the verdict changed between landed and not landed; `None` if either is unknown.
+    /// Whether one of the two stands undamaged and the other does not; `None` if either is unknown.
     pub verdict_changed: Option<bool>,
-    /// The smallest distance to a touchdown limit, as a fraction of the limit: 1 in the middle of the range, 0 on the
-    /// limit, negative outside. Height is left out, because contact is at the ground. `None` without a contact.
+    /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
+    /// it, negative outside. `None` without a contact.
     pub margin: Option<f64>,
     /// Frames that the controller ran.
     pub frames: usize,
@@ -221,17 +203,17 @@ pub fn refly_flight(
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
     refuse_misplaced(options)?;
     let (_, frames) = recording.recorded_frames()?;
+    let mut rerun = Rerun::of(recording, &FaultChanges::default())?;
     let place = find(recording, frames, &options.start)?;
     let first_frame = frames[place].input.frame;
-    let mut rerun = Rerun::of(recording, &FaultChanges::default())?.fly_before(first_frame);
+    rerun = rerun.fly_before(first_frame);
     let reached = reached(recording, &rerun, &frames[..place]);
     let world = rerun.flight.world();
-    let place_m = world.state().position_m;
     let start = StartState {
         frame: recording.release_frame + first_frame,
         time_s: frames[place].input.time_s,
         phase: place.checked_sub(1).map_or("DEPLOY", |before| phase_name(&frames[before].output)),
-        x_m: libm::hypot(place_m.x, place_m.y),
+        x_m: world.state().position_m.xy().norm(),
         z_m: world.height_m(),
     };
     if options.faults != FaultChanges::default() {
@@ -250,12 +232,11 @@ pub fn refly_flight(
 
     let verdict = sortie::verdict(&rerun.flight);
     let end_s = rerun.flight.frame() as f64 * FRAME_S;
-    rerun
-        .records
-        .extend(verdict.iter().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict.clone())))));
+    let last = verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict))));
+    rerun.records.extend(last);
     let [recorded, reflown] =
         [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
-    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landed);
+    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
     let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
     let mut report = ReflyReport {
         kind: "closed loop: flown again in simulation",
@@ -305,12 +286,10 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
 /// pad. What only a crew or a log's disk makes different does not count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let felt = |frame: &ComputerFrame| {
-        let ComputerInput {
-            measured, known, fins_rad, contact, igniter_continuity, booster_attached, ..
-        } = frame.input.clone();
+        let ComputerInput { measured, fins_rad, contact, igniter_continuity, booster_attached, .. } =
+            frame.input.clone();
         let input = ComputerInput {
             measured,
-            known,
             fins_rad,
             contact,
             igniter_continuity,
@@ -358,8 +337,9 @@ fn change(
     });
     let truth = truth_with(&drawn, &of_truth)?;
     if truth != *world.truth() || true_mission.airframe != *world.airframe() {
-        let motor = truth.curve(&true_mission)?;
-        *rerun.flight.world_mut() = world.changed(&true_mission.airframe, motor.as_ref(), &truth)?;
+        let motor = truth.curve(&true_mission).map_err(SetUpError::from)?;
+        let changed = world.changed(&true_mission.airframe, motor.as_ref(), &truth);
+        *rerun.flight.world_mut() = changed.map_err(SetUpError::from)?;
     }
     Ok(())
 }
@@ -423,18 +403,14 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Res
             (in_phase(&|found| found == *phase), format!("no frame in phase {}", phase.name()))
         }
     };
-    found.ok_or_else(|| ReflyError::Start { name: recording.name.clone(), reason })
+    found.ok_or_else(|| ReflyError::Refused { name: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
 pub fn margin(verdict: &VerdictFacts) -> f64 {
-    let fractions = verdict.limits.iter().filter(|limit| limit.name != "altitude").map(|limit| {
-        let half_width = 0.5 * (limit.maximum - limit.minimum);
-        let fraction = (limit.value - limit.minimum).min(limit.maximum - limit.value) / half_width;
-        // A NaN counts as infinitely far outside.
-        if fraction.is_nan() { f64::NEG_INFINITY } else { fraction }
-    });
-    fractions.fold(f64::INFINITY, f64::min)
+    let left = verdict.deciding().map(|limit| 1.0 - limit.share());
+    // A NaN counts as infinitely far outside.
+    left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(f64::INFINITY, f64::min)
 }
 
 /// Writes a re-flown flight as a log that every command accepts.
@@ -528,7 +504,21 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
             "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
         )?;
     }
-    print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
+    let verdicts = [report.recorded.as_ref(), report.reflown.as_ref()];
+    let [then, now] = verdicts.map(|verdict| verdict_words(verdict, "no verdict"));
+    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
+    writeln!(output, "{:<14} {then:>22} {now:>22}", "verdict")?;
+    for LimitRow { limit, values: [then, now] } in
+        verdict_rows(verdicts[1].or(verdicts[0]), verdicts, shown, " OUTSIDE")
+    {
+        writeln!(
+            output,
+            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
+            shown(&limit.name),
+            limit.minimum,
+            limit.maximum
+        )?;
+    }
     let answer = match report.verdict_changed {
         Some(true) => "the verdict CHANGES",
         Some(false) => "the verdict does not change",
@@ -544,29 +534,6 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
         report.commands_identical,
         report.gimbal_difference_max_rad
     )
-}
-
-/// Two verdicts, limit by limit.
-pub(crate) fn print_verdicts(
-    recorded: Option<&VerdictFacts>,
-    now: Option<&VerdictFacts>,
-    output: &mut impl Write,
-) -> io::Result<()> {
-    let words = |verdict| verdict_words(verdict, "no verdict");
-    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
-    writeln!(output, "{:<14} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
-    for LimitRow { limit, values: [then, now] } in
-        verdict_rows(now.or(recorded), [recorded, now], shown, " OUTSIDE")
-    {
-        writeln!(
-            output,
-            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
-            shown(&limit.name),
-            limit.minimum,
-            limit.maximum
-        )?;
-    }
-    Ok(())
 }
 
 #[derive(Debug, clap::Args)]

@@ -17,7 +17,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use flight_log::logged::{state_from_log, vector_from_log};
 use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
-use protocol::log::{flight_v1, v1};
+use protocol::log::flight_v1;
 
 use super::chart::{Chart, Line};
 use crate::controller::{LoggedComputer, NewPlans};
@@ -177,8 +177,6 @@ pub(super) struct Flight {
     pub(super) plant: Vec<Plant>,
     /// At the planning frames.
     pub(super) thoughts: Vec<Decision>,
-    /// The state at contact.
-    pub(super) contact: Option<[f64; 6]>,
     pub(super) gimbal: Vec<GimbalAxis>,
     /// Vehicle time, s, and thrust as estimated in flight, N.
     pub(super) inferred_n: Vec<(f64, f64)>,
@@ -239,7 +237,6 @@ impl Flight {
             in_space: None,
             plant: Vec::new(),
             thoughts: Vec::new(),
-            contact: recording.verdict.as_ref().map(|verdict| state_of(&verdict.state)),
             gimbal: vec![gimbal],
             inferred_n: Vec::new(),
             plans: Vec::new(),
@@ -275,11 +272,6 @@ impl Flight {
             (None, Some(track)) => (Teller::Estimate, track),
             (None, None) => (Teller::Nobody, Vec::new()),
         };
-        // In the same plane as everything else.
-        let contact = recording.verdict.as_ref().map(|verdict| {
-            let sample = plant.iter().rfind(|plant| plant.sample.time_s <= verdict.time_s);
-            sample.map_or_else(|| state_of(&verdict.state), |plant| plant.sample.state)
-        });
         Self {
             vehicle: Some(Vehicle::of(mission)),
             in_space: Some(in_space(&recording, mission, again, pilot, &plane, test_ratios)),
@@ -299,7 +291,6 @@ impl Flight {
             spans: Vec::new(),
             plant,
             thoughts,
-            contact,
             teller,
             track,
             recording,
@@ -366,6 +357,12 @@ impl Flight {
         ignition.into_iter().chain(touchdown).collect()
     }
 
+    /// The last known state before contact.
+    pub(super) fn contact(&self) -> Option<[f64; 6]> {
+        let contact_s = self.touchdown_s?;
+        self.track.iter().rfind(|sample| sample.time_s <= contact_s).map(|sample| sample.state)
+    }
+
     /// Whether the vehicle is still in the air at a time.
     pub(super) fn is_before_contact(&self, time_s: f64) -> bool {
         self.touchdown_s.is_none_or(|touchdown_s| time_s <= touchdown_s)
@@ -387,10 +384,6 @@ impl Flight {
 
 pub(super) fn phase_of(number: u32) -> Option<Phase> {
     u8::try_from(number).ok().and_then(Phase::from_index)
-}
-
-fn state_of(state: &v1::PlanarState) -> [f64; 6] {
-    [state.x_m, state.z_m, state.theta_rad, state.u_m_s, state.w_m_s, state.q_rad_s]
 }
 
 /// What the frames tell beside the plane of the landing.

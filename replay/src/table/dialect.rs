@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    use protocol::dialect::{MavMessage, TD_FINS_DATA, TD_LANDING_VERDICT_DATA};
+    use protocol::dialect::{MavMessage, TD_FINS_DATA, TD_LANDING_VERDICT_DATA, TdLanding};
     use protocol::frame::Encoder;
     use protocol::identity::VEHICLE;
 
@@ -278,15 +278,15 @@ mod tests {
     fn every_field_of_a_message_has_its_value() {
         let verdict = TD_LANDING_VERDICT_DATA {
             time_boot_ms: 19_846,
-            u_m_s: -0.31,
-            landed: 1,
+            vertical_m_s: -0.31,
+            landing: TdLanding::TD_LANDING_STANDS,
             ..TD_LANDING_VERDICT_DATA::default()
         };
         let (shape, cells) = row(&MavMessage::TD_LANDING_VERDICT(verdict));
         assert_eq!(shape.name, "mavlink_1_1_td_landing_verdict");
         assert_eq!(cells["time_boot_ms"], Cell::Integer(19_846));
-        assert_eq!(cells["u_m_s"], Cell::Float(f64::from(-0.31_f32)));
-        assert_eq!(cells["landed"], Cell::Integer(1));
+        assert_eq!(cells["vertical_m_s"], Cell::Float(f64::from(-0.31_f32)));
+        assert_eq!(cells["landing"], Cell::Integer(1));
         let (_, cells) =
             row(&MavMessage::TD_FINS(TD_FINS_DATA { commanded: [1, -2, 3, -4], ..TD_FINS_DATA::default() }));
         assert_eq!((&cells["commanded_2"], &cells["commanded_4"]), (&Cell::Integer(-2), &Cell::Integer(-4)));

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::io::Read;
 
+use flight::rules::verdict::Landing;
 use prost_reflect::{
     DescriptorPool, DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor,
     ReflectMessage as _, Value,
@@ -412,7 +413,6 @@ impl TableReader {
         ];
         let name = format!("{}_limits", table_name(TOPIC_VERDICT));
         let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns);
-        let of_legs = if verdict.table_2.is_empty() { "table 2" } else { "legs" };
         let row = |(standard, limit): (&str, &v1::LimitResult)| {
             let cells = vec![
                 time.clone(),
@@ -426,8 +426,12 @@ impl TableReader {
             ];
             Row { table, cells }
         };
-        let decide = verdict.limits.iter().map(|limit| (of_legs, limit));
-        decide.chain(verdict.table_2.iter().map(|limit| ("table 2", limit))).map(row).collect()
+        let [_, _, envelope, table_2] = Landing::COLUMNS;
+        let all = [("borne", &verdict.borne), (envelope, &verdict.envelope), (table_2, &verdict.table_2)];
+        all.into_iter()
+            .flat_map(|(standard, limits)| limits.iter().map(move |one| (standard, one)))
+            .map(row)
+            .collect()
     }
 }
 

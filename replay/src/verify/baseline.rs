@@ -34,7 +34,7 @@ struct Flight {
     /// The recorded decisions are made again, bit for bit; `None` if not all of them could be compared.
     identical: Option<bool>,
     /// When flown again; `None` if it did not come down, or cannot be flown again.
-    landed: Option<bool>,
+    stands: Option<bool>,
     /// The smallest distance to a limit as a fraction of it; see [`margin`].
     margin: Option<f64>,
     /// How it ended, or why that is not known.
@@ -48,13 +48,13 @@ type Flights = BTreeMap<String, Flight>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Change {
-    NoLongerLands,
+    NoLongerStands,
     /// It is gone, is another flight, or can no longer be verified or flown again.
     Lost,
     Worse,
     /// The recorded decisions are not made any more, and the margin is not smaller.
     Diverged,
-    NowLands,
+    NowStands,
     Better,
     New,
     Same,
@@ -63,11 +63,11 @@ enum Change {
 impl Change {
     fn word(self) -> &'static str {
         match self {
-            Self::NoLongerLands => "FLIPPED: lands no longer",
+            Self::NoLongerStands => "FLIPPED: stands no longer",
             Self::Lost => "LOST",
             Self::Worse => "WORSE",
             Self::Diverged => "DIVERGED",
-            Self::NowLands => "FLIPPED: lands now",
+            Self::NowStands => "FLIPPED: stands now",
             Self::Better => "better",
             Self::New => "new",
             Self::Same => "same",
@@ -75,7 +75,7 @@ impl Change {
     }
 
     fn fails(self, may_diverge: bool) -> bool {
-        matches!(self, Self::NoLongerLands | Self::Lost | Self::Worse)
+        matches!(self, Self::NoLongerStands | Self::Lost | Self::Worse)
             || (self == Self::Diverged && !may_diverge)
     }
 
@@ -85,17 +85,17 @@ impl Change {
         if before.content != now.content || (before.margin.is_some() && now.margin.is_none()) {
             return Self::Lost;
         }
-        let landed = |flight: &Flight| flight.landed == Some(true);
+        let stands = |flight: &Flight| flight.stands == Some(true);
         let gained = match (before.margin, now.margin) {
             (Some(before), Some(now)) => now - before,
             (None, Some(_)) => f64::INFINITY,
             _ => 0.0,
         };
-        match (landed(before), landed(now)) {
-            (true, false) => Self::NoLongerLands,
+        match (stands(before), stands(now)) {
+            (true, false) => Self::NoLongerStands,
             _ if gained < -SAME_MARGIN => Self::Worse,
             _ if before.identical == Some(true) && now.identical == Some(false) => Self::Diverged,
-            (false, true) => Self::NowLands,
+            (false, true) => Self::NowStands,
             _ if gained > SAME_MARGIN => Self::Better,
             _ => Self::Same,
         }
@@ -153,7 +153,7 @@ fn fly(path: &Path) -> Option<Flight> {
     Some(Flight {
         content: content_of(path),
         identical,
-        landed: flown.as_ref().map(|verdict| verdict.landed),
+        stands: flown.as_ref().map(|verdict| verdict.landing.stands),
         margin: flown.as_ref().map(margin),
         words: words.into_iter().flatten().collect::<Vec<_>>().join("; "),
     })
@@ -293,8 +293,8 @@ fn print(judged: &[Judged], output: &mut impl Write) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn flight(identical: Option<bool>, landed: bool, margin: f64) -> Flight {
-        Flight { content: None, identical, landed: Some(landed), margin: Some(margin), words: String::new() }
+    fn flight(identical: Option<bool>, stands: bool, margin: f64) -> Flight {
+        Flight { content: None, identical, stands: Some(stands), margin: Some(margin), words: String::new() }
     }
 
     #[test]
@@ -310,13 +310,13 @@ mod tests {
             (flight(diverged, true, 0.6), Change::Diverged, [true, false]),
             (flight(diverged, true, 0.4), Change::Worse, [true, true]),
             (flight(None, true, 0.6), Change::Lost, [true, true]),
-            (flight(identical, false, -0.1), Change::NoLongerLands, [true, true]),
+            (flight(identical, false, -0.1), Change::NoLongerStands, [true, true]),
         ] {
             let change = Change::of(Some(&before), Some(&now));
             assert_eq!((change, [false, true].map(|may| change.fails(may))), (expected, fails));
         }
         let crashed = flight(diverged, false, -2.0);
-        assert_eq!(Change::of(Some(&crashed), Some(&flight(diverged, true, 0.1))), Change::NowLands);
+        assert_eq!(Change::of(Some(&crashed), Some(&flight(diverged, true, 0.1))), Change::NowStands);
         // A divergence that was accepted is no news.
         assert_eq!(Change::of(Some(&crashed), Some(&crashed)), Change::Same);
         // What cannot be verified fails, whether the baseline has it or not.
@@ -339,6 +339,6 @@ mod tests {
             ..flight(Some(true), landed, 0.5)
         };
         assert_eq!(Change::of(Some(&of("crashed", false)), Some(&of("landed", true))), Change::Lost);
-        assert_eq!(Change::of(Some(&of("crashed", false)), Some(&of("crashed", true))), Change::NowLands);
+        assert_eq!(Change::of(Some(&of("crashed", false)), Some(&of("crashed", true))), Change::NowStands);
     }
 }

@@ -1,20 +1,20 @@
-//! Solves one recorded frame again.
+//! Solves the plans of a recorded flight again, and judges them.
 //!
-//! The controller first runs every earlier frame, so that it has the warm start it had in flight. Then the same landing
-//! problem is solved again with a cold start, and the two solutions are compared. The third is the judge's:
-//! [`reference_solver`] shares only the equations of motion with the solver that flies.
+//! The controller first runs every earlier frame, so that it has the warm start it had in flight. The landing that a frame
+//! planned is then solved cold, and by the [`judge`], which is written independently and solves another way. Both plans
+//! are counted by the judge's own dynamics and conditions.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use anyhow::Result;
-use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::guidance::powered::ControlLevel;
-use flight::guidance::powered::Plane;
-use flight::vehicle::dynamics::PlanarState;
+use anyhow::{Context as _, Result};
+use campaign::run::in_parallel;
+use campaign::stopwatch::Stopwatch;
+use flight::computer::pilot::FRAMES_PER_PLAN;
+use flight::guidance::powered::{ControlLevel, LandingSolved};
 use flight_log::frame::level_of;
-use nalgebra::Vector3;
-use nmpc::{Problem, Solution};
+use judge::{Judgement, Score};
+use nmpc::{Outcome as SolveOutcome, State};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
@@ -25,11 +25,9 @@ use crate::log::{Recording, RecordingError};
 use crate::print::{print_json, shown};
 use crate::settings::SettingError;
 
-/// A condition or limit with less margin than this counts as active; in its own unit (m, rad, m/s or rad/s).
-const ACTIVE: f64 = 1e-4;
-
-/// State components in order, with their units.
-const COMPONENTS: [&str; 6] = ["x_m", "z_m", "theta_rad", "u_m_s", "w_m_s", "q_rad_s"];
+/// Plans whose costs differ by less than this share, and whose first gimbal angles by less than this, are the same.
+const SAME_SHARE: f64 = 0.01;
+const SAME_DEG: f64 = 0.5;
 
 /// Why a frame cannot be solved again.
 #[derive(Debug, thiserror::Error)]
@@ -57,49 +55,43 @@ pub enum ExplainError {
     },
 }
 
-/// The result of a solve.
+/// A plan, as the judge counts it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Solved {
-    /// The solver status.
+pub struct PlanFacts {
+    /// How its solve ended.
     pub status: &'static str,
-    /// Newton iterations.
     pub iterations: usize,
-    /// Cost of the plan.
+    /// Running cost.
     pub cost: f64,
-    /// Stationarity residual.
-    pub kkt_stationarity: f64,
-    /// Feasibility residual.
-    pub kkt_feasibility: f64,
-    /// The largest violation of a condition along the path, m, rad, m/s or rad/s.
-    pub condition_miss: f64,
-    /// The first input, rad.
-    pub gimbal_rad: f64,
-}
-
-/// The flown plan beside the reference solver's of the same problem.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Judged {
-    /// What the reference solver finds from its own guesses; it may settle on another branch.
-    pub reference: Solved,
-    /// How much more the flown plan costs, as a fraction, with what it misses of its conditions; negative if it is better.
-    pub flown_dearer: f64,
-    /// How far the first inputs are apart, rad.
-    pub first_input_rad: f64,
-    /// How far the touchdowns are apart, m.
-    pub touchdown_m: f64,
-    /// How far the velocities there are apart, m/s.
+    /// Cost and the price of every broken condition.
+    pub merit: f64,
+    /// The largest miss of a condition, in its unit (m, m/s, rad, rad/s), and which.
+    pub broken: f64,
+    pub broken_condition: Option<String>,
+    /// First gimbal angles towards north and west, deg, and first share of the fins.
+    pub gimbal_deg: [f64; 2],
+    pub fins: f64,
+    /// Place of the touchdown, north and west of the target, m, and vertical velocity there, m/s.
+    pub touchdown_m: [f64; 2],
     pub touchdown_m_s: f64,
 }
 
-/// A limit or condition that the plan touches.
+/// The plan of a frame beside the judge's of the same problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ActiveConstraint {
-    /// The limit as text, as in `w_m_s <= 0.03`.
-    pub what: String,
-    /// Nodes or intervals of the plan at which it is active.
-    pub at: Vec<usize>,
-    /// The largest multiplier among them: how much cost would be saved if the limit were one unit looser.
-    pub multiplier: f64,
+pub struct Judged {
+    /// The plan that flew, or would have.
+    pub flown: PlanFacts,
+    /// Newton iterations and merit of the flying solver with a cold start.
+    pub cold_iterations: usize,
+    pub cold_merit: f64,
+    /// The judge's.
+    pub judge: PlanFacts,
+    /// How much more the flown plan costs than the judge's, as a share, with the price of what it breaks; negative: less.
+    pub flown_dearer: f64,
+    /// How far the first gimbal angles are apart, deg.
+    pub first_input_deg: f64,
+    /// In one sentence.
+    pub verdict: String,
 }
 
 /// A frame that was solved again.
@@ -110,9 +102,9 @@ pub struct FrameReport {
     pub frame: u64,
     /// Vehicle time, s.
     pub time_s: f64,
+    /// Since the thrust began, s.
+    pub burning_s: f64,
     pub phase: &'static str,
-    /// The recorded input.
-    pub input: InputFacts,
     /// The control level that decided.
     pub level: &'static str,
     /// The recorded gimbal commands in pitch and yaw, rad.
@@ -121,168 +113,69 @@ pub struct FrameReport {
     pub gimbal_rad: Vec<f64>,
     /// Whether the whole output is equal to the recorded one, bit for bit; and the memory, unless it covers the pad.
     pub identical: bool,
-    /// The solve as in flight; `None` if this frame solved nothing.
-    pub warm: Option<Solved>,
-    /// The same problem with a cold start.
-    pub cold: Option<Solved>,
-    /// What an independent solver says about the plan.
+    /// `None` if this frame planned nothing.
     pub judged: Option<Judged>,
-    /// The nearest frame that solves a landing: this frame if it does, `None` if no frame does.
-    pub nearest_solved: Option<u64>,
-    /// Limits and conditions that the warm plan touches.
-    pub active: Vec<ActiveConstraint>,
-    /// The plan: time from the frame, s, and state at each node.
-    pub path: Vec<PathPoint>,
+    /// The nearest frame that plans a landing: this frame if it does, `None` if no frame does.
+    pub nearest_planned: Option<u64>,
+    /// The plan: time from the frame, s, and state at each node ([`nmpc::State`]).
+    pub path: Vec<(f64, State)>,
 }
 
-/// The input of the frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct InputFacts {
-    /// State components in order: x, z, theta, u, w, q; in the plane of the landing, with velocities relative to the air.
-    pub state: [f64; 6],
-    pub time_since_ignition_s: f64,
-    /// The gimbal angles held, rad.
-    pub gimbal_applied_rad: Vec<f64>,
-    /// Estimated thrust over nominal thrust.
-    pub thrust_scale: f64,
+/// A frame, and the landing that it planned.
+struct Explained {
+    report: FrameReport,
+    solved: Option<LandingSolved>,
 }
 
-/// A node of the plan.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PathPoint {
-    /// Time from the frame, s.
-    pub time_s: f64,
-    /// State components in order: x, z, theta, u, w, q.
-    pub state: [f64; 6],
-    /// The input from here on, rad; `None` at the end.
-    pub gimbal_rad: Option<f64>,
-}
-
-/// Solves one recorded frame again.
-///
-/// # Errors
-/// See [`ExplainError`].
-pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, ExplainError> {
+/// Runs a recorded flight again, up to a frame or to its end, and solves what the frame, or each, planned.
+fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>, ExplainError> {
     let (start, frames) = recording.replayable_frames()?;
     let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
     let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
-    let place = frames.iter().position(|frame| logged(frame) == number).ok_or_else(|| {
-        let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
-        ExplainError::NoFrame {
-            name: recording.name.clone(),
-            frame: number,
-            first: bound(frames.first()),
-            last: bound(frames.last()),
+    let planned: Vec<u64> = frames.iter().filter(|frame| plans(frame)).map(logged).collect();
+    let mut explained = Vec::new();
+    for recorded in frames {
+        let number = logged(recorded);
+        if only.is_some_and(|only| only != number) || only.is_none() && !planned.contains(&number) {
+            controller.run_again(recorded)?;
+            continue;
         }
-    })?;
-    for before in &frames[..place] {
-        controller.run_again(before)?;
-    }
-    let recorded = &frames[place];
-    let time_s = recorded.input.time_s;
-    let held = place.checked_sub(1).and_then(|before| frames.get(before));
-    let (again, solved) = controller.run_inspected(recorded)?;
-    let pilot = controller.pilot();
-    let warm = solved.as_ref().map(|solved| &solved.warm.solution);
-    let state = match &solved {
-        Some(solved) => solved.problem.initial,
-        None => in_plane(pilot),
-    };
-    Ok(FrameReport {
-        file: recording.name.clone(),
-        frame: number,
-        time_s,
-        phase: phase_name(&again.output),
-        input: InputFacts {
-            state: state.to_array(),
-            time_since_ignition_s: pilot.burning_s(time_s).unwrap_or(0.0),
-            gimbal_applied_rad: held.map_or_else(Vec::new, |held| held.output.gimbal_rad.clone()),
-            thrust_scale: pilot.scales()[0],
-        },
-        level: level_of(&again.output).map_or("unknown", ControlLevel::name),
-        recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
-        gimbal_rad: again.output.gimbal_rad.clone(),
-        identical: again.encode_to_vec() == recorded.encode_to_vec(),
-        warm: warm.map(solved_facts),
-        cold: solved.as_ref().map(|solved| solved_facts(&solved.cold.solution)),
-        judged: solved.as_ref().map(|solved| judged(&solved.problem, &solved.warm.solution)),
-        nearest_solved: nearest(number, frames.iter().filter(|frame| plans(frame)).map(logged)),
-        active: solved
-            .as_ref()
-            .map(|solved| active_constraints(&solved.problem, &solved.warm.solution))
-            .unwrap_or_default(),
-        path: warm.map(path).unwrap_or_default(),
-    })
-}
-
-fn nearest(number: u64, solved: impl Iterator<Item = u64>) -> Option<u64> {
-    solved.min_by_key(|frame| frame.abs_diff(number))
-}
-
-fn solved_facts(solution: &Solution) -> Solved {
-    Solved {
-        status: solution.status.name(),
-        iterations: solution.iterations,
-        cost: solution.cost,
-        kkt_stationarity: solution.kkt_stationarity,
-        kkt_feasibility: solution.kkt_feasibility,
-        condition_miss: solution.condition_miss,
-        gimbal_rad: solution.inputs_rad.first().copied().unwrap_or(f64::NAN),
-    }
-}
-
-fn judged(problem: &Problem, flown: &Solution) -> Judged {
-    let reference = reference_solver::solve(problem, None);
-    let merit = |plan: &Solution| plan.cost + problem.solver.terminal_penalty * plan.condition_miss;
-    let first_rad = |plan: &Solution| plan.inputs_rad.first().copied().unwrap_or(f64::NAN);
-    let end = |plan: &Solution| plan.states.last().copied().unwrap_or_default();
-    let (ours, theirs) = (end(flown), end(&reference));
-    Judged {
-        flown_dearer: merit(flown) / merit(&reference) - 1.0,
-        first_input_rad: (first_rad(flown) - first_rad(&reference)).abs(),
-        touchdown_m: libm::hypot(ours.x_m - theirs.x_m, ours.z_m - theirs.z_m),
-        touchdown_m_s: libm::hypot(ours.u_m_s - theirs.u_m_s, ours.w_m_s - theirs.w_m_s),
-        reference: solved_facts(&reference),
-    }
-}
-
-fn active_constraints(problem: &Problem, solution: &Solution) -> Vec<ActiveConstraint> {
-    let mut active: Vec<ActiveConstraint> = Vec::new();
-    let mut note = |what: String, at: usize, multiplier: f64| match active
-        .iter_mut()
-        .find(|constraint| constraint.what == what)
-    {
-        Some(known) => {
-            known.at.push(at);
-            if multiplier.abs() > known.multiplier.abs() {
-                known.multiplier = multiplier;
-            }
-        }
-        None => active.push(ActiveConstraint { what, at: vec![at], multiplier }),
-    };
-    let limit_rad = problem.gimbal_limit_rad;
-    for (interval, input_rad) in solution.inputs_rad.iter().enumerate() {
-        let [lower, upper] = solution.limit_multipliers.get(interval).copied().unwrap_or_default();
-        if limit_rad - input_rad.abs() < ACTIVE {
-            let multiplier = if *input_rad > 0.0 { upper } else { lower };
-            let sign = if *input_rad > 0.0 { "<= " } else { ">= -" };
-            note(format!("gimbal_rad {sign}{limit_rad:.4}"), interval, multiplier);
+        let (again, solved) = controller.run_inspected(recorded)?;
+        let pilot = controller.pilot();
+        let path = |solved: &LandingSolved| {
+            let time_s = |node: usize| node as f64 * solved.plan.step_s();
+            solved.plan.states().iter().enumerate().map(|(node, state)| (time_s(node), *state)).collect()
+        };
+        explained.push(Explained {
+            report: FrameReport {
+                file: recording.name.clone(),
+                frame: number,
+                time_s: recorded.input.time_s,
+                burning_s: pilot.burning_s(recorded.input.time_s).unwrap_or(0.0),
+                phase: phase_name(&again.output),
+                level: level_of(&again.output).map_or("unknown", ControlLevel::name),
+                recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
+                gimbal_rad: again.output.gimbal_rad.clone(),
+                identical: again.encode_to_vec() == recorded.encode_to_vec(),
+                judged: None,
+                nearest_planned: planned.iter().copied().min_by_key(|frame| frame.abs_diff(number)),
+                path: solved.as_ref().map(path).unwrap_or_default(),
+            },
+            solved,
+        });
+        if only.is_some() {
+            break;
         }
     }
-    let states: Vec<[f64; 6]> = solution.states.iter().map(|state| state.to_array()).collect();
-    let multipliers = solution.end_multipliers.iter().chain(&solution.floor_multipliers);
-    for (condition, multiplier) in problem.conditions().iter().zip(multipliers) {
-        let name = COMPONENTS.get(condition.component).copied().unwrap_or("?");
-        let bound = condition.sign * condition.offset;
-        if condition.equality {
-            note(format!("{name} = {bound:.4}"), condition.node, *multiplier);
-        } else if condition.value(&states) < ACTIVE {
-            let sign = if condition.sign > 0.0 { ">=" } else { "<=" };
-            note(format!("{name} {sign} {bound:.4}"), condition.node, *multiplier);
+    match only.filter(|_| explained.is_empty()) {
+        None => Ok(explained),
+        Some(frame) => {
+            let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
+            let (first, last) = (bound(frames.first()), bound(frames.last()));
+            Err(ExplainError::NoFrame { name: recording.name.clone(), frame, first, last })
         }
     }
-    active
 }
 
 /// Whether a landing is planned in a frame.
@@ -291,26 +184,89 @@ fn plans(frame: &ComputerFrame) -> bool {
     frame.input.frame.is_multiple_of(FRAMES_PER_PLAN) && frame.output.level != idle
 }
 
-/// The estimated motion in the plane of the landing; before such a plane exists, in the world's x-z plane.
-fn in_plane(pilot: &Pilot) -> PlanarState {
-    let nil = Vector3::zeros();
-    let plane = pilot.plane().copied().unwrap_or_else(|| Plane::choose(&nil, &nil, &nil));
-    pilot.estimate().map_or_else(PlanarState::default, |estimate| {
-        let wind_m_s = estimate.wind_m_s.push(0.0).dot(&plane.along);
-        plane.project(&estimate.state, 0.0, wind_m_s)
-    })
+/// Solves one recorded frame again.
+///
+/// # Errors
+/// See [`ExplainError`].
+pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, ExplainError> {
+    // Without that frame it is an error.
+    let Explained { report, solved } = inspected(recording, Some(number))?.swap_remove(0);
+    Ok(FrameReport { judged: solved.as_ref().map(judged), ..report })
 }
 
-fn path(solution: &Solution) -> Vec<PathPoint> {
-    let inputs = solution.inputs_rad.iter().copied().map(Some).chain(std::iter::repeat(None));
-    let points = solution.states.iter().zip(inputs).enumerate();
-    points
-        .map(|(node, (state, gimbal_rad))| PathPoint {
-            time_s: node as f64 * solution.step_s,
-            state: state.to_array(),
-            gimbal_rad,
-        })
-        .collect()
+/// Solves every frame again that planned a landing.
+///
+/// # Errors
+/// See [`ExplainError`].
+pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, ExplainError> {
+    let explained = inspected(recording, None)?;
+    let progress = Stopwatch::start();
+    let one = |frame: &Explained| FrameReport {
+        judged: frame.solved.as_ref().map(judged),
+        ..frame.report.clone()
+    };
+    Ok(in_parallel(&explained, one, &|done| progress.show(done, explained.len(), "plans")))
+}
+
+fn judged(solved: &LandingSolved) -> Judged {
+    let LandingSolved { problem, outcome, plan } = solved;
+    let mut workspace = nmpc::Workspace::default();
+    let cold: SolveOutcome = nmpc::solve(&mut workspace, problem, None);
+    let (states, inputs) = (plan.states(), plan.inputs());
+    let Judgement { converged, iterations, score, states: found, inputs: found_inputs } =
+        judge::solve(problem, Some((states, inputs)));
+    let flown = facts(
+        outcome.status.name(),
+        outcome.iterations,
+        &judge::score(problem, states, inputs),
+        (states, inputs),
+    );
+    let status = if converged { "converged" } else { "best found" };
+    let judge = facts(status, iterations, &score, (&found, &found_inputs));
+    let apart = [0, 1].map(|axis| (flown.gimbal_deg[axis] - judge.gimbal_deg[axis]).abs());
+    let first_input_deg = apart[0].max(apart[1]);
+    let flown_dearer = flown.merit / judge.merit - 1.0;
+    let percent = 100.0 * flown_dearer.abs();
+    let words = if flown_dearer > SAME_SHARE {
+        format!("the judge found a better plan: the flown one is {percent:.2} % dearer")
+    } else if flown_dearer < -SAME_SHARE {
+        format!("the judge found none as good: the flown plan is {percent:.2} % cheaper")
+    } else if first_input_deg > SAME_DEG {
+        "the judge found another plan that is as good".to_owned()
+    } else {
+        "the judge agrees".to_owned()
+    };
+    Judged {
+        verdict: format!("{words}; first gimbal angles are {first_input_deg:.3} deg apart"),
+        cold_iterations: cold.iterations,
+        cold_merit: cold.merit,
+        flown,
+        judge,
+        flown_dearer,
+        first_input_deg,
+    }
+}
+
+fn facts(
+    status: &'static str,
+    iterations: usize,
+    score: &Score,
+    (states, inputs): (&[State], &[[f64; nmpc::INPUTS]]),
+) -> PlanFacts {
+    let [north, west, fins] = inputs.first().copied().unwrap_or([f64::NAN; nmpc::INPUTS]);
+    let end = states.last().copied().unwrap_or([f64::NAN; nmpc::STATES]);
+    PlanFacts {
+        status,
+        iterations,
+        cost: score.cost,
+        merit: score.merit,
+        broken: score.miss,
+        broken_condition: score.worst.map(|(what, node)| format!("{what} at node {node}")),
+        gimbal_deg: [north.to_degrees(), west.to_degrees()],
+        fins,
+        touchdown_m: [end[0], end[1]],
+        touchdown_m_s: end[5],
+    }
 }
 
 /// Most nodes of the plan that are shown.
@@ -321,78 +277,60 @@ const NODES_SHOWN: usize = 12;
 /// # Errors
 /// The output failed.
 pub fn print_explained(report: &FrameReport, output: &mut impl Write) -> io::Result<()> {
-    let FrameReport { frame, time_s, phase, level, input, .. } = report;
-    writeln!(output, "{}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}", shown(&report.file))?;
-    let [x, z, theta, u, w, q] = input.state;
-    writeln!(
-        output,
-        "input    x {x:.3} m, z {z:.3} m, theta {:.3} deg, u {u:.3} m/s, w {w:.3} m/s, q {:.3} deg/s",
-        theta.to_degrees(),
-        q.to_degrees()
-    )?;
-    writeln!(
-        output,
-        "         {:.3} s since ignition, gimbal held {} deg, thrust {:.4} of nominal",
-        input.time_since_ignition_s,
-        degrees(&input.gimbal_applied_rad),
-        input.thrust_scale
-    )?;
+    let FrameReport { frame, time_s, phase, level, burning_s, .. } = report;
+    let head = format!("{}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}", shown(&report.file));
+    match &report.judged {
+        Some(judged) => writeln!(output, "{head}: {}", judged.verdict)?,
+        None => writeln!(output, "{head}")?,
+    }
     let same = if report.identical { "identical bit for bit" } else { "NOT IDENTICAL" };
     writeln!(
         output,
-        "command  {} deg as recorded, {} deg now: {same}",
+        "command  {} deg as recorded, {} deg now: {same}; {burning_s:.3} s since the thrust began",
         degrees(&report.recorded_gimbal_rad),
         degrees(&report.gimbal_rad)
     )?;
-    if report.warm.is_none() && report.cold.is_none() {
-        let nearest = report.nearest_solved.map_or_else(
+    let Some(judged) = &report.judged else {
+        let nearest = report.nearest_planned.map_or_else(
             || "no frame of this log does".to_owned(),
             |nearest| format!("the nearest that does is {nearest}"),
         );
-        return writeln!(output, "solve    this frame solves no landing; {nearest}");
+        return writeln!(output, "plan     this frame plans no landing; {nearest}");
+    };
+    for (name, plan) in [("flown", &judged.flown), ("judge", &judged.judge)] {
+        let broken = plan.broken_condition.as_ref().map_or_else(
+            || "nothing broken".to_owned(),
+            |condition| format!("{condition} broken by {:.1e}", plan.broken),
+        );
+        let ([north_deg, west_deg], [north_m, west_m]) = (plan.gimbal_deg, plan.touchdown_m);
+        writeln!(
+            output,
+            "{name:<8} {}, {} iterations, cost {:.4}, with what is broken {:.4}; gimbal {north_deg:.3} and {west_deg:.3} deg, \
+             fins {:.2}; touches down {north_m:.2} m north, {west_m:.2} m west at {:.3} m/s; {broken}",
+            plan.status, plan.iterations, plan.cost, plan.merit, plan.fins, plan.touchdown_m_s
+        )?;
     }
-    for (name, solved) in [("warm", &report.warm), ("cold", &report.cold)] {
-        match solved {
-            Some(solved) => print_solved(name, solved, output)?,
-            None => writeln!(output, "{name:<8} nothing was kept from a solve at this frame")?,
+    writeln!(
+        output,
+        "cold     {} iterations without the plan before it, with what is broken {:.4}",
+        judged.cold_iterations, judged.cold_merit
+    )?;
+    let stride = report.path.len().div_ceil(NODES_SHOWN).max(1);
+    for (node, (time_s, state)) in report.path.iter().enumerate() {
+        if node % stride != 0 && node + 1 != report.path.len() {
+            continue;
         }
-    }
-    if let (Some(warm), Some(cold)) = (&report.warm, &report.cold) {
+        let name = if node == 0 { "path" } else { "" };
+        let [north, west, up, north_m_s, west_m_s, up_m_s, p, r, ..] = state;
         writeln!(
             output,
-            "         the warm start saves {} iterations; costs differ by {:.3e}, first inputs by {:.3e} rad",
-            cold.iterations.cast_signed() - warm.iterations.cast_signed(),
-            (warm.cost - cold.cost).abs(),
-            (warm.gimbal_rad - cold.gimbal_rad).abs()
+            "{name:<8} +{time_s:.2} s  {north:>7.2} m north {west:>7.2} m west {up:>7.2} m up  {north_m_s:>6.2} {west_m_s:>6.2} \
+             {up_m_s:>6.2} m/s  leans {:>6.2} deg north {:>6.2} deg west",
+            p.to_degrees(),
+            r.to_degrees()
         )?;
     }
-    if let Some(judged) = &report.judged {
-        print_solved("clarabel", &judged.reference, output)?;
-        let word = if judged.flown_dearer > 0.0 { "dearer" } else { "cheaper" };
-        writeln!(
-            output,
-            "         the flown plan is {:.1e} % {word}; first inputs are {:.1e} rad apart, touchdowns {:.1e} m and {:.1e} m/s",
-            100.0 * judged.flown_dearer.abs(),
-            judged.first_input_rad,
-            judged.touchdown_m,
-            judged.touchdown_m_s
-        )?;
-    }
-    for (place, constraint) in report.active.iter().enumerate() {
-        let name = if place == 0 { "active" } else { "" };
-        let at: Vec<String> = constraint.at.iter().map(ToString::to_string).collect();
-        writeln!(
-            output,
-            "{name:<8} {} at {}, multiplier {:.4e}",
-            constraint.what,
-            at.join(" "),
-            constraint.multiplier
-        )?;
-    }
-    if report.active.is_empty() {
-        writeln!(output, "active   none")?;
-    }
-    print_path(report, output)
+    Ok(())
 }
 
 /// One angle, or pitch and yaw.
@@ -400,44 +338,50 @@ fn degrees(rad: &[f64]) -> String {
     rad.iter().map(|rad| format!("{:.4}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
 }
 
-fn print_solved(name: &str, solved: &Solved, output: &mut impl Write) -> io::Result<()> {
+/// Writes the plans of a flight as a table, with the answer first.
+fn print_all(file: &str, reports: &[FrameReport], output: &mut impl Write) -> io::Result<()> {
+    let judged: Vec<(&FrameReport, &Judged)> =
+        reports.iter().filter_map(|report| Some((report, report.judged.as_ref()?))).collect();
+    let count = |is: &dyn Fn(&Judged) -> bool| judged.iter().filter(|(_, judged)| is(judged)).count();
     writeln!(
         output,
-        "{name:<8} {}, {} iterations, cost {:.6}, stationarity {:.1e}, feasibility {:.1e}, conditions missed by {:.1e}",
-        solved.status,
-        solved.iterations,
-        solved.cost,
-        solved.kkt_stationarity,
-        solved.kkt_feasibility,
-        solved.condition_miss
-    )
-}
-
-fn print_path(report: &FrameReport, output: &mut impl Write) -> io::Result<()> {
-    let nodes = &report.path;
-    let stride = nodes.len().div_ceil(NODES_SHOWN).max(1);
-    for (node, point) in nodes.iter().enumerate() {
-        if node % stride != 0 && node + 1 != nodes.len() {
-            continue;
-        }
-        let name = if node == 0 { "path" } else { "" };
-        let [x, z, theta, u, w, q] = point.state;
-        let gimbal =
-            point.gimbal_rad.map_or_else(String::new, |rad| format!(", gimbal {:.3} deg", rad.to_degrees()));
+        "{}: {} plans: the judge agrees within {:.0} % of cost in {} and within {SAME_DEG} deg of the first gimbal angles in {}; \
+         it found a better plan in {}, and none as good in {}",
+        shown(file),
+        judged.len(),
+        100.0 * SAME_SHARE,
+        count(&|judged| judged.flown_dearer.abs() <= SAME_SHARE),
+        count(&|judged| judged.first_input_deg <= SAME_DEG),
+        count(&|judged| judged.flown_dearer > SAME_SHARE),
+        count(&|judged| judged.flown_dearer < -SAME_SHARE),
+    )?;
+    writeln!(output, "{:>8} {:>8} {:<14} {:>10} {:>9} {:>9}  broken", "frame", "T+, s", "level", "merit", "dearer", "first")?;
+    for (report, judged) in judged {
+        let flown = &judged.flown;
         writeln!(
             output,
-            "{name:<8} +{:.1} s  x {x:>7.3} m  z {z:>7.3} m  theta {:>8.3} deg  u {u:>7.3} m/s  w {w:>7.3} m/s  q {:>8.3} deg/s{gimbal}",
-            point.time_s,
-            theta.to_degrees(),
-            q.to_degrees()
+            "{:>8} {:>8.3} {:<14} {:>10.3} {:>7.2} % {:>6.3} deg  {}",
+            report.frame,
+            report.time_s,
+            report.level,
+            flown.merit,
+            100.0 * judged.flown_dearer,
+            judged.first_input_deg,
+            flown.broken_condition.as_deref().unwrap_or("")
         )?;
     }
     Ok(())
 }
 
-pub(super) fn run(file: &Path, number: u64, json: bool) -> Result<Outcome> {
+pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Outcome> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
+    if frame == "all" {
+        let reports = explain_all(&recording)?;
+        answer(|output| if json { print_json(&reports, output) } else { print_all(&recording.name, &reports, output) })?;
+        return Ok(Outcome::Given);
+    }
+    let number = frame.parse().with_context(|| format!("--explain {frame}: neither a frame's number nor `all`"))?;
     let report = explain(&recording, number)?;
     answer(|output| if json { print_json(&report, output) } else { print_explained(&report, output) })?;
     Ok(Outcome::Given)

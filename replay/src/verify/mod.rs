@@ -47,7 +47,9 @@ use serde::Serialize;
 
 use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
-use crate::log::{BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording};
+use crate::log::{
+    BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+};
 use crate::print::{counted, print_json, shown};
 
 /// The topics that a verification reads.
@@ -586,10 +588,8 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     if let Some(obstacle) = &consequence.obstacle {
         return writeln!(output, "verdict: whether it would change is not known: {}", shown(obstacle));
     }
-    let words = |verdict: Option<bool>| match verdict {
-        Some(true) => "LANDED",
-        Some(false) => "NOT LANDED",
-        None => "no verdict",
+    let word = |verdict: &Option<VerdictFacts>| {
+        verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
     };
     let answer = match consequence.changed {
         Some(true) => "would CHANGE",
@@ -599,9 +599,9 @@ fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::
     writeln!(
         output,
         "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
-        words(consequence.recorded.as_ref().map(|verdict| verdict.landed)),
+        word(&consequence.recorded),
         consequence.from_frame,
-        words(consequence.reflown.as_ref().map(|verdict| verdict.landed))
+        word(&consequence.reflown)
     )
 }
 
@@ -617,9 +617,9 @@ pub(crate) struct Args {
     /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
     #[arg(long)]
     strict: bool,
-    /// Solve this frame of the only log again.
-    #[arg(long, value_name = "FRAME", conflicts_with = "strict")]
-    explain: Option<u64>,
+    /// Solve the plan of this frame of the only log again, and judge it; or of `all` frames, which takes a minute.
+    #[arg(long, value_name = "FRAME|all", conflicts_with = "strict")]
+    explain: Option<String>,
     #[command(flatten)]
     held: baseline::Arguments,
     #[command(flatten)]
@@ -634,7 +634,7 @@ impl Args {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
-        if let Some(frame) = self.explain {
+        if let Some(frame) = &self.explain {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, frame, self.json);
         }

@@ -22,7 +22,7 @@ fn recording() -> Recording {
 
 #[test]
 fn the_logged_flight_landed_and_verifies() {
-    assert!(LANDED.landed && recording().verdict.unwrap().landed);
+    assert!(LANDED.landed && recording().verdict.unwrap().landing.stands);
     let report = only(verify(&LANDED.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
 }
@@ -292,19 +292,13 @@ fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
         4 => output.gimbal_rad = vec![number; (bits % 4) as usize],
         5 => output.phase = bits as u32,
         6 => output.level = bits as u32,
-        7 => input.known = None,
+        7 => input.measured.gnss = None,
         8 => input.contact = true,
         9 => input.requests.push(Request { asked: (bits % 12) as u32, ..Request::default() }),
-        _ => {
-            if let Some(measured) = &mut input.measured {
-                match field {
-                    10 => measured.imu.gyro_rad_s.y = number,
-                    11 => measured.imu.specific_force_m_s2.x = number,
-                    12 => measured.pressure_altitude_m = Some(number),
-                    _ => measured.lidar_range_m = Some(number),
-                }
-            }
-        }
+        10 => input.measured.imu.gyro_rad_s.y = number,
+        11 => input.measured.imu.specific_force_m_s2.x = number,
+        12 => input.measured.pressure_altitude_m = Some(number),
+        _ => input.measured.lidar_range_m = Some(number),
     }
 }
 

@@ -74,13 +74,13 @@ fn accepted_logs_pass_until_a_flight_gets_worse() {
     // The baseline had more margin in one flight, less in another, and another ending in the third.
     logs.rewrite("week-1/nominal.mcap", |flight| flight["margin"] = 0.99.into());
     logs.rewrite("week-1/dispersed.mcap", |flight| flight["margin"] = (-0.5).into());
-    logs.rewrite("week-2/mk2.mcap", |flight| flight["landed"] = false.into());
+    logs.rewrite("week-2/mk2.mcap", |flight| flight["stands"] = false.into());
     let (code, stdout, _) = logs.verify(&[]);
     assert_eq!(code, 1, "{stdout}");
     for (log, word) in [
         ("week-1/nominal.mcap", "WORSE"),
         ("week-1/dispersed.mcap", "better"),
-        ("week-2/mk2.mcap", "FLIPPED: lands now"),
+        ("week-2/mk2.mcap", "FLIPPED: stands now"),
     ] {
         assert!(row(&stdout, log).contains(word), "{word}: {stdout}");
     }

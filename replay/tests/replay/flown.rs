@@ -55,10 +55,9 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     };
     let verdict = v1::LandingVerdict {
         time_s: FRAMES as f64 * FRAME_S,
-        landed: true,
-        limits: ["distance", "altitude", "tilt", "vertical speed", "lateral speed", "rotation rate"]
-            .map(limit)
-            .into(),
+        landing: v1::Landing { stands: true, upright: true, envelope: true, table_2: true },
+        envelope: ["vertical speed", "lateral speed", "tilt", "rotation rate"].map(limit).into(),
+        table_2: vec![limit("distance")],
         ..v1::LandingVerdict::default()
     };
     Flight { start, frames, verdict, thoughts, header: campaign_header(&recipe, NUMBER) }

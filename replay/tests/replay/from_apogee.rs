@@ -50,7 +50,7 @@ pub(crate) fn fly_recipe(recipe: &Recipe) -> Logged {
     let verdict = Box::new(sortie::verdict(tally.flight()).unwrap());
     writer.write(&Record::LandingVerdict(verdict), sortie::time_ns(tally.flight())).unwrap();
     writer.finish().unwrap();
-    Logged { directory, log, landed: tally.row().legs }
+    Logged { directory, log, landed: tally.row().stands }
 }
 
 impl Logged {

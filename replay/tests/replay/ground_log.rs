@@ -68,10 +68,10 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
         let (log, vehicle) = (&*GROUND, &*WITH_FRAMES);
         let (heard, own) = (info(log).unwrap(), info(&vehicle.log).unwrap());
         let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
-        assert_eq!((verdict.landed, verdict.clock), (recorded.landed, Clock::Boot));
+        assert_eq!((verdict.landing, verdict.clock), (recorded.landing, Clock::Boot));
         let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
         assert!((verdict.time_s - boot.time_s).abs() < 0.001, "{} {boot}", verdict.time_s);
-        let limits = verdict.limits.iter().zip(&recorded.limits);
+        let limits = verdict.envelope.iter().zip(&recorded.envelope);
         for (heard, own) in limits {
             assert_eq!((&heard.name, &heard.unit, heard.passed), (&own.name, &own.unit, own.passed));
             assert!((heard.value - own.value).abs() < 1e-4, "{heard:?} {own:?}");
@@ -80,9 +80,8 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
         assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
     }
     let (code, stdout, _) = run(&mut replay("info", &GROUND));
-    assert!(code == 0 && stdout.contains("verdict     LANDED"), "{stdout}");
-    // Table 2 is not sent; the legs' verdict does not stand for it.
-    assert!(stdout.contains("Table 2 is not known"), "{stdout}");
+    assert!(code == 0 && stdout.contains("verdict     STANDS UNDAMAGED"), "{stdout}");
+    assert!(stdout.contains("side Table 2"), "{stdout}");
 }
 
 #[test]
@@ -93,7 +92,7 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
     let page = replay::report::report(&GROUND).unwrap().html;
-    assert!(page.contains("LANDED") && page.contains("\ntouchdown\n"));
+    assert!(page.contains("STANDS UNDAMAGED") && page.contains("\ntouchdown\n"));
 }
 
 #[test]
@@ -110,8 +109,8 @@ fn every_message_becomes_a_table_with_every_field() {
     let head = text.lines().next().unwrap();
     assert_eq!(
         head,
-        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,contact_ms,x_m,altitude_m,pitch_rad,u_m_s,w_m_s,\
-         q_rad_s,limits_violated,landed"
+        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,contact_ms,distance_m,\
+         vertical_m_s,lateral_m_s,tilt_rad,rate_rad_s,limits_violated,landing"
     );
     // As many rows as frames of the dialect.
     let frames: u64 = files

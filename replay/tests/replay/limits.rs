@@ -170,7 +170,7 @@ fn many_facts_and_many_limits_do_not_fill_the_memory() {
     };
     let in_pieces: Vec<u8> = (0..100).flat_map(|piece| facts(piece * 10_000, 10_000)).collect();
     let limit = protocol::log::v1::LimitResult { unit: "m".to_owned(), ..Default::default() };
-    let verdict = protocol::log::v1::LandingVerdict { limits: vec![limit; 200_000], ..Default::default() };
+    let verdict = protocol::log::v1::LandingVerdict { envelope: vec![limit; 200_000], ..Default::default() };
     let header =
         LogHeader { profile_toml: Some(crate::flown::mission_toml().to_owned()), ..Default::default() };
     let mut writer = LogWriter::new(std::io::Cursor::new(Vec::new()), &header).unwrap();
@@ -278,7 +278,7 @@ fn a_gigabyte_is_described_within_200_megabytes() {
 fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let (input, output) = (&mut frame.input, &mut frame.output);
-    let measured = input.measured.as_mut().unwrap();
+    let measured = &mut input.measured;
     match field {
         0 => input.time_s = number,
         1 => measured.imu.gyro_rad_s.x = number,

@@ -138,7 +138,7 @@ fn the_whole_flight_is_described() {
     assert!((solve_time.median_s - 0.004).abs() < 1e-12);
     let phases: Vec<&str> = info.phases[0].spans.iter().map(|span| span.phase.as_str()).collect();
     assert_eq!(phases, ["DEPLOY", "AERO_DESCENT"]);
-    assert_eq!(info.verdict.unwrap().limits.len(), 6);
+    assert_eq!(info.verdict.unwrap().envelope.len(), 4);
     let frames = info.channels.iter().find(|channel| channel.topic == "/mavlink/tx/raw").unwrap();
     assert_eq!((frames.messages, frames.lost), (FLIGHT.frames.len() as u64, 0));
 }

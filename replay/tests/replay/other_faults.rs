@@ -35,7 +35,7 @@ fn the_same_flight_with_and_without_a_fault() {
     assert_eq!(flown.verdict, healthy.verdict);
     assert_eq!(
         report.verdict_changed,
-        Some(healthy.verdict.unwrap().landed != broken.verdict.unwrap().landed)
+        Some(healthy.verdict.unwrap().landing.stands != broken.verdict.unwrap().landing.stands)
     );
 }
 

@@ -38,7 +38,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
 fn says_the_verdict_first_and_then_why(page: &str) {
     check(page);
     let order = [
-        "LANDED ",
+        "STANDS UNDAMAGED",
         "Worst of the limits: ",
         "Touchdown at T+",
         "Findings, first in time",
@@ -112,7 +112,7 @@ fn telemetry_alone_makes_a_page() {
     replay::log::import_tlog(&tlog, &log).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
-    assert!(page.contains("From the telemetry of a ground station") && page.contains("LANDED"));
+    assert!(page.contains("From the telemetry of a ground station") && page.contains("STANDS UNDAMAGED"));
 }
 
 /// The mission's own words for a start on its pad.
@@ -169,7 +169,7 @@ fn a_report_with_another_log_draws_both_flights() {
     let page = report_with(&MK2.log, &DISPERSED.log).unwrap().html;
     check(&page);
     let both = page.split("<h2").find(|section| section.contains(">Two flights</h2>")).unwrap();
-    for words in ["Both paths of the landing", "altitude of both, m", "commanded, deg", "LANDED"] {
+    for words in ["Both paths of the landing", "altitude of both, m", "commanded, deg", "STANDS UNDAMAGED"] {
         assert!(both.contains(words), "{words} is not in {both}");
     }
     for figure in both.split("<figure").skip(1) {
@@ -190,7 +190,7 @@ fn the_report_of_a_broken_flight_names_its_cause_first() {
     );
     let findings = page.split("Findings, first in time").nth(1).unwrap();
     assert!(findings.split("<li>").nth(1).unwrap().contains("<a href=\"#burn\">gimbal pitch 10.8 deg"));
-    assert!(page.contains("Simulated: flown again without gimbal-jams:4@powered it is LANDED on its legs"));
+    assert!(page.contains("Simulated: flown again without gimbal-jams:4@powered: STANDS UNDAMAGED"));
     // In every picture of the burn the finding stands where it began.
     assert!(page.matches("class=\"limit\"").count() > 10);
 }

@@ -118,11 +118,13 @@ fn a_flight_without_its_pad_is_no_divergence_and_is_not_whole() {
 
 #[test]
 fn a_verdict_that_contradicts_itself_is_damage() {
-    let changes: [fn(&mut LandingVerdict); 4] = [
-        |verdict| verdict.limits[1].value = f64::NAN,
-        |verdict| verdict.landed = !verdict.landed,
-        |verdict| verdict.limits.clear(),
-        |verdict| verdict.limits[0].value += 1e6,
+    let changes: [fn(&mut LandingVerdict); 6] = [
+        |verdict| verdict.envelope[1].value = f64::NAN,
+        |verdict| verdict.landing.stands = !verdict.landing.stands,
+        |verdict| verdict.landing.upright = !verdict.landing.upright,
+        |verdict| verdict.landing.table_2 = !verdict.landing.table_2,
+        |verdict| verdict.envelope.clear(),
+        |verdict| verdict.envelope[0].value += 1e6,
     ];
     for change in changes {
         let mut held = pad();
@@ -148,9 +150,7 @@ fn inputs_that_cannot_be_are_named() {
         ("time", |frame| frame.input.time_s = f64::NAN),
         ("pin", |frame| frame.input.pin_out = !frame.input.pin_out),
         ("lidar", |frame| {
-            if let Some(measured) = &mut frame.input.measured {
-                measured.lidar_range_m = Some(3e307);
-            }
+            frame.input.measured.lidar_range_m = Some(3e307);
         }),
     ];
     for (name, change) in changes {

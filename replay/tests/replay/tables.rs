@@ -104,7 +104,7 @@ fn different_verdicts_fail_unless_they_are_tolerated() {
     write_log(&path, &recording, &flight).unwrap();
     let (a, b) = (flown(&MK2), Flown::open(&path).unwrap());
     let found = compare(&a, &b, Align::Ignition, &Tolerances::default()).unwrap();
-    assert!(found.failures.contains(&"the verdicts differ: landed and not landed".to_owned()));
+    assert!(found.failures.contains(&"the verdicts differ: stands undamaged and not landed".to_owned()));
     // The weak motor's flight is shorter, so samples are missing at its end.
     assert!(
         found.failures.iter().any(|failure| failure.starts_with("vehicle_truth3d: ")),
@@ -147,7 +147,7 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
         assert_eq!(cells.len(), names.len());
         let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
         assert_eq!(number(gimbal), frame.output.gimbal_rad[1].to_bits());
-        assert_eq!(number(gyro), frame.input.measured.as_ref().unwrap().imu.gyro_rad_s.x.to_bits());
+        assert_eq!(number(gyro), frame.input.measured.imu.gyro_rad_s.x.to_bits());
         assert_eq!(number(fin), frame.output.fins_rad[3].to_bits());
         count += 1;
     }
@@ -200,8 +200,8 @@ fn a_tlog_goes_out_and_comes_in_again() {
     assert_eq!(facts.grade.level, GradeLevel::TelemetryOnly);
     let (then, now) = (Recording::open(&WITH_FRAMES.log).unwrap(), Recording::open(&imported_path).unwrap());
     let (then, now) = (then.verdict.unwrap(), now.verdict.unwrap());
-    assert_eq!((then.landed, then.limits.len()), (now.landed, now.limits.len()));
-    for (a, b) in then.limits.iter().zip(&now.limits) {
+    assert_eq!((then.landing, then.envelope.len()), (now.landing, now.envelope.len()));
+    for (a, b) in then.envelope.iter().zip(&now.envelope) {
         // Single precision over the air.
         let near = |x: f64, y: f64| (x - y).abs() <= 1e-5 * (1.0 + x.abs());
         assert!(a.name == b.name && near(a.value, b.value) && near(a.maximum, b.maximum), "{a:?} {b:?}");

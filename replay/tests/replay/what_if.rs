@@ -8,14 +8,12 @@ use crate::simulated::MK2;
 fn the_margin_is_the_fraction_left_of_the_nearest_limit() {
     let recording = MK2.recording();
     let mut verdict = refly(&recording, &ReflyOptions::default()).unwrap().reflown.unwrap();
-    for limit in &mut verdict.limits {
-        limit.value = 0.5 * (limit.minimum + limit.maximum);
-    }
+    verdict.envelope.iter_mut().for_each(|limit| limit.value = 0.0);
     assert!((margin(&verdict) - 1.0).abs() < 1e-12);
-    verdict.limits[3].value = 0.75 * verdict.limits[3].maximum;
+    verdict.envelope[0].value = 0.75 * verdict.envelope[0].minimum;
     assert!((margin(&verdict) - 0.25).abs() < 1e-12);
-    verdict.limits[4].value = 2.0 * verdict.limits[4].maximum;
+    verdict.envelope[1].value = 2.0 * verdict.envelope[1].maximum;
     assert!((margin(&verdict) + 1.0).abs() < 1e-12);
-    verdict.limits[4].value = f64::NAN;
+    verdict.envelope[1].value = f64::NAN;
     assert!(margin(&verdict).is_infinite() && margin(&verdict) < 0.0);
 }

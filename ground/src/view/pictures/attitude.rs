@@ -101,7 +101,7 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     let burning = vehicle.phase_now().is_some_and(is_burning);
     let gimbal = vehicle.gimbal().map_or_else(Gimbal::default, |gimbal| gimbal.value);
     let limit_rad =
-        vehicle.limits().map(|limits| f64::from(limits.pitch_error_rad)).filter(|limit| *limit < ARC_REACH);
+        vehicle.limits().map(|limits| f64::from(limits.tilt_rad)).filter(|limit| *limit < ARC_REACH);
     let near_ground = vehicle.height_m().is_some_and(|height| height.value < 2.0);
     plane.draw(theme, frame, |context| {
         arc(context, limit_rad, per_dot, theme);

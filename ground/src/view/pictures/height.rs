@@ -192,7 +192,8 @@ pub fn draw_sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         path.iter().map(|(sink, height_m)| (*sink, root(*height_m))).collect::<Vec<_>>()
     };
     let (flown, plan) = (on_scale(&flown), on_scale(&plan));
-    let legs_m_s = vehicle.limits().map(|limits| f64::from(limits.u_m_s)).filter(|most| most.is_finite());
+    let legs_m_s =
+        vehicle.limits().map(|limits| f64::from(limits.vertical_m_s)).filter(|most| most.is_finite());
     plane.draw(theme, frame, |context| {
         if let Some(x) = legs_m_s {
             context.draw(&Line {
@@ -233,6 +234,6 @@ fn planned(model: &Model) -> Vec<(f64, f64)> {
     }
     let between =
         path.windows(2).map(|pair| ((pair[0].1 - pair[1].1) / step_s, f64::midpoint(pair[0].1, pair[1].1)));
-    let end = (-prediction.value.touchdown.u_m_s, prediction.value.touchdown.altitude_m);
+    let end = (-prediction.value.touchdown.vertical_m_s, prediction.value.touchdown.height_m);
     between.chain([end]).collect()
 }

@@ -58,8 +58,8 @@ pub fn comes_down(model: &Model, now: Duration) -> Option<ComesDown> {
 /// The landing that is rehearsed on the pad: east and north, m.
 fn rehearsed(model: &Model) -> Option<(f64, f64)> {
     let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
-    let prediction = model.vehicle.prediction.filter(|_| on_pad)?;
-    Some((0.0, prediction.value.touchdown.x_m)).filter(|(_, north_m)| north_m.is_finite())
+    let (north_m, _) = model.vehicle.planned().last().filter(|_| on_pad)?;
+    Some((0.0, *north_m))
 }
 
 /// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands still while the vehicle moves
@@ -95,7 +95,8 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
     let lost = predict_position(vehicle, now);
-    let fence_m = vehicle.limits().map(|limits| f64::from(limits.x_m)).filter(|m| m.is_finite() && *m > 0.0);
+    let fence_m =
+        vehicle.limits().map(|limits| f64::from(limits.fence_m)).filter(|m| m.is_finite() && *m > 0.0);
     let phase = vehicle.phase_now();
     let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
     let stands = flown.last().copied().filter(|_| stands);

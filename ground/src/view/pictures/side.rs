@@ -63,7 +63,7 @@ pub fn draw_side_view(
         predict_position(vehicle, now).map(|at| (from.sees([at.x_m, at.y_m, at.altitude_m]), at.error_m));
     let reckoned: Vec<(f64, f64)> = lost.iter().map(|(at, _)| *at).collect();
     let points: Vec<(f64, f64)> = [&flown, predicted, &reckoned].concat();
-    let limit_m = vehicle.limits().map(|limits| f64::from(limits.x_m));
+    let limit_m = vehicle.limits().map(|limits| f64::from(limits.fence_m));
     let limit_m = limit_m.filter(|limit_m| limit_m.is_finite() && *limit_m > 0.0);
     let view = Bounds::around(&points, limit_m, area);
     let Bounds { x: [left, right], y: [bottom, top], per_dot } = view;

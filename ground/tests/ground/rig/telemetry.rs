@@ -4,8 +4,8 @@ use mavlink::types::CharArray;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA, TD_DESCENT_DATA,
     TD_FINDING_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdBooster, TdChute, TdControlLevel, TdLimit,
-    TdMotor, TdSolverStatus,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdBooster, TdChute, TdControlLevel, TdLanding,
+    TdLimit, TdMotor, TdSolverStatus,
 };
 
 use super::Rig;
@@ -115,12 +115,12 @@ impl Rig {
         self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
             time_boot_ms,
             time_to_go_ms: 2_300,
-            x_m: -1.4,
-            altitude_m: 0.0,
-            pitch_rad: 1.555,
-            u_m_s: -0.05,
-            w_m_s: 0.03,
-            q_rad_s: -0.008,
+            distance_m: 1.4,
+            height_m: 0.0,
+            vertical_m_s: -0.05,
+            lateral_m_s: 0.03,
+            tilt_rad: 0.016,
+            rate_rad_s: 0.008,
             limits_violated: violated,
         }));
         let points: Vec<(f64, f64)> =
@@ -200,36 +200,26 @@ impl Rig {
         }));
     }
 
-    /// The limits of Table 2 of the landing paper.
+    /// The design envelope of mk2's legs, and its fence.
     pub(crate) fn limits(&mut self) {
-        self.touchdown_limits([20.0, 5.0, 0.4, 0.1, 2.0, 20.0]);
-    }
-
-    /// The limits of mk2: its landing legs, inside its fence.
-    pub(crate) fn limits_of_legs(&mut self) {
-        self.touchdown_limits([120.0, 10.0, 1.0, 0.7, 30.0, 7.0]);
-    }
-
-    fn touchdown_limits(&mut self, [x_m, pitch_deg, u_m_s, w_m_s, q_deg_s, gimbal_deg]: [f32; 6]) {
         self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
-            x_m,
-            altitude_min_m: 0.0,
-            altitude_max_m: 0.2,
-            pitch_error_rad: pitch_deg.to_radians(),
-            u_m_s,
-            w_m_s,
-            q_rad_s: q_deg_s.to_radians(),
-            gimbal_limit_rad: gimbal_deg.to_radians(),
+            vertical_m_s: 1.0,
+            lateral_m_s: 0.7,
+            tilt_rad: 10_f32.to_radians(),
+            rate_rad_s: 30_f32.to_radians(),
+            fence_m: 120.0,
+            gimbal_limit_rad: 7_f32.to_radians(),
         }));
     }
 
     pub(crate) fn verdict(&mut self, landed: bool, violated: TdLimit) {
-        self.contact([-1.428, 1.554, if landed { -0.058 } else { -1.2 }, 0.029, -0.0078], landed, violated);
+        let (landing, sink_m_s) = if landed { (TdLanding::all(), 0.058) } else { (TdLanding::empty(), 1.2) };
+        self.contact([1.428, 0.017, -sink_m_s, 0.029, 0.0078], landing, violated);
     }
 
     /// A landing at this distance from the pad, m.
-    pub(crate) fn verdict_at(&mut self, x_m: f32) {
-        self.contact([x_m, 1.554, -0.058, 0.029, -0.0078], true, TdLimit::empty());
+    pub(crate) fn verdict_at(&mut self, distance_m: f32) {
+        self.contact([distance_m, 0.017, -0.058, 0.029, 0.0078], TdLanding::all(), TdLimit::empty());
     }
 
     /// What went wrong: the finding at this place of so many.
@@ -246,22 +236,21 @@ impl Rig {
         }));
     }
 
-    /// A verdict with the values at contact: distance, pitch, speeds, rate.
-    pub(crate) fn contact(&mut self, figures: [f32; 5], landed: bool, limits_violated: TdLimit) {
+    /// A verdict with the values at contact: distance, tilt, vertical and lateral speed, rate.
+    pub(crate) fn contact(&mut self, figures: [f32; 5], landing: TdLanding, limits_violated: TdLimit) {
         // The motor has burnt out and is hot.
         (self.motor, self.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 55);
-        let [x_m, pitch_rad, u_m_s, w_m_s, q_rad_s] = figures;
+        let [distance_m, tilt_rad, vertical_m_s, lateral_m_s, rate_rad_s] = figures;
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             time_boot_ms: self.boot_ms(),
             contact_ms: self.boot_ms(),
-            x_m,
-            altitude_m: 0.0,
-            pitch_rad,
-            u_m_s,
-            w_m_s,
-            q_rad_s,
+            distance_m,
+            vertical_m_s,
+            lateral_m_s,
+            tilt_rad,
+            rate_rad_s,
             limits_violated,
-            landed: u8::from(landed),
+            landing,
         }));
     }
 }

@@ -5,6 +5,8 @@ use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 use core::fmt;
 
+use serde::Serialize;
+
 use crate::vehicle::mission::LegLimits;
 use crate::vehicle::rigid::RigidState;
 
@@ -180,7 +182,7 @@ impl LandingVerdict {
 }
 
 /// How a landing ended. No word implies another, but what stands undamaged is upright.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Landing {
     /// It came to rest upright on its legs, and nothing broke. Legs that crush tell it by what they bore; others have kept their
     /// limits at contact.
@@ -199,6 +201,15 @@ impl Landing {
     /// The four in words.
     pub const WORDS: [&str; 4] =
         ["stands undamaged", "upright", "inside the design envelope of its legs", "inside Table 2"];
+
+    /// The first of them that holds, where there is no place for more.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self { stands: true, .. } => "stands undamaged",
+            Self { upright: true, .. } => "upright",
+            _ => "not landed",
+        }
+    }
 
     /// The four in their order.
     pub fn flags(self) -> [bool; 4] {
@@ -231,7 +242,7 @@ impl fmt::Display for FlightEnding<'_> {
         if self.aborted {
             out.write_str("ABORTED, then ")?;
         }
-        let failure = self.failure.unwrap_or("for no told reason");
+        let failure = self.failure.unwrap_or("reason not told");
         match failure {
             _ if stands => out.write_str("STANDS UNDAMAGED")?,
             UNDER_PARACHUTE => return out.write_str("DOWN UNDER THE PARACHUTE, not landed"),

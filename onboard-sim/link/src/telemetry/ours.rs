@@ -245,6 +245,7 @@ pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
         lateral_m_s: limits.lateral_m_s as f32,
         tilt_rad: limits.tilt_rad as f32,
         rate_rad_s: limits.rate_rad_s as f32,
+        fence_m: state.mission().gate.fence_radius_m as f32,
         gimbal_limit_rad: state.mission().airframe.gimbal.limit_rad() as f32,
     })
 }

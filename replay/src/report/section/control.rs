@@ -140,7 +140,7 @@ pub(super) fn prediction(flight: &Flight) -> String {
         pictures.push(chart(
             format!("{name} at touchdown, {unit}"),
             over(&|_, _, state| factor * state[component]),
-            flight.contact.map(|state| factor * state[component]),
+            flight.contact().map(|state| factor * state[component]),
         ));
     }
     let contact = flight.in_space.as_ref().zip(flight.touchdown_s).and_then(|(in_space, contact_s)| {

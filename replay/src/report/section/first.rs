@@ -1,8 +1,10 @@
 //! The first screen: how the flight ended, what went wrong, the whole flight, its place and its limits.
 
+use flight::rules::verdict::Landing;
+
 use crate::findings::over;
 use crate::info::{Info, rounded};
-use crate::log::VerdictLimit;
+use crate::log::{VerdictFacts, VerdictLimit};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{escaped, paragraph, put, table_of_limits};
@@ -29,21 +31,22 @@ pub(super) fn html(flight: &Flight, info: &Info) -> String {
 fn verdict(info: &Info) -> String {
     let ending = info.ending.as_deref().unwrap_or("No verdict in this log");
     let class = match &info.verdict {
-        Some(verdict) if verdict.landed => " good",
-        Some(_) => " bad",
-        None => "",
+        Some(VerdictFacts { landing: Landing { stands: false, .. }, .. }) => " bad",
+        Some(VerdictFacts { landing: Landing { envelope: true, .. }, .. }) => " good",
+        // It stands, and its legs were not designed for it.
+        Some(_) | None => "",
     };
     let mut html = format!("<p class=\"verdict{class}\">{}</p>\n", escaped(ending));
     let mut words = Vec::new();
     if let Some(verdict) = &info.verdict {
-        let sorted = worst_first(&verdict.limits);
-        let broken = verdict.limits.iter().filter(|limit| !limit.passed).count();
+        let sorted = worst_first(verdict.of_the_legs());
+        let broken = sorted.iter().filter(|(limit, _)| !limit.passed).count();
         if let Some((worst, share)) = sorted.first().filter(|(_, share)| share.is_finite()) {
             let far =
                 if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
-            let all = verdict.limits.len();
+            let all = sorted.len();
             words.push(format!(
-                "Worst of the limits: {} {:.2} {}, {far}; {broken} of {all} broken.",
+                "Worst of the legs' limits: {} {:.2} {}, {far}; {broken} of {all} broken.",
                 worst.name,
                 worst.value.abs(),
                 worst.unit
@@ -103,23 +106,22 @@ fn without_its_faults(flight: &Flight) -> String {
     let flown = refly_flight(&flight.recording, &options).ok().and_then(|(_, flown)| flown.verdict);
     let Some(verdict) = flown else { return String::new() };
     let ending = verdict.ending.unwrap_or_default();
-    paragraph(&format!("Simulated: flown again without {faults} it is {ending}."))
+    paragraph(&format!("Simulated: flown again without {faults}: {ending}."))
 }
 
-fn worst_first(limits: &[VerdictLimit]) -> Vec<(&VerdictLimit, f64)> {
-    let mut sorted: Vec<(&VerdictLimit, f64)> = limits.iter().map(|limit| (limit, limit.share())).collect();
+fn worst_first<'a>(limits: impl Iterator<Item = &'a VerdictLimit>) -> Vec<(&'a VerdictLimit, f64)> {
+    let mut sorted: Vec<(&VerdictLimit, f64)> = limits.map(|limit| (limit, limit.share())).collect();
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
     sorted
 }
 
 fn limits(info: &Info) -> String {
     let Some(verdict) = &info.verdict else { return String::new() };
-    if verdict.table_2.is_empty() {
-        return limit_table("touchdown", &verdict.limits);
-    }
-    let table_2 = limit_table("by the landing paper's Table 2", &verdict.table_2);
-    limit_table("by what its legs bear", &verdict.limits)
-        + &format!("<details><summary>By the landing paper's Table 2</summary>\n{table_2}</details>\n")
+    let [_, _, envelope, table_2] = Landing::WORDS;
+    let more = limit_table(table_2, &verdict.table_2);
+    limit_table("borne", &verdict.borne)
+        + &limit_table(envelope, &verdict.envelope)
+        + &format!("<details><summary>{table_2}</summary>\n{more}</details>\n")
 }
 
 fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
@@ -133,7 +135,10 @@ fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
             format!("<span class=\"{class}\">{word}</span>"),
         ]
     };
-    let rows: Vec<Vec<String>> = worst_first(limits).into_iter().map(row).collect();
+    let rows: Vec<Vec<String>> = worst_first(limits.iter()).into_iter().map(row).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
     table_of_limits(&[title, "#value", "#limit", "share; the mark is the limit", ""], &rows)
 }
 
@@ -159,7 +164,7 @@ fn bar(limit: &VerdictLimit, share: f64) -> String {
 fn height(flight: &Flight) -> String {
     let track = flight.track.iter().map(|sample| (flight.axis_s(sample.time_s), sample.state[1]));
     let frames = flight.recording.frames.iter().filter_map(|frame| {
-        let height_m = frame.input.measured.as_ref()?.pressure_altitude_m?;
+        let height_m = frame.input.measured.pressure_altitude_m?;
         Some((flight.axis_s(frame.input.time_s), height_m))
     });
     let lines = vec![

@@ -298,7 +298,7 @@ fn with_truth<'a>(
 fn sensed_heights(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
     let (mut barometer, mut lidar) = (Vec::new(), Vec::new());
     for (frame, truth) in with_truth(flight, world) {
-        let Some(measured) = &frame.input.measured else { continue };
+        let measured = &frame.input.measured;
         let at_s = flight.axis_s(frame.input.time_s);
         barometer
             .extend(measured.pressure_altitude_m.map(|sensed_m| (at_s, sensed_m - truth.state.position_m.z)));
@@ -313,9 +313,7 @@ fn sensed_heights(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
 fn sensed_places(flight: &Flight, world: &[&TruthSample]) -> Vec<Line> {
     let mut places = [Vec::new(), Vec::new(), Vec::new()];
     for (frame, truth) in with_truth(flight, world) {
-        let Some(fix) = frame.input.measured.as_ref().and_then(|measured| measured.gnss.as_ref()) else {
-            continue;
-        };
+        let Some(fix) = &frame.input.measured.gnss else { continue };
         let at_s = flight.axis_s(frame.input.time_s);
         let (sensed, actual) = (&fix.position_m, &truth.state.position_m);
         places[0].push((at_s, sensed.x - actual.x));

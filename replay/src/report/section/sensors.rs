@@ -79,7 +79,7 @@ pub(super) fn battery_and_vibration(flight: &Flight) -> String {
         let frames = flight.recording.frames.iter().filter(|frame| {
             u8::try_from(frame.output.phase).ok().and_then(Phase::from_index).is_some_and(belongs)
         });
-        frames.filter_map(|frame| Some(frame.input.measured.as_ref()?.imu.specific_force_m_s2.x)).collect()
+        frames.map(|frame| frame.input.measured.imu.specific_force_m_s2.x).collect()
     };
     let line = |name, class, samples: &[f64]| Line { name, class, points: spectrum(samples) };
     let lines = vec![

@@ -77,10 +77,9 @@ pub struct PoweredGuidance {
 pub struct LandingSolved {
     /// The problem at the final time that was found, with its conditions, limits and motor.
     pub problem: Problem,
-    /// Solved as in flight, from the previous plan; the iterations are those of all final times.
-    pub warm: (Outcome, Plan),
-    /// The problem solved cold.
-    pub cold: (Outcome, Plan),
+    /// How it ended, solved as in flight, from the previous plan; the iterations are those of all final times.
+    pub outcome: Outcome,
+    pub plan: Plan,
 }
 
 impl PoweredGuidance {
@@ -270,11 +269,7 @@ impl PoweredGuidance {
         let outcome = again.search(time_s, state, situation)?;
         let (mut problem, plan) = (again.problem?, again.found);
         stretch(&mut problem, situation, &self.settings, plan.length_s(), plan.inputs().len());
-        let mut workspace = Workspace::default();
-        let cold = nmpc::solve(&mut workspace, &problem, None);
-        let mut cold_plan = Plan::default();
-        cold_plan.read(&workspace, &problem, time_s);
-        Some(LandingSolved { problem, warm: (outcome, plan), cold: (cold, cold_plan) })
+        Some(LandingSolved { problem, outcome, plan })
     }
 
     /// Share of the fins' drag area that the plan has at a time.
