@@ -26,7 +26,7 @@ use campaign::figure::FigureError;
 pub(crate) use cases::{Case, Table};
 pub(crate) use flown::{AsPrinted, as_printed};
 pub(crate) use objective::Objective;
-pub(crate) use text::{to_json, write_stability, write_tables};
+pub(crate) use text::{write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.
 #[derive(Debug, Clone, PartialEq)]
