@@ -8,6 +8,7 @@
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
+//! * [`worst_plans`]: the plans of a landing burn that the judge finds worst.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
 //!   holds a directory of logs against a baseline, and proves the books of ground stations.
@@ -42,6 +43,7 @@ pub mod report;
 pub mod settings;
 pub mod table;
 pub mod verify;
+pub mod worst_plans;
 
 use std::io::Write as _;
 

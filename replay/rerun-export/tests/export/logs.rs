@@ -142,7 +142,7 @@ pub(crate) fn write_telemetry_log(path: &Path) {
             phase: Some(u32::from(Phase::Powered.index())),
             // No pose has been received in the first second.
             altitude_m: (second > 0).then_some(15.0),
-            pitch_rad: Some(std::f64::consts::FRAC_PI_2),
+            tilt_rad: Some(0.0),
             control_level: Some(u32::from(ControlLevel::Converged.index())),
             ..v1::Telemetry::default()
         };
