@@ -6,7 +6,7 @@ use core::f64::consts::FRAC_PI_2;
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::{RigidState, upright};
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
-use flight::vehicles::{airframe, motors};
+use flight::vehicles::airframe;
 use nalgebra::{UnitQuaternion, Vector3};
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
 use sim::world::{Actuators, STEP_S, Truth, World};
