@@ -359,7 +359,7 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     )?;
     writeln!(out, "{}", what(&summary.manifest))?;
     for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
-        writeln!(out, "{word:<38}  {}", share)?;
+        writeln!(out, "{word:<38}  {share}")?;
     }
     if let Some(attainable) = &summary.attainable {
         let Attainable { command_height_m, .. } = attainable;
@@ -389,7 +389,7 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     write_text(&distributions(summary), out)?;
     let told = sensitivities(summary);
     if told.len() == 1 {
-        return writeln!(out, "\nwhat costs landings: {} flights do not tell", of);
+        return writeln!(out, "\nwhat costs landings: {of} flights do not tell");
     }
     writeln!(
         out,
