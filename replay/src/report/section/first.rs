@@ -46,7 +46,7 @@ fn verdict(info: &Info) -> String {
                 if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
             let all = sorted.len();
             words.push(format!(
-                "Worst of the legs' limits: {} {:.2} {}, {far}; {broken} of {all} broken.",
+                "Worst of the limits: {} {:.2} {}, {far}; {broken} of {all} broken.",
                 worst.name,
                 worst.value.abs(),
                 worst.unit
