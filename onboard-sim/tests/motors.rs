@@ -204,7 +204,9 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
     }
     let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
     assert!(
-        csv.starts_with("wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,landed\n0,as planned,0,"),
+        csv.starts_with(
+            "wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,stands,upright,envelope,table_2\n0,as planned,0,"
+        ),
         "{csv}"
     );
     let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();

@@ -488,13 +488,13 @@ fn phases(timeline: &PhaseTimeline) -> String {
 }
 
 fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
-    if let Some(ending) = &info.ending {
-        row(output, "verdict", &shown(ending))?;
+    let touchdown = |verdict: &VerdictFacts| format!("touchdown at {}", info.clocks.words(verdict.contact()));
+    let words = [info.ending.as_deref().map(shown), info.verdict.as_ref().map(touchdown)];
+    let words: Vec<String> = words.into_iter().flatten().collect();
+    if !words.is_empty() {
+        row(output, "verdict", &words.join("; "))?;
     }
-    let Some(verdict) = &info.verdict else {
-        return Ok(());
-    };
-    row(output, "", &format!("touchdown at {}", info.clocks.words(verdict.contact())))?;
+    let Some(verdict) = &info.verdict else { return Ok(()) };
     for (whose, limits) in
         [("", &verdict.borne), ("envelope: ", &verdict.envelope), ("Table 2: ", &verdict.table_2)]
     {

@@ -271,7 +271,7 @@ fn a_divergence_report_says_whether_the_verdict_would_change() {
     let first = format!("first at frame {}", recording.frames[forged].input.frame);
     assert!(stdout.contains(&first) && stdout.contains("output.gimbal_rad[1]"), "{stdout}");
     assert!(
-        stdout.contains("verdict: would not change: recorded LANDED, flown on by this build"),
+        stdout.contains("verdict: would not change: recorded stands undamaged, flown on by this build"),
         "{stdout}"
     );
 }

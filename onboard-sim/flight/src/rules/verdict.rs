@@ -240,7 +240,7 @@ impl fmt::Display for FlightEnding<'_> {
         match failure {
             _ if stands => out.write_str("STANDS UNDAMAGED")?,
             UNDER_PARACHUTE => return out.write_str("DOWN UNDER THE PARACHUTE, not landed"),
-            _ if upright => write!(out, "UPRIGHT, taken as damaged: {failure}")?,
+            _ if upright => write!(out, "UPRIGHT, damaged: {failure}")?,
             _ => return write!(out, "NOT LANDED: {failure}"),
         }
         let side = |is_inside| if is_inside { "inside" } else { "outside" };
@@ -326,7 +326,7 @@ mod tests {
         );
         assert_eq!(
             said([false, true, true, false], Some("leg overloaded")),
-            "UPRIGHT, taken as damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
+            "UPRIGHT, damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
         );
         assert_eq!(said([false, false, true, true], Some("tipped over")), "NOT LANDED: tipped over");
         let under = FlightEnding { aborted: true, failure: Some(UNDER_PARACHUTE), ..FlightEnding::default() };
