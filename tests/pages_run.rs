@@ -18,7 +18,7 @@ const PAGES: [&str; 9] = [
     "ground/README.md",
     "ground/packaging/README.md",
     "onboard-sim/board/README.md",
-    "onboard-sim/flight/benches/peers/README.md",
+    "onboard-sim/lab/paper/benches/peers/README.md",
     "tests/README.md",
 ];
 
@@ -36,7 +36,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ENGINEER.md", "ground ", "tests/demo.rs flies it"),
     (
         "ENGINEER.md",
-        "onboard-sim fly --profile mk2 --mavlink udpout:192.168.1.20:14550",
+        "onboard-sim fly --mavlink udpout:192.168.1.20:14550",
         "waits for a station, as on CREW.md",
     ),
     (
@@ -58,13 +58,13 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ground/packaging/README.md", "ground stop", "tests/first_flight.rs runs it"),
     ("ground/packaging/README.md", "ground/packaging/build", "needs containers of Debian for two processors"),
     ("onboard-sim/board/README.md", "onboard-sim/board/emulate", "needs QEMU and cross compilers"),
-    ("onboard-sim/flight/benches/peers/README.md", "onboard-sim/flight/benches/peers/run", "installs peers"),
+    ("onboard-sim/lab/paper/benches/peers/README.md", "onboard-sim/lab/paper/benches/peers/run", "installs peers"),
     ("tests/README.md", "cargo bench", "lasts two hours"),
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
 const SAID: [(&str, &str); 16] = [
-    ("onboard-sim fly --profile mk2 --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
+    ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "attainable_low_m"),
     ("replay info flight.mcap", "verdict"),
     ("replay verify flight.mcap ", "frames identical"),
@@ -76,7 +76,7 @@ const SAID: [(&str, &str); 16] = [
     ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
     ("replay export flight.mcap --to parquet", "tables"),
     ("replay fit flight.mcap ", "drag"),
-    ("replay fit fits.json --mission mk2 --flights", "GO"),
+    ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay verify logs --baseline baseline.json --accept", "new"),
     ("replay verify logs --baseline baseline.json   ", "same"),
     ("onboard-sim motors --mission mini-f10 ", "scatter"),

@@ -29,7 +29,15 @@ fn a_map_overwrites_no_file_without_force() {
     let map = |force: Option<&str>| {
         Command::new(env!("CARGO_BIN_EXE_onboard-sim"))
             .current_dir(directory.path())
-            .args(["paper", "map", "--x", "thrust-to-weight=1.1:1.2:2", "--y", "height=20:25:2"])
+            .args([
+                "campaign",
+                "map",
+                "--attainable",
+                "--x",
+                "thrust-scale=1:1.1:2",
+                "--y",
+                "height=290:300:2",
+            ])
             .args(["--csv", "map.csv", "--svg", "map.svg"])
             .args(force)
             .output()

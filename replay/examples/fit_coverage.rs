@@ -42,7 +42,7 @@ fn truth(recipe: &Recipe, flight: &Sortie, body_share: f64) -> anyhow::Result<BT
     let drawn = flight.drawn();
     let truth = &drawn.truth;
     let sensors = &recipe.dispersion.sensor_params;
-    let errors = *Sensors::new(sensors, drawn.flight_seed, 0.0)?.errors();
+    let errors = *Sensors::new(sensors, drawn.flight_seed, 1.0)?.errors();
     let airframe = &recipe.mission.airframe;
     let arm_m = airframe.mass.loaded_cg_station_m;
     let [pitch_rad, yaw_rad] = truth.thrust_misalignment_rad;

@@ -118,7 +118,7 @@ enum Command {
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
     /// setting by setting; exit code 1 if one differs.
     #[command(
-        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk2 day/mission.toml"
+        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
     Compare(compare::Args),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
@@ -149,7 +149,7 @@ enum Command {
     /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
     /// NO-GO (exit code 1) if not.
     #[command(
-        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk2 --day day --flights 1000"
+        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]
     Fit(fit::Args),
     /// Prints a shell's completions.

@@ -1,9 +1,9 @@
 //! Maps where a vehicle lands, over two quantities of the start, the motor or the day.
 //!
-//! There are three questions, cheapest first: whether a plan exists for the landing paper's vehicle (its study asks that),
-//! whether a mission can be landed with perfect information, and whether its own guidance lands it ([`map`]). Cells are
-//! independent, so a map does not depend on how many of them are computed at the same time. A cell differs from the
-//! mission's nominal flight in two values alone: the draw of one flight number is the same in every cell.
+//! There are two questions: whether a mission can be landed with perfect information, which is cheaper, and whether its own
+//! guidance lands it ([`map`]). Cells are independent, so a map does not depend on how many of them are computed at the same
+//! time. A cell differs from the mission's nominal flight in two values alone: the draw of one flight number is the same in
+//! every cell.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -23,17 +23,16 @@ use crate::run::in_parallel;
 pub struct Cell {
     /// Whether a landing exists, and if not, why.
     pub finding: Finding,
-    /// Speed at the end of the plan, m/s, or the lower bound if nothing was planned; in space vertical speed at contact, not
-    /// a number where nothing was flown.
+    /// Vertical speed at contact, m/s; not a number where nothing was flown.
     pub touchdown_speed_m_s: f64,
 }
 
 /// Whether a landing exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Finding {
-    /// A converged plan, or a flight, ends inside every limit.
+    /// The flight leaves the vehicle standing undamaged, or the bound does not forbid it.
     Lands,
-    /// The best plan found, or the flight, ends outside a limit.
+    /// The flight ends outside a limit.
     Misses,
     /// A bound proves that nothing lands.
     NotLandable,
@@ -64,35 +63,16 @@ pub struct Map {
     pub cells: Vec<Cell>,
 }
 
-/// A map over two different ones of the possible quantities, whose cells `of` computes from a value of `x` and one of `y`;
-/// `progress` is called with the cells done, from any thread.
-///
-/// # Errors
-/// The axes do not suit what is mapped, or a cell cannot be computed.
-pub fn map_of(
-    (whose, possible): (&str, &'static [Quantity]),
-    [x, y]: [Axis; 2],
-    progress: &(dyn Fn(usize) + Sync),
-    of: impl Fn(f64, f64) -> Result<Cell, SetUpError> + Sync,
-) -> Result<Map, MapError> {
-    if x.quantity == y.quantity {
-        return Err(MapError::SameQuantity(x.quantity));
-    }
-    if let Some(axis) = [x, y].into_iter().find(|axis| !possible.contains(&axis.quantity)) {
-        return Err(MapError::Quantity { whose: whose.to_owned(), quantity: axis.quantity, possible });
-    }
-    let places: Vec<usize> = (0..x.count * y.count).collect();
-    let cell = |place: &usize| of(x.value(place % x.count), y.value(place / x.count));
-    let cells = in_parallel(&places, cell, progress);
-    Ok(Map { x, y, cells: cells.into_iter().collect::<Result<_, _>>()? })
-}
-
 /// Why there is no map.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// The quantity means nothing to this vehicle or by.
-    #[error("{whose} cannot be mapped over {}; it can over {}", .quantity.name(), names(.possible))]
-    Quantity { whose: String, quantity: Quantity, possible: &'static [Quantity] },
+    /// The bound of perfect information does not know the quantity.
+    #[error(
+        "what is attainable with {mission} cannot be mapped over {}; it can over {}",
+        .quantity.name(),
+        names(&Quantity::ATTAINABLE)
+    )]
+    Quantity { mission: String, quantity: Quantity },
     /// Both axes are the same quantity.
     #[error("both axes vary {}; choose two quantities", .0.name())]
     SameQuantity(Quantity),
@@ -161,48 +141,28 @@ impl Map {
 /// A quantity that a map varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// Nominal thrust over weight.
-    ThrustToWeight,
-    /// Height at ignition in the plane, at the start of a mission, m.
-    Height,
-    /// Speed of descent at ignition, m/s.
-    Speed,
-    /// Tilt from upright at ignition in the plane, at the start of a mission (below a drone: of its swing), degrees.
-    Tilt,
-    /// Pitch rate at ignition, degrees per second.
-    Rate,
-    /// Lateral speed at ignition, m/s.
-    LateralSpeed,
-    /// Thrust over nominal; known to the controller in the plane, learnt in flight by that of a mission.
-    ThrustScale,
-    /// Height of the feet at which the thrust of a mission begins, m.
+    /// Height of the feet at which the thrust begins, m.
     IgnitionHeight,
+    /// Thrust over nominal, learnt in flight by the guidance.
+    ThrustScale,
     /// Mean wind 10 m above the ground, m/s.
     Wind,
+    /// Tilt from upright at the start (below a drone: of its swing), degrees.
+    Tilt,
+    /// Height of the start, m.
+    Height,
 }
 
 impl Quantity {
-    const ALL: [Self; 9] = [
-        Self::ThrustToWeight,
-        Self::Height,
-        Self::Speed,
-        Self::Tilt,
-        Self::Rate,
-        Self::LateralSpeed,
-        Self::ThrustScale,
-        Self::IgnitionHeight,
-        Self::Wind,
-    ];
+    const ALL: [Self; 5] = [Self::IgnitionHeight, Self::ThrustScale, Self::Wind, Self::Tilt, Self::Height];
+    /// What the bound of perfect information knows: no wind and no attitude. All are above 0.
+    const ATTAINABLE: [Self; 3] = [Self::IgnitionHeight, Self::ThrustScale, Self::Height];
 
     /// The name on a command line, that of a table's column with its unit, and the words beside a picture's axis.
     fn words(self) -> [&'static str; 3] {
         match self {
-            Self::ThrustToWeight => ["thrust-to-weight", "thrust_to_weight", "thrust / weight"],
             Self::Height => ["height", "height_m", "height, m"],
-            Self::Speed => ["speed", "speed_m_s", "speed, m/s"],
             Self::Tilt => ["tilt", "tilt_deg", "tilt, deg"],
-            Self::Rate => ["rate", "rate_deg_s", "rate, deg/s"],
-            Self::LateralSpeed => ["lateral-speed", "lateral_speed_m_s", "lateral speed, m/s"],
             Self::ThrustScale => ["thrust-scale", "thrust_scale", "thrust / nominal"],
             Self::IgnitionHeight => ["ignition-height", "ignition_height_m", "ignition height, m"],
             Self::Wind => ["wind", "wind_m_s", "wind at 10 m, m/s"],
@@ -246,7 +206,7 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "axis `{given}`: {problem}; write QUANTITY=FROM:TO:COUNT with a quantity of {}",
-    Quantity::ALL.map(Quantity::name).join(", ")
+    names(&Quantity::ALL)
 )]
 pub struct AxisError {
     given: String,
@@ -277,14 +237,10 @@ impl FromStr for Axis {
             .ok()
             .filter(|count| (2..=Self::MAX_COUNT).contains(count))
             .ok_or_else(|| refuse("the count is not a number from 2 to 500"))?;
-        let positive = matches!(
-            quantity,
-            Quantity::ThrustToWeight | Quantity::Height | Quantity::ThrustScale | Quantity::IgnitionHeight
-        );
         if quantity == Quantity::Wind && from.min(to) < 0.0 {
             return Err(refuse("the range must not be below 0"));
         }
-        if positive && from.min(to) <= 0.0 {
+        if Quantity::ATTAINABLE.contains(&quantity) && from.min(to) <= 0.0 {
             return Err(refuse("the range must be above 0"));
         }
         Ok(Self { quantity, from, to, count })
@@ -306,12 +262,6 @@ pub enum By {
     PerfectInformation,
 }
 
-/// What each can be mapped over.
-const FLOWN: &[Quantity] =
-    &[Quantity::IgnitionHeight, Quantity::ThrustScale, Quantity::Wind, Quantity::Tilt, Quantity::Height];
-/// The bound knows no wind and no attitude.
-const ATTAINABLE: &[Quantity] = &[Quantity::IgnitionHeight, Quantity::ThrustScale, Quantity::Height];
-
 /// Computes a mission's map; `progress` is called with the cells done, from any thread.
 ///
 /// # Errors
@@ -322,12 +272,18 @@ pub fn map(
     axes: [Axis; 2],
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<Map, MapError> {
-    let (possible, bound) = match by {
-        By::Guidance => (FLOWN, ""),
-        By::PerfectInformation => (ATTAINABLE, "what is attainable with "),
-    };
-    let whose = format!("{bound}{}", recipe.mission.name);
-    map_of((&whose, possible), axes, progress, |x, y| cell(recipe, by, axes, [x, y]))
+    let [x, y] = axes;
+    if x.quantity == y.quantity {
+        return Err(MapError::SameQuantity(x.quantity));
+    }
+    let unknown = |axis: &Axis| !Quantity::ATTAINABLE.contains(&axis.quantity);
+    if let Some(axis) = axes.into_iter().find(|axis| by == By::PerfectInformation && unknown(axis)) {
+        return Err(MapError::Quantity { mission: recipe.mission.name.clone(), quantity: axis.quantity });
+    }
+    let places: Vec<usize> = (0..x.count * y.count).collect();
+    let of = |place: &usize| cell(recipe, by, axes, [x.value(place % x.count), y.value(place / x.count)]);
+    let cells = in_parallel(&places, of, progress);
+    Ok(Map { x, y, cells: cells.into_iter().collect::<Result<_, _>>()? })
 }
 
 fn cell(recipe: &Recipe, by: By, axes: [Axis; 2], values: [f64; 2]) -> Result<Cell, SetUpError> {
@@ -417,7 +373,7 @@ mod tests {
 
     #[test]
     fn axes_are_read_and_written_alike() {
-        for text in ["height=5:30:26", "tilt=-30:30:7", "thrust-to-weight=0.9:1.4:26"] {
+        for text in ["height=5:30:26", "tilt=-30:30:7", "thrust-scale=0.9:1.4:26"] {
             assert_eq!(text.parse::<Axis>().unwrap().to_string(), text);
         }
         let axis: Axis = "height=5:30:26".parse().unwrap();
@@ -430,7 +386,7 @@ mod tests {
             ["", "height", "depth=1:2:3", "height=1:2", "height=a:2:3", "height=1:2:1", "height=-1:2:3"]
         {
             let error = text.parse::<Axis>().unwrap_err().to_string();
-            assert!(error.contains("QUANTITY=FROM:TO:COUNT") && error.contains("lateral-speed"), "{error}");
+            assert!(error.contains("QUANTITY=FROM:TO:COUNT") && error.contains("ignition-height"), "{error}");
         }
     }
 
@@ -445,7 +401,7 @@ mod tests {
 
     /// The nominal motor lands, half of one and a storm do not; the map does not depend on the number of jobs.
     #[test]
-    fn a_mission_in_a_plane_and_one_in_space_are_flown() {
+    fn two_missions_are_flown_on_as_many_threads_as_wanted() {
         use Finding::{Lands, Misses};
         for mission in ["mk2", "vlr"] {
             let map = || mapped(mission, By::Guidance, "thrust-scale=0.5:1:2", "wind=0:30:2");
@@ -478,10 +434,6 @@ mod tests {
             let axes = [x.parse().unwrap(), "thrust-scale=0.9:1.1:2".parse().unwrap()];
             map(&recipe, by, axes, &|_| ()).unwrap_err().to_string()
         };
-        assert_eq!(
-            refused("speed=1:2:2", By::Guidance),
-            "mk2 cannot be mapped over speed; it can over ignition-height, thrust-scale, wind, tilt, height"
-        );
         assert_eq!(
             refused("wind=1:2:2", By::PerfectInformation),
             "what is attainable with mk2 cannot be mapped over wind; it can over ignition-height, thrust-scale, height"

@@ -4,7 +4,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, Request};
-use flight::computer::pilot::{Pilot, Sensed};
+use flight::computer::pilot::Pilot;
 use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
 use flight::estimation::estimator::AidStatus;
 use flight::guidance::powered::ControlLevel;
@@ -78,7 +78,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
     let &Input {
         frame,
         time_s,
-        ref sensed,
+        ref measured,
         gimbal_rad,
         fins_rad,
         contact,
@@ -93,15 +93,10 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         requests,
         rehearsed,
     } = input;
-    let (measured, known) = match sensed {
-        Sensed::Measured(measurements) => (Some(measurements.to_log()), None),
-        Sensed::Known(estimate) => (None, Some(estimate.to_log())),
-    };
     v1::ComputerInput {
         frame,
         time_s,
-        measured,
-        known,
+        measured: measured.to_log(),
         gimbal_rad: gimbal_rad.to_vec(),
         fins_rad: fins_rad.to_vec(),
         contact,
@@ -125,15 +120,10 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let frame = input.frame;
     let at = |field| At { frame, field };
-    let sensed = match (&input.measured, &input.known) {
-        (Some(measurements), None) => Sensed::Measured(Logged::from_log(measurements, at("measured"))?),
-        (None, Some(estimate)) => Sensed::Known(Logged::from_log(estimate, at("known"))?),
-        _ => return Err(RecordError::Sensed { frame }),
-    };
     let rest = Input {
         frame,
         time_s: input.time_s,
-        sensed,
+        measured: Logged::from_log(&input.measured, at("measured"))?,
         gimbal_rad: Logged::from_log(&input.gimbal_rad, at("gimbal_rad"))?,
         fins_rad: Logged::from_log(&input.fins_rad, at("fins_rad"))?,
         contact: input.contact,
@@ -342,7 +332,7 @@ mod tests {
             let input = Input {
                 frame,
                 time_s: number(9),
-                sensed: Sensed::Measured(measured),
+                measured,
                 gimbal_rad: [number(10), number(11)],
                 fins_rad: [12, 13, 14, 15].map(number),
                 contact: flags[1],
@@ -380,7 +370,6 @@ mod tests {
     fn an_unknown_value_is_refused_with_the_number_of_its_frame() {
         let input = v1::ComputerInput {
             frame: 7,
-            measured: Some(protocol::records::flight_v1::Measurements::default()),
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
             requests: vec![v1::Request { asked: 10, ..v1::Request::default() }],
@@ -388,11 +377,7 @@ mod tests {
         };
         let error = input_from_log(&input).unwrap_err().to_string();
         assert_eq!(error, "frame 7: asked 10 is unknown; this build knows 0 to 9");
-        let error =
-            input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input.clone() }).unwrap_err();
+        let error = input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal_rad has 1 values and should have 2");
-        let both =
-            v1::ComputerInput { known: Some(protocol::records::flight_v1::Estimate::default()), ..input };
-        assert_eq!(input_from_log(&both).unwrap_err(), RecordError::Sensed { frame: 7 });
     }
 }

@@ -38,9 +38,6 @@ pub enum RecordError {
         /// The length that it should have.
         should: usize,
     },
-    /// Neither measurements nor a known state, or both.
-    #[error("frame {frame}: needs measurements or a known state, and one of them only")]
-    Sensed { frame: u64 },
 }
 
 /// The place of a value in a log, for errors.

@@ -3,11 +3,9 @@
 use alloc::string::String;
 
 use flight::computer::findings::Findings;
-use flight::computer::pilot::Sensed;
 use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown_m};
 use flight::computer::{Computer, Input};
 use flight::estimation::estimator::Estimate;
-use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, Plan, PoweredReport};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
@@ -130,14 +128,6 @@ impl<'a> VehicleState<'a> {
     /// The input of the computer's last frame.
     pub fn input(&self) -> &'a Input<'static> {
         self.computer.input()
-    }
-
-    /// The measurements of the last frame; `None` where no sensors are modelled.
-    pub fn measured(&self) -> Option<&'a Measurements> {
-        match &self.input().sensed {
-            Sensed::Measured(measured) => Some(measured).filter(|_| self.computer.sensors().measures()),
-            Sensed::Known(_) => None,
-        }
     }
 
     /// The design envelope of the legs.

@@ -7,7 +7,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dispersion {
-    /// The controller sees sensors; otherwise it knows the true state.
+    /// The sensors err; otherwise they are nearly exact, and the state at the start is known.
     pub sensors: bool,
     /// Errors of the sensors.
     pub sensor_params: SensorParams,

@@ -12,7 +12,7 @@ use crate::world::{Battery, World};
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
-use flight::estimation::estimator::{Estimate, Measurements};
+use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::Phase;
@@ -60,7 +60,6 @@ pub struct Sortie {
     computer: Computer,
     rehearsal: Option<Rehearsal>,
     surroundings: Surroundings,
-    /// Narrows what the computer is told and what it commands.
     /// The state in which the fall began.
     fall: Option<RigidState>,
     injector: Injector,
@@ -180,7 +179,7 @@ impl Sortie {
             rehearsal.step();
         }
         self.let_go_when_cleared();
-        let sensed = self.surroundings.sample_sensors();
+        let measured = self.surroundings.sample_sensors();
         self.frame += 1;
         self.dead = self.frames_down > 0;
         if self.dead {
@@ -191,7 +190,7 @@ impl Sortie {
             return Flown { output: None, took: Duration::ZERO };
         }
         // Without a sample there is no frame; what was commanded goes on.
-        let Some(sensed) = sensed else { return Flown { output: None, took: Duration::ZERO } };
+        let Some(measured) = measured else { return Flown { output: None, took: Duration::ZERO } };
         let abort = [Request::of_the_programme(Asked::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {
@@ -205,7 +204,7 @@ impl Sortie {
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
-            sensed,
+            measured,
             gimbal_rad,
             fins_rad,
             contact,
@@ -328,7 +327,7 @@ impl Sortie {
         &mut self.surroundings.world
     }
 
-    /// The sensor samples of the last frame; `None` if the computer gets the truth.
+    /// The sensor samples of the last frame; `None` before the first.
     pub fn measured(&self) -> Option<&Measurements> {
         self.surroundings.measured()
     }
@@ -439,8 +438,7 @@ impl EstimatorErrors {
 }
 
 impl Sortie {
-    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` if the pilot gets the
-    /// truth instead of an estimate, and while its computer is dead.
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` while its computer is dead.
     ///
     /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
     pub fn nees_of_motion(&self) -> Option<f64> {
@@ -456,8 +454,8 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
-    /// `None` if the pilot gets the truth instead of an estimate, before the motor has lit, and where its scales are over another
-    /// curve than the truth's. The accelerometer cannot tell more impulse from less mass.
+    /// `None` before the motor has lit, and where its scales are over another curve than the truth's. The accelerometer cannot
+    /// tell more impulse from less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
@@ -483,11 +481,6 @@ impl Sortie {
             nose_rad: (estimate.state.nose_in_world() - truth.nose_in_world()).norm(),
         }
     }
-}
-
-/// The truth, in the form of an estimate.
-pub(crate) fn known(world: &World) -> Estimate {
-    Estimate::exact(world.time_s(), *world.state(), *world.specific_force_m_s2(), world.wind_m_s().xy())
 }
 
 // The rehearsal on the pad: one flight of the mission with its nominal data, faster than real time.

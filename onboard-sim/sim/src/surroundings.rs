@@ -1,9 +1,10 @@
 //! Everything of a flight but its flight computer: the world and how it begins, the sensors that look at it, and the
 //! actuators that move it.
 
-use crate::world::sensors::{SensorFaults, SensorTruth, Sensors, believed_start};
+use crate::world::sensors::{
+    NEARLY_EXACT, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
+};
 use crate::world::{Actuators, Battery, World};
-use flight::computer::pilot::Sensed;
 use flight::computer::{Commands, FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::outputs::Line;
@@ -14,13 +15,13 @@ use flight::vehicle::rigid::RigidState;
 use crate::dispersion::Dispersion;
 use crate::draw::Draw;
 use crate::outcome::{Ending, Outcome, judge};
-use crate::sortie::{LONGEST_S, SetUpError, known};
+use crate::sortie::{LONGEST_S, SetUpError};
 
 /// The world of one flight, and what is between it and its flight computer.
 #[derive(Debug, Clone)]
 pub(crate) struct Surroundings {
     pub(crate) world: World,
-    sensors: Option<Sensors>,
+    sensors: Sensors,
     pub(crate) faults: SensorFaults,
     actuators: Actuators,
     pub(crate) battery: Battery,
@@ -38,13 +39,13 @@ impl Surroundings {
         drawn: &Draw,
     ) -> Result<(Self, RigidState), SetUpError> {
         let world = world(mission, drawn)?;
-        let (sensors, believed) = if dispersion.sensors {
-            let sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0)?;
+        let believed = if dispersion.sensors {
             let uncertainty = StartUncertainty::at_start(mission.start.at);
-            (Some(sensors), believed_start(world.state(), &uncertainty, drawn.flight_seed))
+            believed_start(world.state(), &uncertainty, drawn.flight_seed)
         } else {
-            (None, *world.state())
+            *world.state()
         };
+        let sensors = sensors(dispersion, drawn)?;
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
@@ -57,53 +58,41 @@ impl Surroundings {
         if let Ok(world) = world(mission, drawn) {
             self.world = world;
         }
-        if dispersion.sensors {
-            self.sensors = Sensors::new(&dispersion.sensor_params, drawn.flight_seed, 0.0).ok();
+        if let Ok(sensors) = sensors(dispersion, drawn) {
+            self.sensors = sensors;
         }
         self.actuators = at_rest(mission);
     }
 
     /// From now on the receiver's times count from this time of its clock, s: the flight computer's do.
     pub(crate) fn count_from(&mut self, release_s: f64) {
-        if let Some(sensors) = &mut self.sensors {
-            sensors.count_from(release_s);
-        }
+        self.sensors.count_from(release_s);
     }
 
     /// The world moves for one frame, and the sensors measure it. `None` if they have given no sample: what is true is then known to
-    /// nobody. Without sensors the computer is told the true state.
-    pub(crate) fn sample_sensors(&mut self) -> Option<Sensed> {
+    /// nobody.
+    pub(crate) fn sample_sensors(&mut self) -> Option<Measurements> {
         let mut measured = None;
         for _ in 0..FRAME_MS {
             self.world.step(&self.actuators);
-            if let Some(sensors) = &mut self.sensors {
-                measured = sensors.observe(&SensorTruth::of(&self.world)).or(measured);
-            }
+            measured = self.sensors.observe(&SensorTruth::of(&self.world)).or(measured);
         }
-        let measured = measured.map(|measured| self.faults.heard(&measured));
         let lit =
             [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
         self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
-        self.measured = measured;
-        match self.sensors {
-            Some(_) => measured.map(Sensed::Measured),
-            None => Some(Sensed::Known(known(&self.world))),
-        }
+        self.measured = measured.map(|measured| self.faults.heard(&measured));
+        self.measured
     }
 
     /// What feedback and switches say after the frame; `released`: contact counts.
     pub(crate) fn feedback(&mut self, released: bool) -> Feedback {
-        let fed_back_rad = self.world.fins_feedback_rad();
-        let touched = released && self.world.touchdown().is_some();
-        let (fins_rad, contact, igniter_continuity) = match &mut self.sensors {
-            Some(sensors) => {
-                (sensors.fins_rad(&fed_back_rad), sensors.contact(touched), sensors.igniter_continuity())
-            }
-            None => (fed_back_rad, touched, true),
-        };
-        let booster_attached = self.world.booster_attached();
-        let gimbal_rad = self.world.gimbal_feedback_rad();
-        Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached }
+        Feedback {
+            gimbal_rad: self.world.gimbal_feedback_rad(),
+            fins_rad: self.sensors.fins_rad(&self.world.fins_feedback_rad()),
+            contact: self.sensors.contact(released && self.world.touchdown().is_some()),
+            igniter_continuity: self.sensors.igniter_continuity(),
+            booster_attached: self.world.booster_attached(),
+        }
     }
 
     /// Commands for the next frame.
@@ -144,6 +133,11 @@ impl Surroundings {
     pub(crate) fn measured(&self) -> Option<&Measurements> {
         self.measured.as_ref()
     }
+}
+
+fn sensors(dispersion: &Dispersion, drawn: &Draw) -> Result<Sensors, SensorParamError> {
+    let errors = if dispersion.sensors { 1.0 } else { NEARLY_EXACT };
+    Sensors::new(&dispersion.sensor_params, drawn.flight_seed, errors)
 }
 
 /// What actuators and switches say at the end of a frame.

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, Output};
 use flight::estimation::estimator::Measurements;
 use flight::rules::phase::Phase;
@@ -51,9 +50,8 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let frames = frames.0;
     let flown = phases(computer.clone(), frames.iter().copied());
     assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::Deploy]), "{flown:?}");
-    let Sensed::Measured(standing) = frames[0].sensed else { panic!("measured") };
-    let standing = Measurements { gnss: None, ..standing };
-    let stood = frames.iter().map(|frame| Input { sensed: Sensed::Measured(standing), ..*frame });
+    let measured = Measurements { gnss: None, ..frames[0].measured };
+    let stood = frames.iter().map(|frame| Input { measured, ..*frame });
     let told = phases(computer, stood);
     assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::map::{self, By};
+use campaign::map::{self, Axis, By};
 use campaign::run::{self, Progress};
 use campaign::scenario::{Expected, Scenario};
 use campaign::store::{Order, Shard, Store, merge};
@@ -20,7 +20,7 @@ use sha2::Digest as _;
 use sim::dispersion;
 use sim::fault::{TimedFault, how_to_write};
 
-use super::{MapArguments, Stopwatch, on_threads, recipe, single};
+use super::{Stopwatch, on_threads, recipe, refuse_loss, single, write_file};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -28,7 +28,7 @@ pub(crate) struct CampaignArguments {
     #[command(subcommand)]
     command: Option<CampaignCommand>,
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
@@ -68,7 +68,7 @@ pub(crate) struct CampaignArguments {
 #[derive(Subcommand)]
 enum CampaignCommand {
     /// Map where a mission lands, over two quantities: one simulated flight for each cell.
-    #[command(after_help = "Example: onboard-sim campaign map --profile mk2 --svg mk2.svg")]
+    #[command(after_help = "Example: onboard-sim campaign map --svg mk3.svg")]
     Map(MapOfMission),
     /// Merge the parts of a campaign that was flown in shards.
     #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
@@ -153,10 +153,29 @@ fn program() -> anyhow::Result<String> {
 #[derive(Args)]
 struct MapOfMission {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
-    #[command(flatten)]
-    map: MapArguments,
+    /// Columns: QUANTITY=FROM:TO:COUNT.
+    ///
+    /// Quantities: ignition-height (m, of the feet where the thrust begins; without it the guidance chooses), thrust-scale, wind
+    /// (m/s), tilt (deg, at the start), height (m, of the start).
+    #[arg(long, value_name = "AXIS", default_value = "thrust-scale=0.8:1.2:21")]
+    x: Axis,
+    /// Rows, in the same form.
+    #[arg(long, value_name = "AXIS", default_value = "wind=0:10:11")]
+    y: Axis,
+    /// Write the cells as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the map as a picture.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+    /// Cells computed at the same time; the map does not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
     /// Map what perfect information could land, instead of the mission's own guidance: an upper bound in vertical motion
     /// alone, some forty times cheaper. It knows no wind, so it needs --y.
     #[arg(long, requires = "y")]
@@ -171,8 +190,13 @@ struct MapOfMission {
 }
 
 fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
-    let recipe = recipe(&arguments.profile, None, &arguments.dispersion, arguments.seed)?;
-    let (by, asked, how) = if arguments.attainable {
+    let MapOfMission { ref profile, x, y, ref csv, ref svg, force, jobs, attainable, ref dispersion, seed } =
+        *arguments;
+    for path in [csv, svg].into_iter().flatten() {
+        refuse_loss(path, force)?;
+    }
+    let recipe = recipe(profile, None, dispersion, seed)?;
+    let (by, asked, how) = if attainable {
         let how = "an upper bound: vertical motion, no wind, no attitude";
         (By::PerfectInformation, "could it be landed with perfect information?", how)
     } else {
@@ -183,8 +207,20 @@ fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
         )
     };
     let title = format!("{}: {asked}", recipe.mission.name);
-    let default = ["thrust-scale=0.8:1.2:21", "wind=0:10:11"];
-    arguments.map.run(default, [&title, how], |axes, progress| map::map(&recipe, by, axes, progress))
+    let stopwatch = Stopwatch::start();
+    let show = |done| stopwatch.show(done, x.count * y.count, "cells");
+    let map = on_threads(jobs, || Ok(map::map(&recipe, by, [x, y], &show)?))?;
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "{title} ({how})").context("standard output")?;
+    map.write_table(&mut stdout)?;
+    if let Some(path) = csv {
+        write_file(path, force, |out| map.write_csv(out))?;
+    }
+    if let Some(path) = svg {
+        let picture = map::svg(&map, &title)?;
+        write_file(path, force, |out| out.write_all(picture.as_bytes()))?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Cost of a run.

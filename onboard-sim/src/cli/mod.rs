@@ -9,14 +9,11 @@ mod single;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
-use ::campaign::map::{self, Axis, Map, MapError};
 use ::campaign::motors::ranking::Progress;
 use ::campaign::run::threads;
 use ::campaign::stopwatch::Stopwatch;
 use anyhow::Context as _;
-use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
@@ -144,63 +141,4 @@ fn unfinished_beside(path: &Path) -> std::io::Result<NamedTempFile> {
         unfinished.permissions(std::fs::Permissions::from_mode(0o666));
     }
     unfinished.tempfile_in(folder)
-}
-
-/// What is mapped over, and where it is written.
-#[derive(Args)]
-struct MapArguments {
-    /// Columns: QUANTITY=FROM:TO:COUNT [default: thrust-scale=0.8:1.2:21; of the paper's vehicle
-    /// thrust-to-weight=0.9:1.5:41].
-    ///
-    /// Quantities of a mission: ignition-height (m, of the feet where the thrust begins; without it the guidance chooses),
-    /// thrust-scale, wind (m/s), tilt (deg, at the start), height (m, of the start). Of the paper's vehicle:
-    /// thrust-to-weight, height (m), speed (m/s), tilt (deg), rate (deg/s), lateral-speed (m/s), thrust-scale.
-    #[arg(long, value_name = "AXIS")]
-    x: Option<Axis>,
-    /// Rows, in the same form [default: wind=0:10:11; of the paper's vehicle height=5:35:31].
-    #[arg(long, value_name = "AXIS")]
-    y: Option<Axis>,
-    /// Write the cells as CSV.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-    /// Write the map as a picture.
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
-    /// Cells computed at the same time; the map does not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
-}
-
-impl MapArguments {
-    /// Computes a map of cells and writes it; the title says whose it is and what it answers, `how` by what.
-    fn run(
-        &self,
-        default: [&str; 2],
-        [title, how]: [&str; 2],
-        compute: impl FnOnce([Axis; 2], &(dyn Fn(usize) + Sync)) -> Result<Map, MapError> + Send,
-    ) -> anyhow::Result<ExitCode> {
-        let Self { force, jobs, .. } = *self;
-        for path in [&self.csv, &self.svg].into_iter().flatten() {
-            refuse_loss(path, force)?;
-        }
-        let axis = |given: Option<Axis>, default: &str| given.map_or_else(|| default.parse(), Ok);
-        let axes = [axis(self.x, default[0])?, axis(self.y, default[1])?];
-        let cells = axes[0].count * axes[1].count;
-        let stopwatch = Stopwatch::start();
-        let map = on_threads(jobs, || Ok(compute(axes, &|done| stopwatch.show(done, cells, "cells"))?))?;
-        let mut stdout = std::io::stdout().lock();
-        writeln!(stdout, "{title} ({how})").context("standard output")?;
-        map.write_table(&mut stdout)?;
-        if let Some(path) = &self.csv {
-            write_file(path, force, |out| map.write_csv(out))?;
-        }
-        if let Some(path) = &self.svg {
-            let svg = map::svg(&map, title)?;
-            write_file(path, force, |out| out.write_all(svg.as_bytes()))?;
-        }
-        Ok(ExitCode::SUCCESS)
-    }
 }

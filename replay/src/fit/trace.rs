@@ -5,7 +5,6 @@ use std::path::Path;
 
 use flight::computer::Commands;
 use flight::computer::Input;
-use flight::computer::pilot::Sensed;
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
@@ -95,7 +94,7 @@ impl Trace {
         Self { name, mission, mission_toml, frames: Vec::new(), damage: None, landed: None, content: None }
     }
 
-    /// Adds a frame; one without sensors or with numbers that are not finite is left out.
+    /// Adds a frame; one with numbers that are not finite is left out.
     pub fn push(
         &mut self,
         input: &Input<'_>,
@@ -104,7 +103,7 @@ impl Trace {
         estimate: &Estimate,
         gimbal_reported_rad: [f64; 2],
     ) {
-        let Sensed::Measured(measured) = input.sensed else { return };
+        let measured = input.measured;
         let numbers = [&measured.imu.gyro_rad_s, &measured.imu.specific_force_m_s2];
         let sound = estimate.state.is_finite()
             && estimate.wind_m_s.iter().all(|wind| wind.is_finite())

@@ -32,7 +32,6 @@ use protocol::log::writer::LogHeader;
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
-use sim::world::whole::WorldError;
 
 use self::rerun::Rerun;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
@@ -104,35 +103,18 @@ pub enum ReflyError {
     /// A setting is wrong.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The requested start is not in the log.
+    /// The log does not say how its flight was flown, this build does not know it, the requested start is not in it, or a fault cannot
+    /// be added or left out.
     #[error("{name}: {reason}")]
-    Start {
+    Refused {
         /// The file.
         name: String,
-        /// What was requested and what the log has.
+        /// What is missing or unknown, and what the log has.
         reason: String,
     },
-    /// The flight cannot be set up.
+    /// The flight cannot be set up, or its world cannot be changed this way.
     #[error(transparent)]
     Flight(#[from] SetUpError),
-    /// The world cannot be changed this way at the start.
-    #[error(transparent)]
-    World(#[from] WorldError),
-    /// The log does not say how its flight was flown, or this build does not know it.
-    #[error("{name}: cannot be flown again from its start: {reason}")]
-    Recipe {
-        /// The file.
-        name: String,
-        /// What is missing or unknown.
-        reason: String,
-    },
-    /// A fault cannot be added or left out.
-    #[error("{name}: {reason}")]
-    Fault {
-        /// The file.
-        name: String,
-        reason: String,
-    },
     /// A setting of the controller given to the plant, or the other way round, or one that does not change in flight.
     #[error("{setting}: {belongs}")]
     Misplaced {
@@ -224,17 +206,17 @@ pub fn refly_flight(
 ) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
     refuse_misplaced(options)?;
     let (_, frames) = recording.recorded_frames()?;
+    let mut rerun = Rerun::of(recording, &FaultChanges::default())?;
     let place = find(recording, frames, &options.start)?;
     let first_frame = frames[place].input.frame;
-    let mut rerun = Rerun::of(recording, &FaultChanges::default())?.fly_before(first_frame);
+    rerun = rerun.fly_before(first_frame);
     let reached = reached(recording, &rerun, &frames[..place]);
     let world = rerun.flight.world();
-    let place_m = world.state().position_m;
     let start = StartState {
         frame: recording.release_frame + first_frame,
         time_s: frames[place].input.time_s,
         phase: place.checked_sub(1).map_or("DEPLOY", |before| phase_name(&frames[before].output)),
-        x_m: libm::hypot(place_m.x, place_m.y),
+        x_m: world.state().position_m.xy().norm(),
         z_m: world.height_m(),
     };
     if options.faults != FaultChanges::default() {
@@ -253,9 +235,8 @@ pub fn refly_flight(
 
     let verdict = sortie::verdict(&rerun.flight);
     let end_s = rerun.flight.frame() as f64 * FRAME_S;
-    rerun
-        .records
-        .extend(verdict.iter().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict.clone())))));
+    let last = verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict))));
+    rerun.records.extend(last);
     let [recorded, reflown] =
         [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
     let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
@@ -309,12 +290,10 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
 /// pad. What only a crew or a log's disk makes different does not count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let felt = |frame: &ComputerFrame| {
-        let ComputerInput {
-            measured, known, fins_rad, contact, igniter_continuity, booster_attached, ..
-        } = frame.input.clone();
+        let ComputerInput { measured, fins_rad, contact, igniter_continuity, booster_attached, .. } =
+            frame.input.clone();
         let input = ComputerInput {
             measured,
-            known,
             fins_rad,
             contact,
             igniter_continuity,
@@ -362,8 +341,9 @@ fn change(
     });
     let truth = truth_with(&drawn, &of_truth)?;
     if truth != *world.truth() || true_mission.airframe != *world.airframe() {
-        let motor = truth.curve(&true_mission)?;
-        *rerun.flight.world_mut() = world.changed(&true_mission.airframe, motor.as_ref(), &truth)?;
+        let motor = truth.curve(&true_mission).map_err(SetUpError::from)?;
+        let changed = world.changed(&true_mission.airframe, motor.as_ref(), &truth);
+        *rerun.flight.world_mut() = changed.map_err(SetUpError::from)?;
     }
     Ok(())
 }
@@ -427,7 +407,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Res
             (in_phase(&|found| found == *phase), format!("no frame in phase {}", phase.name()))
         }
     };
-    found.ok_or_else(|| ReflyError::Start { name: recording.name.clone(), reason })
+    found.ok_or_else(|| ReflyError::Refused { name: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
@@ -528,7 +508,21 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
             "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
         )?;
     }
-    print_verdicts(report.recorded.as_ref(), report.reflown.as_ref(), output)?;
+    let verdicts = [report.recorded.as_ref(), report.reflown.as_ref()];
+    let [then, now] = verdicts.map(|verdict| verdict_words(verdict, "no verdict"));
+    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
+    writeln!(output, "{:<14} {then:>22} {now:>22}", "verdict")?;
+    for LimitRow { limit, values: [then, now] } in
+        verdict_rows(verdicts[1].or(verdicts[0]), verdicts, shown, " OUTSIDE")
+    {
+        writeln!(
+            output,
+            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
+            shown(&limit.name),
+            limit.minimum,
+            limit.maximum
+        )?;
+    }
     let answer = match report.verdict_changed {
         Some(true) => "the verdict CHANGES",
         Some(false) => "the verdict does not change",
@@ -547,29 +541,6 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
         report.commands_identical,
         report.gimbal_difference_max_rad
     )
-}
-
-/// Two verdicts, limit by limit.
-pub(crate) fn print_verdicts(
-    recorded: Option<&VerdictFacts>,
-    now: Option<&VerdictFacts>,
-    output: &mut impl Write,
-) -> io::Result<()> {
-    let words = |verdict| verdict_words(verdict, "no verdict");
-    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
-    writeln!(output, "{:<14} {:>22} {:>22}", "verdict", words(recorded), words(now))?;
-    for LimitRow { limit, values: [then, now] } in
-        verdict_rows(now.or(recorded), [recorded, now], shown, " OUTSIDE")
-    {
-        writeln!(
-            output,
-            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
-            shown(&limit.name),
-            limit.minimum,
-            limit.maximum
-        )?;
-    }
-    Ok(())
 }
 
 #[derive(Debug, clap::Args)]

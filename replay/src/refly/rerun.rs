@@ -70,7 +70,10 @@ impl Rerun {
     /// add is unknown.
     pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
         let (start, frames) = recording.recorded_frames()?;
-        let lacking = |reason: String| ReflyError::Recipe { name: recording.name.clone(), reason };
+        let lacking = |reason: String| ReflyError::Refused {
+            name: recording.name.clone(),
+            reason: format!("cannot be flown again from its start: {reason}"),
+        };
         let run = &recording.head.run;
         if let Some(original) = run.get("reflown_from") {
             return Err(lacking(format!("it was flown again from {original}; fly that one again")));
@@ -167,7 +170,7 @@ fn changed(
     recorded: &[TimedFault],
     changes: &FaultChanges,
 ) -> Result<Vec<TimedFault>, ReflyError> {
-    let refused = |reason: String| ReflyError::Fault { name: recording.name.clone(), reason };
+    let refused = |reason| ReflyError::Refused { name: recording.name.clone(), reason };
     let mut faults = recorded.to_vec();
     for without in &changes.without {
         // `gnss-out` means every one of that name, `gnss-out@5` just that one.

@@ -5,7 +5,7 @@
 
 use flight::computer::{FRAME_S, flight_time_s};
 use protocol::log::computer_v1::{ComputerInput, Uplink};
-use protocol::log::flight_v1::{Estimate, GnssFix, Measurements, RigidState, Vector3};
+use protocol::log::flight_v1::{GnssFix, Measurements, Vector3};
 
 /// No servo turns further, rad.
 const ANGLE_MAX_RAD: f64 = 2.0;
@@ -109,9 +109,8 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
         .or_else(|| {
             // Fixes are on the clock of the flight: from power-up, and from the release on T+.
             let clock_s = flight_time_s(input.frame.saturating_sub(release_frame.unwrap_or(0)));
-            measured(input.measured.as_ref()?, clock_s)
+            measured(&input.measured, clock_s)
         })
-        .or_else(|| known(input.known.as_ref()?))
 }
 
 fn measured(measured: &Measurements, time_s: f64) -> Option<String> {
@@ -127,13 +126,6 @@ fn measured(measured: &Measurements, time_s: f64) -> Option<String> {
                 .or_else(|| vector("velocity of GNSS, m/s,", velocity_m_s, SPEED_MAX_M_S))
                 .or_else(|| outside("time of a fix, s,", *valid_at_s, first_s, last_s))
         })
-}
-
-fn known(Estimate { state, .. }: &Estimate) -> Option<String> {
-    let RigidState { position_m, velocity_m_s, rate_rad_s, .. } = state;
-    vector("position, m,", position_m, PLACE_MAX_M)
-        .or_else(|| vector("velocity, m/s,", velocity_m_s, SPEED_MAX_M_S))
-        .or_else(|| vector("rate, rad/s,", rate_rad_s, RATE_MAX_RAD_S))
 }
 
 fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {

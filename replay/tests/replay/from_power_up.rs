@@ -450,9 +450,7 @@ proptest! {
                 for request in &mut found.input.requests {
                     request.asked = asked;
                 }
-                if let Some(measured) = &mut found.input.measured {
-                    measured.imu.gyro_rad_s.x = number;
-                }
+                found.input.measured.imu.gyro_rad_s.x = number;
             }
         };
         let report = FLOWN.verified_with(|_| true, nonsense);

@@ -278,7 +278,7 @@ fn a_gigabyte_is_described_within_200_megabytes() {
 fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
     let number = f64::from_bits(bits);
     let (input, output) = (&mut frame.input, &mut frame.output);
-    let measured = input.measured.as_mut().unwrap();
+    let measured = &mut input.measured;
     match field {
         0 => input.time_s = number,
         1 => measured.imu.gyro_rad_s.x = number,

@@ -3,7 +3,6 @@
 use std::io::{Cursor, Read as _, Seek as _};
 use std::sync::LazyLock;
 
-use flight::computer::pilot::Sensed;
 use flight::computer::{Computer, Input, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::rules::arming::Uplink;
@@ -63,7 +62,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
         let input = Input {
             frame,
             time_s,
-            sensed: Sensed::Measured(measured),
+            measured,
             gimbal_rad: [0.0; 2],
             fins_rad: [0.3; 4],
             contact: false,

@@ -150,9 +150,7 @@ fn inputs_that_cannot_be_are_named() {
         ("time", |frame| frame.input.time_s = f64::NAN),
         ("pin", |frame| frame.input.pin_out = !frame.input.pin_out),
         ("lidar", |frame| {
-            if let Some(measured) = &mut frame.input.measured {
-                measured.lidar_range_m = Some(3e307);
-            }
+            frame.input.measured.lidar_range_m = Some(3e307);
         }),
     ];
     for (name, change) in changes {

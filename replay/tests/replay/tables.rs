@@ -147,7 +147,7 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
         assert_eq!(cells.len(), names.len());
         let number = |place: usize| cells[place].parse::<f64>().unwrap().to_bits();
         assert_eq!(number(gimbal), frame.output.gimbal_rad[1].to_bits());
-        assert_eq!(number(gyro), frame.input.measured.as_ref().unwrap().imu.gyro_rad_s.x.to_bits());
+        assert_eq!(number(gyro), frame.input.measured.imu.gyro_rad_s.x.to_bits());
         assert_eq!(number(fin), frame.output.fins_rad[3].to_bits());
         count += 1;
     }

@@ -9,7 +9,6 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
-use super::pilot::Sensed;
 use super::{Computer, FRAME_S, Input};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
@@ -314,13 +313,11 @@ impl Watcher {
             // Nobody knows what was commanded or measured meanwhile.
             self.surfaces = servos(&computer.pilot().mission().airframe, flown);
         }
-        if let Sensed::Measured(measured) = &flown.sensed {
-            if measured.gnss.is_some() {
-                self.gnss_since_boost = phase != Phase::Boost;
-            }
-            if phase == Phase::Boost {
-                self.boost_m_s += measured.imu.specific_force_m_s2.x * FRAME_S;
-            }
+        if flown.measured.gnss.is_some() {
+            self.gnss_since_boost = phase != Phase::Boost;
+        }
+        if phase == Phase::Boost {
+            self.boost_m_s += flown.measured.imu.specific_force_m_s2.x * FRAME_S;
         }
         let commands = computer.commands();
         for (servo, command_rad) in
@@ -336,9 +333,7 @@ impl Watcher {
             }
         }
         let nose_up = estimate.state.nose_in_world().z;
-        let near = has_sensors(flown)
-            && estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up
-            && nose_up > LIDAR_COS_TILT;
+        let near = estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up && nose_up > LIDAR_COS_TILT;
         self.down |= flown.contact && !phase.before_apogee();
         self.astray |= phase.in_landing_burn() && nose_up < ASTRAY_COS_TILT;
         self.must_see_s = if near { self.must_see_s.or(Some(time_s)) } else { None };
@@ -353,7 +348,7 @@ impl Watcher {
         let now = |value: f64, beside| Seen { since_s: time_s, size: value, value, beside, detail: "" };
         let [barometer_s, gnss_s, _] = computer.sensors().silent_s();
         let silent = |silent_s: f64, longest_s: f64| {
-            (in_air && has_sensors(flown) && silent_s > longest_s)
+            (in_air && silent_s > longest_s)
                 .then_some(Seen { since_s: time_s - silent_s, ..now(silent_s, 0.0) })
         };
         match sign {
@@ -374,11 +369,6 @@ impl Watcher {
             _ => None,
         }
     }
-}
-
-/// Without a model of sensors the state is known, and none of them can fail.
-fn has_sensors(flown: &Input<'_>) -> bool {
-    matches!(flown.sensed, Sensed::Measured(_))
 }
 
 /// A sign that only a vehicle in the air has.
@@ -434,7 +424,7 @@ fn seen_in_flight(
             let burnt_kg = 0.5 * booster.motor_curve.propellant_mass_kg();
             let mass_kg = mission.airframe.mass.loaded_kg + booster.dry_kg + burnt_kg;
             let share = watcher.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
-            let felt = has_sensors(flown) && mode.phase == Phase::Coast;
+            let felt = mode.phase == Phase::Coast;
             (felt && share < ASCENT_WEAK).then(|| now(share, 1.0))
         }
         Sign::Separation => (flown.booster_attached && watcher.parted_s.is_some()).then(|| now(1.0, 0.0)),

@@ -33,9 +33,9 @@ use serde::{Deserialize, Serialize};
 pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
-use self::pad::{ANSWERING_RAD, PadWatch, SelfTest, as_measured};
+use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
-use self::pilot::{Pilot, Pointed, Sensed};
+use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::estimation::estimator::{ImuSample, Measurements};
@@ -110,13 +110,9 @@ impl Computer {
         if self.rehearsed.is_none() {
             self.rehearsed = input.rehearsed.cloned();
         }
-        self.sensors.take(
-            &as_measured(&input.sensed),
-            matches!(input.sensed, Sensed::Measured(_)),
-            input.time_s,
-        );
+        self.sensors.take(&input.measured, input.time_s);
         if self.table.mode().phase.on_pad() {
-            self.pad.update_stillness(&input.sensed);
+            self.pad.update_stillness(&input.measured);
             if self.rehearsed.is_some() {
                 self.ask_the_checks_again();
             }
@@ -356,7 +352,7 @@ pub struct Input<'a> {
     pub frame: u64,
     /// Vehicle time at its end, s.
     pub time_s: f64,
-    pub sensed: Sensed,
+    pub measured: Measurements,
     /// Where the gimbal is (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Where the fins are, rad.
@@ -387,7 +383,7 @@ impl Input<'_> {
     const NONE: Input<'static> = Input {
         frame: 0,
         time_s: 0.0,
-        sensed: Sensed::Measured(Measurements::of_imu(ImuSample::NONE)),
+        measured: Measurements::of_imu(ImuSample::NONE),
         gimbal_rad: [0.0; 2],
         fins_rad: [0.0; 4],
         contact: false,
@@ -408,7 +404,7 @@ impl Input<'_> {
         let &Self {
             frame,
             time_s,
-            sensed,
+            measured,
             gimbal_rad,
             fins_rad,
             contact,
@@ -426,7 +422,7 @@ impl Input<'_> {
         Input {
             frame,
             time_s,
-            sensed,
+            measured,
             gimbal_rad,
             fins_rad,
             contact,

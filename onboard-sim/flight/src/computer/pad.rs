@@ -8,9 +8,8 @@ use serde::Serialize;
 
 use super::news::Severity;
 use super::{Computer, Input, Release};
-use crate::computer::pilot::Sensed;
+use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
-use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use crate::estimation::sensor_watch::Rests;
 use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
 use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
@@ -78,8 +77,7 @@ pub(super) struct PadWatch {
 
 impl PadWatch {
     /// Adds a frame.
-    pub(super) fn update_stillness(&mut self, sensed: &Sensed) {
-        let measurements = as_measured(sensed);
+    pub(super) fn update_stillness(&mut self, measurements: &Measurements) {
         self.alignment.take(&measurements.imu);
         let felt_m_s2 = measurements.imu.specific_force_m_s2;
         self.force_sum_m_s2 += felt_m_s2;
@@ -156,25 +154,6 @@ impl PadWatch {
             velocity_m_s: found.map_or_else(Vector3::zeros, |found| found.velocity_m_s),
             ..RigidState::upright(0.0)
         }
-    }
-}
-
-/// The measurements; of perfect sensors if the state is known.
-pub(super) fn as_measured(sensed: &Sensed) -> Measurements {
-    let estimate = match sensed {
-        Sensed::Measured(measurements) => return *measurements,
-        Sensed::Known(estimate) => estimate,
-    };
-    let state = &estimate.state;
-    let imu = ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: estimate.specific_force_m_s2 };
-    Measurements {
-        pressure_altitude_m: Some(state.position_m.z),
-        gnss: Some(GnssFix {
-            position_m: state.position_m,
-            velocity_m_s: state.velocity_m_s,
-            valid_at_s: estimate.time_s,
-        }),
-        ..Measurements::of_imu(imu)
     }
 }
 
@@ -332,7 +311,7 @@ impl Computer {
 
     /// A motor may light that nobody lit.
     fn wait_on_the_rail(&mut self, input: &Input<'_>) {
-        if self.pilot.detects_lift_off(&input.sensed) {
+        if self.pilot.detects_lift_off(&input.measured) {
             self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
             if self.table.happen(Event::LiftOff).is_ok() {
                 self.begin_flight();
@@ -409,10 +388,12 @@ impl Computer {
         self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
         let mission = self.pilot.mission();
         if let (Some(launch), Some(start)) = (mission.launched(), self.pad.at_rest()) {
-            let believed = RigidState {
+            let mut believed = RigidState {
                 world_from_body: start.world_from_body,
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
             };
+            // A lift-off that nobody commanded is felt a moment after it began.
+            believed.velocity_m_s = believed.nose_in_world() * self.pilot.pushed_to_m_s();
             self.pilot.stand(&believed, start.gyro_bias_rad_s);
         }
     }

@@ -93,8 +93,6 @@ impl<const N: usize> Voice<N> {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct SensorWatch {
     time_s: f64,
-    /// The computer gets measurements, and not the truth.
-    measures: bool,
     gyro: Voice<3>,
     accelerometer: Voice<3>,
     /// Height, m.
@@ -122,10 +120,10 @@ pub enum Rests {
 }
 
 impl SensorWatch {
-    /// Takes a frame's measurements; without sensors (not `measures`) what they would say.
-    pub fn take(&mut self, measured: &Measurements, measures: bool, time_s: f64) {
+    /// Takes a frame's measurements.
+    pub fn take(&mut self, measured: &Measurements, time_s: f64) {
         let frame_s = if self.gyro.spoke { time_s - self.time_s } else { RESTS_OVER_S };
-        (self.time_s, self.measures) = (time_s, measures);
+        self.time_s = time_s;
         let imu = &measured.imu;
         self.gyro.take(Some(imu.gyro_rad_s.into()).filter(|_| imu.is_plausible()), time_s);
         self.accelerometer.take(Some(imu.specific_force_m_s2.into()).filter(|_| imu.is_plausible()), time_s);
@@ -147,11 +145,6 @@ impl SensorWatch {
             self.turns_rad_s += (imu.gyro_rad_s - self.turns_rad_s) * share;
             self.felt_m_s2 += (imu.specific_force_m_s2 - self.felt_m_s2) * share;
         }
-    }
-
-    /// The computer has sensors, and does not get the truth.
-    pub fn measures(&self) -> bool {
-        self.measures
     }
 
     /// The satellite receiver has a fix.
@@ -177,7 +170,7 @@ impl SensorWatch {
 
     /// For how long the accelerometer has repeated one sample, s; `None` if it does not.
     pub fn accelerometer_frozen_s(&self) -> Option<f64> {
-        self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s).filter(|_| self.measures)
+        self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s)
     }
 
     /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.
@@ -185,8 +178,7 @@ impl SensorWatch {
         let lost_s = |frozen_s: Option<f64>, silent_s: f64| frozen_s.unwrap_or(0.0).max(silent_s);
         let felt_s = lost_s(self.accelerometer_frozen_s(), self.accelerometer.silent_s(self.time_s));
         let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s);
-        let turned_s = lost_s(gyro_s, self.gyro.silent_s(self.time_s));
-        if self.measures { felt_s.max(turned_s) } else { 0.0 }
+        felt_s.max(lost_s(gyro_s, self.gyro.silent_s(self.time_s)))
     }
 
     /// Mean rotation rate over the last moment, rad/s.
@@ -195,11 +187,8 @@ impl SensorWatch {
     }
 
     /// What is wrong with each sensor of a vehicle at rest, in the crew's words: accelerometer, gyro, barometer, satellites,
-    /// lidar. The state of a vehicle without sensors is known, and nothing is wrong.
+    /// lidar.
     pub fn defects(&self, rests: Rests) -> [Option<String>; 5] {
-        if !self.measures {
-            return [const { None }; 5];
-        }
         let time_s = self.time_s;
         let silent = |name: &str, silent_s: f64, longest_s: f64| {
             (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.1} s"))

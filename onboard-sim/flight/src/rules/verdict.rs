@@ -217,12 +217,6 @@ impl Landing {
     }
 }
 
-impl From<[bool; 4]> for Landing {
-    fn from([stands, upright, envelope, table_2]: [bool; 4]) -> Self {
-        Self { stands, upright, envelope, table_2 }
-    }
-}
-
 /// How a flight that touched the ground ended; it is displayed as one sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlightEnding<'a> {
@@ -322,8 +316,9 @@ mod tests {
 
     #[test]
     fn an_ending_says_whether_legs_were_inside_their_envelope() {
-        let said = |flags, failure| {
-            FlightEnding { aborted: false, landing: Landing::from(flags), failure }.to_string()
+        let said = |[stands, upright, envelope, table_2]: [bool; 4], failure| {
+            let landing = Landing { stands, upright, envelope, table_2 };
+            FlightEnding { aborted: false, landing, failure }.to_string()
         };
         assert_eq!(
             said([true, true, false, false], None),

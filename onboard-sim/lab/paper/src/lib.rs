@@ -2,6 +2,9 @@
 //!
 //! The paper is *Definition of a Landing Strategy for a Model-Scale Reusable Rocket* (EuroGNC). The program of this package
 //! repeats its experiments. Vehicles plan in space, with the crate `nmpc`.
+//!
+//! * `plane`: the problem in general, and its solver.
+//! * `problem`: the paper's numbers.
 
 pub mod plane;
 pub mod problem;

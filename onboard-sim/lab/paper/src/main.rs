@@ -15,9 +15,6 @@ use crate::study::figures::{figures, stability_figures};
 #[derive(Parser)]
 #[command(name = "paper", after_help = "Example: paper --out figures")]
 struct Arguments {
-    /// As JSON.
-    #[arg(long, conflicts_with = "stability")]
-    json: bool,
     /// Instead of the tables, map from which tilts the paper's vehicle settles in a passive fall, over the opening of its
     /// fins, with the static margin that explains it.
     #[arg(long)]
@@ -28,7 +25,7 @@ struct Arguments {
 }
 
 fn main() -> anyhow::Result<()> {
-    let Arguments { json, stability, out: folder } = Arguments::parse();
+    let Arguments { stability, out: folder } = Arguments::parse();
     let mut out = std::io::stdout().lock();
     let figures = if stability {
         let stability = Stability::new(CG_STATION_M)?;
@@ -36,12 +33,7 @@ fn main() -> anyhow::Result<()> {
         stability_figures(&stability)?
     } else {
         let experiments = study::experiments();
-        let printed = study::as_printed();
-        if json {
-            writeln!(out, "{:#}", study::to_json(&experiments, &printed))?;
-        } else {
-            study::write_tables(&mut out, &experiments, &printed)?;
-        }
+        study::write_tables(&mut out, &experiments, &study::as_printed())?;
         figures(&experiments.rows)?
     };
     let Some(folder) = folder else { return Ok(()) };

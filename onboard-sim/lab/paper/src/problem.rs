@@ -3,7 +3,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use crate::plane::dynamics::{ModelKind, PlanarModel, PlanarParams, PlanarState};
+use crate::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
 use crate::plane::{FinalBox, Problem, SolverLimits};
 
 /// Thrust with which the paper's Table 3 is possible, N: it needs about 11.1 m/s^2, and nothing lands with the printed
@@ -19,20 +19,19 @@ pub const SAMPLE_S: f64 = 0.1;
 /// Samples from ignition to the end of the burn.
 pub const HORIZON: usize = 50;
 
+/// Fastest touchdown that counts as a landing (Table 2), m/s.
+pub const TOUCHDOWN_SPEED_MAX_M_S: f64 = 0.4;
+
 /// 3 kg in still air at sea level.
 pub fn model() -> PlanarModel {
     PlanarModel {
-        params: PlanarParams {
-            mass_kg: 3.0,
-            pitch_inertia_kg_m2: 0.12,
-            // Both stations are measured from mid-length, nose positive: the only reading that fits "25 % of the length".
-            thrust_arm_m: 0.17 + 0.35,
-            drag_per_m: 1.225 * 0.0043 / (2.0 * 3.0),
-            lateral_drag_per_m: 0.0,
-            crossflow_per_m: 0.0,
-            gravity_m_s2: 9.81,
-        },
         kind: ModelKind::Consistent,
+        mass_kg: 3.0,
+        pitch_inertia_kg_m2: 0.12,
+        // Both stations are measured from mid-length, nose positive: the only reading that fits "25 % of the length".
+        thrust_arm_m: 0.17 + 0.35,
+        drag_per_m: 1.225 * 0.0043 / (2.0 * 3.0),
+        gravity_m_s2: 9.81,
     }
 }
 
@@ -46,25 +45,15 @@ pub fn problem(initial: PlanarState, intervals: usize) -> Problem {
     Problem {
         model: model(),
         initial,
+        intervals,
         step_s: SAMPLE_S,
-        thrust_n: vec![THRUST_N; intervals],
-        mass_kg: vec![],
-        target: PlanarState { theta_rad: FRAC_PI_2, ..PlanarState::default() },
+        thrust_n: THRUST_N,
         state_weights: [0.5, 60.0, 150.0, 50.0, 70.0, 90.0],
         input_weight: 1.0,
         gimbal_limit_rad: 20.0_f64.to_radians(),
         x_final_m: 20.0,
         final_box: None,
-        altitude_min_m: None,
-        floor_rise_m_s: 0.0,
-        touchdown_speed_max_m_s: 0.4,
-        solver: SolverLimits {
-            max_iterations: 60,
-            kkt_tolerance: 1e-6,
-            terminal_penalty: 1000.0,
-            guess_amplitude_rad: 0.3,
-            guess_half_waves: 2,
-        },
+        solver: SolverLimits { max_iterations: 60, kkt_tolerance: 1e-6, terminal_penalty: 1000.0 },
     }
 }
 

@@ -1,4 +1,4 @@
-//! Everything that PAPER.md names exists: its commands, its tests and its paths.
+//! What PAPER.md names exists: the commands of `paper`, tests and paths.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..")
 }
 
 /// What the page has in backticks.
@@ -15,16 +15,15 @@ fn named() -> Vec<String> {
     page.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-/// With `--help` at its end a command is read to its end, but not run.
+/// With `--help` at its end a command is read to its end, but not run. The pages' own tests read those of `onboard-sim`.
 #[test]
 fn every_command_of_the_page_is_understood() {
-    let commands: Vec<String> =
-        named().into_iter().filter(|text| text.starts_with("onboard-sim ") && !text.contains('…')).collect();
-    assert!(commands.len() > 20, "{commands:?}");
+    let is_ours = |text: &str| text.split(' ').next() == Some("paper") && !text.contains('…');
+    let commands: Vec<String> = named().into_iter().filter(|text| is_ours(text)).collect();
+    assert!(commands.len() > 15, "{commands:?}");
     for command in commands {
         let words = command.split_whitespace().skip(1);
-        let output =
-            Command::new(env!("CARGO_BIN_EXE_onboard-sim")).args(words).arg("--help").output().unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_paper")).args(words).arg("--help").output().unwrap();
         assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
     }
 }

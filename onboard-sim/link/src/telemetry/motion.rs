@@ -116,18 +116,17 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
 }
 
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
-/// kept. A vehicle without sensors has no receiver.
+/// kept.
 pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let motion = state.motion();
     let [north_m, east_m, down_m] = motion.position_m;
     let [north_m_s, east_m_s, _] = motion.velocity_m_s;
     let (lat, lon) = degrees_e7(state, north_m, east_m);
     let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
-    let sensors = state.computer.sensors();
-    let fix_type = match sensors.measures() {
-        false => GpsFixType::GPS_FIX_TYPE_NO_GPS,
-        true if sensors.gnss_speaks() => GpsFixType::GPS_FIX_TYPE_3D_FIX,
-        true => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+    let fix_type = if state.computer.sensors().gnss_speaks() {
+        GpsFixType::GPS_FIX_TYPE_3D_FIX
+    } else {
+        GpsFixType::GPS_FIX_TYPE_NO_FIX
     };
     let unknown = GPS_RAW_INT_DATA {
         time_usec: (1e6 * state.time_s) as u64,
@@ -167,9 +166,6 @@ pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysSt
     use MavSysStatusSensor as S;
     let mut silent = S::empty();
     let sensors = state.computer.sensors();
-    if !sensors.measures() {
-        return (silent, silent);
-    }
     let present = S::MAV_SYS_STATUS_SENSOR_3D_GYRO
         | S::MAV_SYS_STATUS_SENSOR_3D_ACCEL
         | S::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
@@ -240,8 +236,6 @@ fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
 /// The outputs that are valid, by the estimator's own doubts, and by how much of its gate each sensor's last measurement was off.
 pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
-    // Where the truth is the estimate there is no estimator to speak of.
-    state.measured()?;
     let estimate = state.airborne()?.estimate;
     let sigmas_m = &estimate.sigmas.position_m;
     let aids = state.computer.pilot().estimator().aids();
@@ -278,9 +272,9 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
 }
 
 /// There is no magnetometer and no thermometer: their fields are not marked as updated.
-pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn imu(state: &VehicleState<'_>) -> MavMessage {
     use HighresImuUpdatedFlags as U;
-    let imu = state.measured()?.imu;
+    let imu = state.input().measured.imu;
     let pressure_altitude_m = state.computer.sensors().pressure_altitude_m();
     let mut fields_updated = U::HIGHRES_IMU_UPDATED_XACC
         | U::HIGHRES_IMU_UPDATED_YACC
@@ -291,7 +285,7 @@ pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
     fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, pressure_altitude_m.is_some());
     let [xacc, yacc, zacc] = <[f64; 3]>::from(imu.specific_force_m_s2).map(|force| force as f32);
     let [xgyro, ygyro, zgyro] = <[f64; 3]>::from(imu.gyro_rad_s).map(|rate| rate as f32);
-    Some(MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
+    MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
         time_usec: (1e6 * state.time_s) as u64,
         xacc,
         yacc,
@@ -302,7 +296,7 @@ pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
         pressure_alt: pressure_altitude_m.unwrap_or(f64::NAN) as f32,
         fields_updated,
         ..HIGHRES_IMU_DATA::default()
-    }))
+    })
 }
 
 #[cfg(test)]

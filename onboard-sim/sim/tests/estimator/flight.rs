@@ -86,7 +86,7 @@ impl Scene {
     /// Runs the flight until the centre of gravity is 0.1 m above its height at rest.
     pub(crate) fn fly(&self) -> Vec<Frame> {
         let mut estimator = self.estimator();
-        let mut sensors = Sensors::new(&self.sensors, self.seed, 0.0).expect("valid sensor parameters");
+        let mut sensors = Sensors::new(&self.sensors, self.seed, 1.0).expect("valid sensor parameters");
         let mut state = Self::start();
         let (mut burning, mut ms) = (false, 0_u32);
         let mut frames = Vec::new();

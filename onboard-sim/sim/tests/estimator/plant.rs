@@ -87,7 +87,7 @@ fn fly(seed: u64) -> Vec<Frame> {
         World::new(&airframe, &curve, &truth, &start(&truth), seed).expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
-    let mut sensors = Sensors::new(&params, seed, 0.0).expect("valid sensor parameters");
+    let mut sensors = Sensors::new(&params, seed, 1.0).expect("valid sensor parameters");
     let uncertainty = StartUncertainty::at_apogee();
     let believed = believed_start(&start(&truth), &uncertainty, seed);
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed);

@@ -52,7 +52,9 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
         passed: true,
     };
     let time_s = FRAMES as f64 * FRAME_S;
-    let verdict = v1::LandingVerdict { time_s, landed: true, limits: vec![limit], ..Default::default() };
+    let landing = v1::Landing { stands: true, upright: true, envelope: true, table_2: true };
+    let (envelope, table_2) = (vec![limit.clone()], vec![limit]);
+    let verdict = v1::LandingVerdict { time_s, landing, envelope, table_2, ..Default::default() };
     log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(time_s)).unwrap();
     log.finish().unwrap();
 }

@@ -63,7 +63,7 @@ pub(super) fn vibration(flight: &Flight) -> String {
     let line = |name, class, belongs: fn(Phase) -> bool| {
         let frames = flight.recording.frames.iter();
         let frames = frames.filter(|frame| phase_of(&frame.output).is_some_and(belongs));
-        let felt = |frame: &ComputerFrame| Some(frame.input.measured.as_ref()?.imu.specific_force_m_s2.x);
+        let felt = |frame: &ComputerFrame| Some(frame.input.measured.imu.specific_force_m_s2.x);
         Line { name, class, points: spectrum(&frames.filter_map(felt).collect::<Vec<f64>>()) }
     };
     let spectra = Chart {

@@ -50,7 +50,7 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
     let mission = flight.pilot.as_ref().map(|pilot| pilot.mission());
     let none = Series::new;
 
-    let barometer = flight.framed(|frame| frame.input.measured.as_ref()?.pressure_altitude_m);
+    let barometer = flight.framed(|frame| frame.input.measured.pressure_altitude_m);
     let height = [("barometer", "thin", barometer), ("feet", "a", flight.flown(|state| state[HEIGHT]))];
     draw.draw("first", Whole, "Height over the whole flight, m", &[], height);
 
@@ -153,18 +153,18 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
     let parachute = flight.truth(|sample| Some(sample.parachute_open_share));
     draw.draw("descent", Air, "Parachute, share open", &[], [("", "a", parachute)]);
     let barometer = flight.framed(|frame| {
-        let sensed_m = frame.input.measured.as_ref()?.pressure_altitude_m?;
+        let sensed_m = frame.input.measured.pressure_altitude_m?;
         Some(sensed_m - flight.world_at(frame.input.time_s)?.state.position_m.z)
     });
     let lidar = flight.framed(|frame| {
-        let sensed_m = frame.input.measured.as_ref()?.lidar_range_m?;
+        let sensed_m = frame.input.measured.lidar_range_m?;
         Some(sensed_m - flight.world_at(frame.input.time_s)?.height_m)
     });
     let lines = [("barometer", "a", barometer), ("lidar range", "c", lidar)];
     draw.draw("descent", Air, "Sensed height less true height, m", &[], lines);
     let fix = |factors: [f64; 3]| {
         flight.framed(|frame| {
-            let sensed = &frame.input.measured.as_ref()?.gnss.as_ref()?.position_m;
+            let sensed = &frame.input.measured.gnss.as_ref()?.position_m;
             let actual = &flight.world_at(frame.input.time_s)?.state.position_m;
             let [north, west, up] = factors;
             Some(north * (sensed.x - actual.x) + west * (sensed.y - actual.y) + up * (sensed.z - actual.z))

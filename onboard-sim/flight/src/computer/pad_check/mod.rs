@@ -19,7 +19,7 @@ use serde::Serialize;
 use self::sweep::{Still, Sweep};
 use super::crew::{Answer, Asked, Ending};
 use super::news::Severity;
-use super::pad::{SelfTest, as_measured};
+use super::pad::SelfTest;
 use super::{Computer, Input};
 use crate::estimation::estimator::Measurements;
 use crate::rules::operator::Operator;
@@ -452,7 +452,7 @@ impl Computer {
         let ([pitch_rad, yaw_rad], [one, two, three, four]) = (input.gimbal_rad, input.fins_rad);
         let seen = PadReadings {
             surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
-            measured: &as_measured(&input.sensed),
+            measured: &input.measured,
             switches: PadSwitches {
                 igniter_continuity: self.input.igniter_continuity,
                 booster_attached: self.input.booster_attached,

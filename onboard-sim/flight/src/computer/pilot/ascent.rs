@@ -5,7 +5,6 @@ use alloc::format;
 use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
-use super::Sensed;
 use super::vertical_speed::{APART_OF_TWO_M_S, RATE_OVER_S, VerticalSpeeds};
 use crate::computer::news::Severity;
 use crate::computer::pad::ANSWERING_RAD;
@@ -68,7 +67,7 @@ pub(super) struct AscentReadings {
 /// The watch's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct AscentWatch {
-    gained_m_s: f64,
+    pub(super) gained_m_s: f64,
     lifted_off: bool,
     lifted_off_at_s: f64,
     /// More than the accelerometer says that it has lifted off.
@@ -249,14 +248,6 @@ impl AscentWatch {
 /// counts.
 fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
     if is_now.unwrap_or(before_s > 0.0) { before_s + frame_s } else { 0.0 }
-}
-
-/// What is felt along the axis, m/s^2.
-pub(super) fn axial_m_s2(sensed: &Sensed) -> f64 {
-    match sensed {
-        Sensed::Known(estimate) => estimate.specific_force_m_s2.x,
-        Sensed::Measured(measured) => measured.imu.specific_force_m_s2.x,
-    }
 }
 
 /// What the crew is told of an event.

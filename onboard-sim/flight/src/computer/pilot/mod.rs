@@ -15,7 +15,7 @@ use alloc::string::String;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use self::ascent::{AscentWatch, FinWatch, axial_m_s2};
+use self::ascent::{AscentWatch, FinWatch};
 pub use self::prediction::{ApogeeAhead, Prediction, touchdown_from_below_m, touchdown_m};
 use self::vehicle_model::VehicleModel;
 use self::vertical_speed::VerticalSpeeds;
@@ -34,16 +34,6 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// Frames between plans.
 pub const FRAMES_PER_PLAN: u64 = 10;
-
-/// The input about the vehicle's motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "plain data, one a frame, so that a log of it is whole")]
-pub enum Sensed {
-    /// Measurements, for the estimator.
-    Measured(Measurements),
-    /// The truth as the estimate: for studies of guidance alone.
-    Known(Estimate),
-}
 
 /// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,14 +137,19 @@ impl Pilot {
         self.ascent.has_lifted_off()
     }
 
+    /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
+    pub(super) fn pushed_to_m_s(&self) -> f64 {
+        self.ascent.gained_m_s
+    }
+
     /// Apogee is near, or was: the booster goes.
     pub(super) fn separates(&self) -> bool {
         self.ascent.separates()
     }
 
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
-    pub(super) fn detects_lift_off(&mut self, sensed: &Sensed) -> bool {
-        self.ascent.detects_lift_off(axial_m_s2(sensed), self.model.mission.estimator.frame_s)
+    pub(super) fn detects_lift_off(&mut self, measured: &Measurements) -> bool {
+        self.ascent.detects_lift_off(measured.imu.specific_force_m_s2.x, self.model.mission.estimator.frame_s)
     }
 
     /// The estimate of the last frame.
@@ -365,7 +360,7 @@ pub(super) mod sample {
 
     use nalgebra::Vector3;
 
-    use super::{Pilot, Sensed};
+    use super::Pilot;
     use crate::computer::table::PhaseTable;
     use crate::computer::{Computer, Input, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
@@ -394,7 +389,7 @@ pub(super) mod sample {
         Input {
             frame,
             time_s: 0.005 * frame as f64,
-            sensed: Sensed::Measured(Measurements::of_imu(imu)),
+            measured: Measurements::of_imu(imu),
             igniter_continuity: true,
             pin_out: true,
             log: LogState { running: true, space_bytes: u64::MAX },

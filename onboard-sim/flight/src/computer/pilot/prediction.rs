@@ -222,7 +222,6 @@ mod tests {
     use super::*;
     use nalgebra::{Vector2, Vector3};
 
-    use crate::computer::pilot::Sensed;
     use crate::computer::pilot::sample::{self, input, released};
     use crate::computer::table::PhaseTable;
     use crate::estimation::estimator::StartUncertainty;
@@ -231,6 +230,11 @@ mod tests {
     /// One frame, in which the crew may abort.
     fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
         pilot.estimate_state(table.mode().phase, input);
+        fly_on(pilot, table, input, abort)
+    }
+
+    /// The same after the estimate.
+    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
         pilot.predict(table, input);
         if abort {
             let event = pilot.abort_event(table.mode(), Some(input), &SensorWatch::default());
@@ -302,9 +306,10 @@ mod tests {
             let height_m = estimate.state.position_m.z;
             let mut input = Input { fins_rad, ..sample::input(frame, 0.0) };
             wrong(height_m, &mut estimate, &mut input);
-            let input = Input { sensed: Sensed::Known(estimate), ..input };
             let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
-            fins_rad = frame_with(&mut pilot, &mut table, &input, aborts);
+            pilot.estimate = Some(estimate);
+            pilot.update_models(table.mode().phase, &input, &estimate);
+            fins_rad = fly_on(&mut pilot, &mut table, &input, aborts);
             let phase = table.mode().phase;
             let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
             match phase {

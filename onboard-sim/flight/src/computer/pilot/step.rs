@@ -4,11 +4,11 @@ use alloc::format;
 
 use nalgebra::Vector3;
 
-use super::ascent::{AscentReadings, axial_m_s2, words_of_ascent};
+use super::ascent::{AscentReadings, words_of_ascent};
 use super::prediction::{commit_height_m, touchdown_m};
 use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
-use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction, Sensed};
+use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction};
 use crate::computer::Input;
 use crate::computer::news::Severity;
 use crate::computer::table::PhaseTable;
@@ -142,30 +142,26 @@ impl Pilot {
     }
 
     fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
-        match input.sensed {
-            Sensed::Known(estimate) => estimate,
-            Sensed::Measured(mut measurements) => {
-                self.silence_what_is_wrong(&mut measurements, input.time_s);
-                let burning_s = self.model.burning_s(input.time_s);
-                let mass = self.model.mass_now(burning_s);
-                let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
-                let air = Air::at_height_m(self.model.mission.pad_altitude_m + height_m);
-                let vehicle = VehicleNow::of(
-                    self.model.airframe(),
-                    &mass,
-                    air.density_kg_m3,
-                    input.fins_rad,
-                    burning_s.is_some() || phase.in_landing_burn(),
-                    self.model.mission.lidar_ahead_of_feet_m,
-                );
-                let (measurements, vehicle) = if phase.before_apogee() {
-                    on_the_way_up(&measurements, &vehicle, phase)
-                } else {
-                    (measurements, vehicle)
-                };
-                self.estimator.step(&measurements, &vehicle)
-            }
-        }
+        let mut measurements = input.measured;
+        self.silence_what_is_wrong(&mut measurements, input.time_s);
+        let burning_s = self.model.burning_s(input.time_s);
+        let mass = self.model.mass_now(burning_s);
+        let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
+        let air = Air::at_height_m(self.model.mission.pad_altitude_m + height_m);
+        let vehicle = VehicleNow::of(
+            self.model.airframe(),
+            &mass,
+            air.density_kg_m3,
+            input.fins_rad,
+            burning_s.is_some() || phase.in_landing_burn(),
+            self.model.mission.lidar_ahead_of_feet_m,
+        );
+        let (measurements, vehicle) = if phase.before_apogee() {
+            on_the_way_up(&measurements, &vehicle, phase)
+        } else {
+            (measurements, vehicle)
+        };
+        self.estimator.step(&measurements, &vehicle)
     }
 
     /// A sensor that repeats itself has stopped, and a fix may be outvoted.
@@ -183,7 +179,7 @@ impl Pilot {
 
     /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
     /// parachute.
-    fn update_models(&mut self, phase: Phase, input: &Input<'_>, estimate: &Estimate) {
+    pub(super) fn update_models(&mut self, phase: Phase, input: &Input<'_>, estimate: &Estimate) {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
@@ -255,18 +251,14 @@ impl Pilot {
     }
 
     fn watch_the_speeds(&mut self, input: &Input<'_>, estimate: &Estimate) {
-        let (felt_m_s2, pressure_altitude_m, fix) = match &input.sensed {
-            Sensed::Known(estimate) => (estimate.specific_force_m_s2, None, None),
-            Sensed::Measured(measured) => {
-                (measured.imu.specific_force_m_s2, measured.pressure_altitude_m, measured.gnss)
-            }
-        };
+        let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
         self.speeds.take(&SpeedReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
-            vertical_m_s2: (estimate.state.world_from_body * felt_m_s2).z - self.model.mission.gravity_m_s2,
+            vertical_m_s2: (estimate.state.world_from_body * imu.specific_force_m_s2).z
+                - self.model.mission.gravity_m_s2,
             pressure_altitude_m: pressure_altitude_m.filter(|_| !self.ascent.is_charged(input.time_s)),
-            gnss_m_s: fix.map(|fix| fix.velocity_m_s.z),
+            gnss_m_s: gnss.map(|fix| fix.velocity_m_s.z),
             estimated_m_s: estimate.state.velocity_m_s.z,
         });
     }
@@ -277,16 +269,12 @@ impl Pilot {
         let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
         };
-        let pressure_altitude_m = match &input.sensed {
-            Sensed::Known(_) => None,
-            Sensed::Measured(measured) => measured.pressure_altitude_m,
-        };
         let seen = AscentReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             phase,
-            axial_specific_force_m_s2: axial_m_s2(&input.sensed),
-            pressure_altitude_m,
+            axial_specific_force_m_s2: input.measured.imu.specific_force_m_s2.x,
+            pressure_altitude_m: input.measured.pressure_altitude_m,
             speeds: self.speeds,
             vertical_m_s: estimate.state.velocity_m_s.z,
             booster_attached: input.booster_attached,

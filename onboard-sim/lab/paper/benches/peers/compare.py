@@ -7,7 +7,6 @@ import subprocess
 import sys
 
 import floor
-import free_landing
 import landing
 import measure
 import quadratic
@@ -19,7 +18,7 @@ import worker
 from ours import Ours
 
 
-# Who gets the landing in space and the one with a free final time, too.
+# Who gets the landing in space, too.
 IN_SPACE = ("fatrop", "ipopt")
 
 # Who gets one step's quadratic problem alone.
@@ -98,8 +97,6 @@ def main():
     scattered.run(records)
     in_space = [worker.start("space_interior", peer, words.functions)[1][0] for peer in words.peers if peer in IN_SPACE]
     space_measure.run(own[0], in_space)
-    free = [worker.start("free_landing", peer, words.functions)[1][0] for peer in words.peers if peer in IN_SPACE]
-    free_landing.run([own[0], *free])
     limit(own[1])
 
 

@@ -85,11 +85,6 @@ class Ours:
         status, ns, iterations, _cost, _stationarity, _feasibility, _miss, *inputs = words[numbers.size :]
         return numbers, (status == "converged", int(ns), int(iterations), float(swept), np.array(inputs, dtype=float))
 
-    def free(self, warm, motor, start):
-        """A landing with a free final time, cold or from the last cold one's: as `free_landing` has it."""
-        lands, ns, cost, end_s, *inputs = self._ask("free", "warm" if warm else "cold", *map(float, [*motor, *start]))
-        return lands == "true", int(ns), float(cost), float(end_s), np.array(inputs, dtype=float)
-
     def layers(self, start):
         """Derivatives, Newton step, whole solve of one iteration, ns."""
         return [float(word) for word in self._ask("sweep", *map(float, start))]

@@ -1,6 +1,6 @@
 """A landing in space as a CasADi NLP: gimbal in two directions, fins, a box at the end, a given final time.
 
-The equations are those of `onboard-sim/nmpc/src/space`, the numbers those of `onboard-sim/flight/examples/peer/space.rs`. Variables
+The equations are those of `onboard-sim/nmpc`, the numbers those of `onboard-sim/lab/paper/examples/peer/space.rs`. Variables
 are ordered by stage, (u_k, x_{k+1}); parameters are the start and the thrust over mass of each interval. All conditions
 are bounds of states, and hard.
 """

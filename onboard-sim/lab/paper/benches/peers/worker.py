@@ -9,7 +9,7 @@ import multiprocessing
 import os
 import traceback
 
-CALLED = ("cold", "adopt", "hold", "warm", "step", "space_cold", "space_adopt", "space_warm", "quadratic", "free")
+CALLED = ("cold", "adopt", "hold", "warm", "step", "space_cold", "space_adopt", "space_warm", "quadratic")
 
 
 def _serve(pipe, module, arguments):

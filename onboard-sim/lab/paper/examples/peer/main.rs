@@ -13,7 +13,6 @@
 //! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at its beginning
 //! space hold               make that solution the plan in space
 //! space warm SAMPLES STATE solve what is left of it
-//! free cold|warm RATIO UNTIL STATE   land with a free final time (`free`): RATIO of thrust to weight, 1 after UNTIL s
 //! quadratic STATE          the problem of one Gauss-Newton step (`quadratic`) at the plan
 //! sweep STATE              time the layers of one iteration at the cold solution
 //! peak                     time the arithmetic of this machine
@@ -23,12 +22,11 @@
 //! Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad. The answer
 //! to `sweep` is the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one
 //! iteration. The answer to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
-//! solve; that to `free` is whether it lands, nanoseconds, cost, final time and the inputs; that to `peak` is Gflop/s and
-//! the latencies of addition, multiplication, division and root in ns.
+//! solve; that to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns. What is proved
+//! not landable is not solved.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
-mod free;
 mod one_guess;
 mod peak;
 mod quadratic;
@@ -42,12 +40,12 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
-use free::{Falling, Free};
-use nmpc::dynamics::PlanarState;
-use nmpc::{Problem, Solution, SolverLimits, WarmStart, Workspace, paper, solve, solve_into};
 use one_guess::OneGuess;
+use paper::plane::dynamics::PlanarState;
+use paper::plane::{Problem, Solution, Workspace, best_touchdown_speed_m_s, solve};
+use paper::problem::{self, HORIZON, TOUCHDOWN_SPEED_MAX_M_S};
 use space::Space;
-use stages::{Model, Status};
+use stages::{Model, Outcome, Start};
 
 /// Number of runs that are averaged, and of repeats, when the layers of an iteration are timed.
 const RUNS: u32 = 50;
@@ -65,25 +63,19 @@ fn main() -> Result<()> {
 }
 
 struct Peer {
-    solver: SolverLimits,
+    penalty: f64,
     workspace: Workspace,
-    last: Solution,
-    plan: Solution,
+    /// The outcome of the workspace's last solve.
+    last: Option<Outcome>,
+    /// The solution from which warm solves start.
+    plan: Option<Solution>,
     space: Space,
-    free: Free,
 }
 
 impl Peer {
     fn new() -> Self {
-        let solver = paper::problem(paper::start(), 0).solver;
-        Self {
-            solver,
-            space: Space::new(solver),
-            workspace: Workspace::default(),
-            last: Solution::default(),
-            plan: Solution::default(),
-            free: Free::default(),
-        }
+        let penalty = problem::problem(problem::start(), HORIZON).solver.terminal_penalty;
+        Self { penalty, workspace: Workspace::default(), last: None, plan: None, space: Space::new(penalty) }
     }
 
     fn answer(&mut self, line: &str) -> Result<String> {
@@ -91,49 +83,52 @@ impl Peer {
         match words.next() {
             Some("penalty") => {
                 let penalty = number(words.next(), "penalty")?;
-                self.solver.terminal_penalty = penalty;
+                self.penalty = penalty;
                 self.space.set_penalty(penalty);
                 Ok("penalised".to_owned())
             }
             Some("cold") => {
                 let which = words.next().context("which guess is missing")?;
-                let problem = self.problem(state(words)?, paper::HORIZON);
+                let problem = self.problem(state(words)?, HORIZON);
                 match which {
-                    "both" => self.timed(&problem, None),
+                    "both" if best_touchdown_speed_m_s(&problem) > TOUCHDOWN_SPEED_MAX_M_S => {
+                        Ok("not-landable 0 0 0 0 0 inf".to_owned())
+                    }
+                    "both" => {
+                        let (outcome, answer) = timed(&problem, &mut self.workspace, None)?;
+                        self.last = Some(outcome);
+                        Ok(answer)
+                    }
                     "0" | "1" => {
                         let index = usize::from(which == "1");
-                        timed(&OneGuess { problem: &problem, index }, &mut stages::Workspace::default())
+                        let guess = OneGuess { problem: &problem, index };
+                        Ok(timed(&guess, &mut stages::Workspace::default(), None)?.1)
                     }
                     _ => bail!("guess '{which}': both, 0 or 1"),
                 }
             }
             Some("hold") => {
-                self.plan = self.last.clone();
+                let outcome = self.last.context("nothing was solved")?;
+                self.plan = Some(Solution::of(&self.workspace, outcome));
                 Ok("held".to_owned())
             }
             Some("warm") => {
                 let samples: usize = number(words.next(), "samples")?;
                 let cap = number(words.next(), "cap")?;
-                let planned = self.plan.inputs_rad.len();
+                let planned = self.plan()?.inputs_rad.len();
                 ensure!(samples < planned, "the plan has {planned} intervals; samples must be fewer");
                 let mut problem = self.problem(state(words)?, planned - samples);
                 problem.solver.max_iterations = cap;
-                // A public solver does not ask first whether a start can be landed.
-                problem.touchdown_speed_max_m_s = f64::MAX;
-                let warm = self.plan.shifted(samples);
-                self.timed(&problem, Some(&warm))
+                let start = self.plan.as_ref().map(|plan| plan.start(samples));
+                let (outcome, answer) = timed(&problem, &mut self.workspace, start.as_ref())?;
+                self.last = Some(outcome);
+                Ok(answer)
             }
-            Some("quadratic") => quadratic::answer(&self.problem(state(words)?, paper::HORIZON), &self.plan),
-            Some("free") => {
-                let warm = words.next() == Some("warm");
-                let [over_weight, until_s, state @ ..]: [f64; 8] = numbers(words)?;
-                let landing = self.problem(PlanarState::from_array(state), paper::HORIZON);
-                self.free.answer(warm, &Falling { over_weight, until_s }, landing)
-            }
+            Some("quadratic") => quadratic::answer(&self.problem(state(words)?, HORIZON), self.plan()?),
             Some("space") => self.in_space(words),
             Some("sweep") => Ok(self.layers(state(words)?)),
             Some("peak") => Ok(peak::measured().to_string()),
-            _ => bail!("must start with penalty, cold, hold, warm, quadratic, free, space, sweep or peak"),
+            _ => bail!("must start with penalty, cold, hold, warm, quadratic, space, sweep or peak"),
         }
     }
 
@@ -155,63 +150,51 @@ impl Peer {
         }
     }
 
-    fn problem(&self, start: PlanarState, intervals: usize) -> Problem {
-        Problem { solver: self.solver, ..paper::problem(start, intervals) }
+    fn plan(&self) -> Result<&Solution> {
+        self.plan.as_ref().context("no plan is held")
     }
 
-    fn timed(&mut self, problem: &Problem, warm: Option<&WarmStart>) -> Result<String> {
-        let Self { workspace, last, .. } = self;
-        solve_into(black_box(problem), warm, workspace, last);
-        let before = thread_ns();
-        solve_into(black_box(problem), warm, workspace, last);
-        let ns = thread_ns() - before;
-        let mut answer = format!(
-            "{} {ns} {} {:e} {:e} {:e} {:e}",
-            last.status.name().replace(' ', "-"),
-            last.iterations,
-            last.cost,
-            last.kkt_stationarity,
-            last.kkt_feasibility,
-            last.condition_miss
-        );
-        for input in &last.inputs_rad {
-            write!(answer, " {input:e}")?;
-        }
-        Ok(answer)
+    fn problem(&self, start: PlanarState, intervals: usize) -> Problem {
+        let mut problem = problem::problem(start, intervals);
+        problem.solver.terminal_penalty = self.penalty;
+        problem
     }
 
     fn layers(&mut self, start: PlanarState) -> String {
-        let mut problem = self.problem(start, paper::HORIZON);
+        let mut problem = self.problem(start, HORIZON);
         let solution = solve(&problem, None);
-        let warm = solution.shifted(0);
-        let workspace = &mut self.workspace;
-        workspace.load(&problem, &warm);
+        let (start, workspace) = (solution.start(0), &mut self.workspace);
+        workspace.load(&problem, &start);
         let evaluated = best_of(REPEATS, RUNS, || workspace.evaluate_intervals(black_box(&problem)));
         let swept = best_of(REPEATS, RUNS, || {
             black_box(workspace.sweep(black_box(&problem)));
         });
         problem.solver.max_iterations = 1;
         problem.initial.w_m_s += 0.02;
-        let last = &mut self.last;
-        let iterated =
-            best_of(REPEATS, RUNS, || solve_into(black_box(&problem), Some(&warm), workspace, last));
+        let iterated = best_of(REPEATS, RUNS, || {
+            workspace.solve(black_box(&problem), Some(&start));
+        });
         format!("{evaluated} {swept} {iterated}")
     }
 }
 
-/// Solves from one guess twice, each time with the buffers of the solve before.
-fn timed<M: Model<6, 1>>(model: &M, workspace: &mut stages::Workspace<M, 6, 1>) -> Result<String> {
-    workspace.solve(black_box(model), None);
+/// Solves twice, the second time with the buffers of the first; the second outcome, and the answer that tells it.
+fn timed<M: Model<NX, NU>, const NX: usize, const NU: usize>(
+    model: &M,
+    workspace: &mut stages::Workspace<M, NX, NU>,
+    start: Option<&Start<'_, NX, NU>>,
+) -> Result<(Outcome, String)> {
+    workspace.solve(black_box(model), start);
     let before = thread_ns();
-    let outcome = workspace.solve(black_box(model), None);
+    let outcome = workspace.solve(black_box(model), start);
     let ns = thread_ns() - before;
-    let status = if outcome.status == Status::Converged { "converged" } else { "failed" };
-    let stages::Outcome { iterations, cost, stationarity, feasibility, miss, .. } = outcome;
+    let Outcome { status, iterations, cost, stationarity, feasibility, miss, .. } = outcome;
+    let status = status.name().replace(' ', "-");
     let mut answer = format!("{status} {ns} {iterations} {cost:e} {stationarity:e} {feasibility:e} {miss:e}");
     for input in workspace.inputs().as_flattened() {
         write!(answer, " {input:e}")?;
     }
-    Ok(answer)
+    Ok((outcome, answer))
 }
 
 fn number<T: FromStr<Err: Error + Send + Sync + 'static>>(

@@ -1,6 +1,6 @@
 //! The landing problem with one of its cold guesses alone, as a public solver gets it.
 
-use nmpc::Problem;
+use paper::plane::Problem;
 use stages::{Condition, InputRange, Model, Settings};
 
 /// A problem whose cold solve starts from its guess `index` only.

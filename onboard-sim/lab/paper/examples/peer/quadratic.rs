@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::rc::Rc;
 
 use anyhow::{Result, ensure};
-use nmpc::{Problem, Solution};
+use paper::plane::{Problem, Solution};
 use stages::{Condition, InputRange, Interval as _, Intervals, Model, Settings, Workspace};
 
 use crate::clock::best_of;
@@ -34,7 +34,7 @@ struct Linear {
 /// The nanoseconds of a Newton step; of every interval the columns of `A`, that of `B`, and its end from zeros; and the
 /// answer of a solve.
 pub(crate) fn answer(problem: &Problem, plan: &Solution) -> Result<String> {
-    ensure!(plan.inputs_rad.len() == problem.intervals(), "the plan must be of the whole horizon");
+    ensure!(plan.inputs_rad.len() == problem.intervals, "the plan must be of the whole horizon");
     let mut posed = Quadratic { problem, plan, linear: Linear::default() };
     let (mut states, mut inputs) = (vec![[0.0; 6]; plan.states.len()], vec![[0.0]; plan.inputs_rad.len()]);
     posed.guess(0, &mut states, &mut inputs);
@@ -55,7 +55,7 @@ pub(crate) fn answer(problem: &Problem, plan: &Solution) -> Result<String> {
     }
     posed.linear.matrices = Rc::new(blocks);
     let mut workspace = Workspace::default();
-    let solved = timed(&posed, &mut workspace)?;
+    let (_, solved) = timed(&posed, &mut workspace, None)?;
     let swept = best_of(REPEATS, RUNS, || {
         black_box(workspace.sweep(black_box(&posed)));
     });
@@ -95,10 +95,10 @@ impl Model<6, 1> for Quadratic<'_> {
 
     fn guess(&self, _: usize, states: &mut [[f64; 6]], inputs_rad: &mut [[f64; 1]]) {
         for (state, planned) in states.iter_mut().zip(&self.plan.states) {
-            *state = planned.to_array();
+            *state = *planned;
         }
         states[0] = self.initial();
-        inputs_rad.copy_from_slice(self.plan.inputs_rad.as_chunks().0);
+        inputs_rad.copy_from_slice(&self.plan.inputs_rad);
     }
 
     fn evaluate(

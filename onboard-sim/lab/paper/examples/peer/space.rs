@@ -2,17 +2,13 @@
 //!
 //! The vehicle is the one of the solver's own tests: 1.2 kg, a thrust that falls to the weight in 3.8 s, a light wind.
 
-use std::fmt::Write as _;
-use std::hint::black_box;
-
 use anyhow::{Result, ensure};
-use nmpc::SolverLimits;
-use nmpc::space::{
-    Drag, End, INPUTS, Outcome, Push, STATES, SpaceProblem, SpaceWorkspace, Start, State, Status, Weights,
+use nmpc::{
+    Drag, End, INPUTS, Problem, Push, STATES, SolverLimits, Start, State, Weights, Workspace,
     last_multipliers,
 };
 
-use crate::clock::thread_ns;
+use crate::timed;
 
 const INTERVALS: usize = 38;
 const GRAVITY_M_S2: f64 = 9.806_65;
@@ -34,14 +30,14 @@ struct Plan {
 
 /// The solver in space, with the problem and the plan of its last solve.
 pub(crate) struct Space {
-    workspace: SpaceWorkspace,
-    problem: SpaceProblem,
+    workspace: Workspace,
+    problem: Problem,
     plan: Plan,
 }
 
 impl Space {
-    pub(crate) fn new(solver: SolverLimits) -> Self {
-        Self { workspace: SpaceWorkspace::default(), problem: landing(solver), plan: Plan::default() }
+    pub(crate) fn new(penalty: f64) -> Self {
+        Self { workspace: Workspace::default(), problem: landing(penalty), plan: Plan::default() }
     }
 
     pub(crate) fn set_penalty(&mut self, penalty: f64) {
@@ -53,10 +49,7 @@ impl Space {
         self.problem.initial = start;
         self.problem.pushes = pushes(thrust_over_weight);
         let Self { workspace, problem, .. } = self;
-        workspace.solve(black_box(problem), None);
-        let before = thread_ns();
-        let outcome = workspace.solve(black_box(problem), None);
-        answer(workspace, &outcome, thread_ns() - before)
+        Ok(timed(problem, workspace, None)?.1)
     }
 
     /// Makes the last solution the plan.
@@ -92,21 +85,8 @@ impl Space {
             limit_multipliers: &plan.limits[samples..],
             condition_multipliers: &conditions,
         };
-        workspace.solve(black_box(&rest), Some(&from));
-        let before = thread_ns();
-        let outcome = workspace.solve(black_box(&rest), Some(&from));
-        answer(workspace, &outcome, thread_ns() - before)
+        Ok(timed(&rest, workspace, Some(&from))?.1)
     }
-}
-
-fn answer(workspace: &SpaceWorkspace, outcome: &Outcome, ns: i64) -> Result<String> {
-    let Outcome { iterations, cost, stationarity, feasibility, miss, .. } = outcome;
-    let status = if outcome.status == Status::Converged { "converged" } else { "failed" };
-    let mut answer = format!("{status} {ns} {iterations} {cost:e} {stationarity:e} {feasibility:e} {miss:e}");
-    for input in workspace.inputs().as_flattened() {
-        write!(answer, " {input:e}")?;
-    }
-    Ok(answer)
 }
 
 /// Thrust falls with the square of time to the weight.
@@ -123,8 +103,8 @@ fn pushes(thrust_over_weight: f64) -> Vec<Push> {
 }
 
 /// Everything but start and thrust.
-fn landing(solver: SolverLimits) -> SpaceProblem {
-    SpaceProblem {
+fn landing(terminal_penalty: f64) -> Problem {
+    Problem {
         initial: [0.0; STATES],
         step_s: 0.1,
         pushes: Vec::new(),
@@ -145,6 +125,6 @@ fn landing(solver: SolverLimits) -> SpaceProblem {
         floor_rise_m_s: 0.2,
         guess_lean_rad: 0.5,
         guess_towards_rad: 0.6,
-        solver: SolverLimits { max_iterations: 200, ..solver },
+        solver: SolverLimits { max_iterations: 200, kkt_tolerance: 1e-6, terminal_penalty },
     }
 }

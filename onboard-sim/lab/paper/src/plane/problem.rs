@@ -1,10 +1,13 @@
-//! The landing problem, as data, and a lower bound of its touchdown speed.
+//! The landing problem, as data and as the solver reads it, and a lower bound of its touchdown speed.
 
-pub use stages::Condition;
-use stages::Settings;
+use core::array::from_fn;
+use core::f64::consts::{FRAC_PI_2, PI};
+
+use stages::{Condition, InputRange, Model, Settings};
 
 use crate::plane::LANDING_MISS;
-use crate::plane::dynamics::{PlanarModel, PlanarParams, PlanarState};
+use crate::plane::dynamics::{PlanarModel, PlanarState};
+use crate::plane::intervals::Blocks;
 
 /// The box in which a planned trajectory ends, in addition to height and distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,75 +35,39 @@ pub struct SolverLimits {
     pub kkt_tolerance: f64,
     /// Penalty of a metre of unmet end condition (exact penalty), cost units per metre.
     pub terminal_penalty: f64,
-    /// Amplitude of the bent initial guesses, rad of pitch.
-    pub guess_amplitude_rad: f64,
-    /// Half-waves of the bent initial guesses over the horizon.
-    pub guess_half_waves: u32,
-}
-
-/// Barrier of a cold solve's first iteration.
-const FIRST_BARRIER: f64 = 1e3;
-
-impl SolverLimits {
-    /// The solver's settings for a model with so many guesses.
-    pub(crate) fn settings(&self, guesses: usize, spare_guesses: usize) -> Settings {
-        Settings {
-            max_iterations: self.max_iterations,
-            tolerance: self.kkt_tolerance,
-            penalty: self.terminal_penalty,
-            first_barrier: FIRST_BARRIER,
-            guesses,
-            spare_guesses,
-            acceptable_miss: LANDING_MISS,
-        }
-    }
 }
 
 /// One landing problem: from a state now, through intervals of held gimbal angle, to the ground.
 ///
 /// Minimise the running cost (Eq. 28 of the landing paper) subject to the planar dynamics, the gimbal limit,
-/// `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other states there (the paper's Table 2)
-/// and `z >= altitude_min_m` at every node before it. The conditions on states are exact penalties, so the problem
-/// always has a solution.
-///
-/// Cost and end conditions are relative to a [`target`](Self::target), which is upright and at rest at the origin in
-/// the paper. In the frame that moves with the wind, the target is at rest on the ground: upright, with a `w` of minus
-/// the wind.
+/// `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other states there (the paper's Table 2).
+/// The conditions on states are exact penalties, so the problem always has a solution. Cost and conditions are relative
+/// to an upright vehicle at rest at the origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// The dynamics.
     pub model: PlanarModel,
     /// The state at the beginning of the first interval.
     pub initial: PlanarState,
+    /// Number of intervals, at least 1.
+    pub intervals: usize,
     /// Length of an interval, s.
     pub step_s: f64,
-    /// Thrust in each interval, N; its length is the number of intervals.
-    pub thrust_n: Vec<f64>,
-    /// Mass in each interval, kg, which scales thrust and air forces; empty for the model's own mass.
-    pub mass_kg: Vec<f64>,
-    /// Reference of running cost, of horizontal distance and height at the end, and of the box there in pitch, `w` and
-    /// pitch rate. The box in `u` is absolute.
-    pub target: PlanarState,
+    pub thrust_n: f64,
     /// Weights of the deviations from the target, in state order.
     pub state_weights: [f64; 6],
     /// Weight of the gimbal angle.
     pub input_weight: f64,
     /// Largest gimbal angle on either side, rad.
     pub gimbal_limit_rad: f64,
-    /// Largest horizontal distance from the target at the end, m.
+    /// Largest horizontal distance from the origin at the end, m.
     pub x_final_m: f64,
     /// Box in which the other states end.
     pub final_box: Option<FinalBox>,
-    /// Lowest altitude at the nodes before the end, m.
-    pub altitude_min_m: Option<f64>,
-    /// Rise of that floor per second before the end, m/s: a leaning vehicle needs room for its legs until it is
-    /// upright.
-    pub floor_rise_m_s: f64,
-    /// Fastest touchdown that counts as a landing, m/s.
-    pub touchdown_speed_max_m_s: f64,
-    /// Limits of the solver.
     pub solver: SolverLimits,
 }
+
+/// Where the vehicle shall be: upright and at rest at the origin.
+const TARGET: [f64; 6] = [0.0, 0.0, FRAC_PI_2, 0.0, 0.0, 0.0];
 
 const X: usize = 0;
 const Z: usize = 1;
@@ -110,121 +77,177 @@ const W: usize = 4;
 const Q: usize = 5;
 
 impl Problem {
-    /// The model in interval `k`, with the mass there.
-    pub fn model_at(&self, k: usize) -> PlanarModel {
-        self.mass_kg.get(k).map_or(self.model, |mass_kg| self.model.with_mass(*mass_kg))
-    }
-
-    /// Number of intervals.
-    pub fn intervals(&self) -> usize {
-        self.thrust_n.len()
-    }
-
-    /// The conditions, in the order of their multipliers: those at the end, height first, then the floor at each
-    /// node before it.
-    pub fn conditions(&self) -> Vec<Condition> {
-        let mut conditions = Vec::new();
-        self.append_all_conditions(&mut conditions);
-        conditions
-    }
-
-    /// Appends the conditions; allocates only if the vector never held as many.
-    pub(super) fn append_all_conditions(&self, conditions: &mut Vec<Condition>) {
-        self.append_end_conditions(conditions);
-        if let Some(altitude_min_m) = self.altitude_min_m {
-            let end = self.intervals();
-            conditions.extend((1..end).map(|node| Condition {
-                node,
-                component: Z,
-                sign: 1.0,
-                offset: altitude_min_m + self.floor_rise_m_s * (end - node) as f64 * self.step_s,
-                equality: false,
-            }));
-        }
-    }
-
-    /// Number of conditions at the end of the horizon.
-    pub fn end_conditions_len(&self) -> usize {
-        if self.intervals() == 0 {
-            return 0;
-        }
-        3 + self.final_box.map_or(0, |limits| 2 + 6 * limits.settled_nodes.min(self.intervals()))
-    }
-
-    /// Appends the conditions at the end of the horizon; none without intervals.
-    fn append_end_conditions(&self, conditions: &mut Vec<Condition>) {
-        let end = self.intervals();
-        if end == 0 {
-            return;
-        }
-        let at_least = |node, component, lowest| Condition {
-            node,
-            component,
-            sign: 1.0,
-            offset: lowest,
-            equality: false,
-        };
-        let at_most = |node, component, highest: f64| Condition {
-            node,
-            component,
-            sign: -1.0,
-            offset: -highest,
-            equality: false,
-        };
-        let between = |node, component, lowest, highest| {
-            [at_least(node, component, lowest), at_most(node, component, highest)]
-        };
-        let about = |node, component, centre: f64, reach: f64| {
-            between(node, component, centre - reach, centre + reach)
-        };
-        let target = &self.target;
-        conditions.push(Condition { equality: true, ..at_least(end, Z, target.z_m) });
-        conditions.extend(about(end, X, target.x_m, self.x_final_m));
-        if let Some(limits) = self.final_box {
-            let tilt = limits.pitch_error_deg.to_radians();
-            let rate = limits.pitch_rate_deg_s.to_radians();
-            conditions.extend(between(end, U, limits.u_min_m_s, limits.u_max_m_s));
-            // From the end backwards, so that a horizon that is too short for all nodes keeps the order of the others.
-            for node in (1..=end).rev().take(limits.settled_nodes) {
-                conditions.extend(about(node, THETA, target.theta_rad, tilt));
-                conditions.extend(about(node, W, target.w_m_s, limits.w_m_s));
-                conditions.extend(about(node, Q, target.q_rad_s, rate));
-            }
-        }
-    }
-
     /// Deviation of a state from the target.
     #[inline]
-    pub fn deviation(&self, state: &[f64; 6]) -> [f64; 6] {
-        let target = self.target.to_array();
-        core::array::from_fn(|i| state[i] - target[i])
+    pub fn deviation(state: &[f64; 6]) -> [f64; 6] {
+        from_fn(|i| state[i] - TARGET[i])
     }
 
     /// Running cost rate at a state and input.
     pub fn cost_rate(&self, state: &[f64; 6], gimbal_rad: f64) -> f64 {
-        let deviation = self.deviation(state);
+        let deviation = Self::deviation(state);
         let state_part: f64 =
             self.state_weights.iter().zip(&deviation).map(|(weight, value)| weight * value * value).sum();
         0.5 * (state_part + self.input_weight * gimbal_rad * gimbal_rad)
     }
 
-    /// Whether every number of the problem is finite, so that it can be solved at all.
-    pub(super) fn is_finite(&self) -> bool {
-        self.initial.is_finite()
-            && self.step_s.is_finite()
-            && self.step_s > 0.0
-            && self.target.is_finite()
-            && self.thrust_n.iter().all(|thrust| thrust.is_finite())
-            && (self.mass_kg.is_empty() || self.mass_kg.len() == self.intervals())
-            && self.mass_kg.iter().all(|mass| mass.is_finite() && *mass > 0.0)
-            && self.floor_rise_m_s.is_finite()
-            && self.gimbal_limit_rad.is_finite()
+    /// Weights of the deviations from the target at a node.
+    #[inline]
+    fn node_weights(&self) -> [f64; 6] {
+        self.state_weights.map(|weight| weight * self.step_s)
+    }
+}
+
+/// Barrier of a cold solve's first iteration.
+const FIRST_BARRIER: f64 = 1e3;
+
+/// Bends of the cold guesses' pitch, rad. Those after the first two are only tried if the first two do not land.
+const BENDS_RAD: [f64; 4] = [0.3, -0.3, 3.3 * 0.3, -3.3 * 0.3];
+const NARROW_BENDS: usize = 2;
+
+impl Model<6, 1> for Problem {
+    type Intervals = Blocks;
+    type StateCurvature = [f64; 6];
+    type InputCurvature = [f64; 1];
+
+    #[inline]
+    fn intervals(&self) -> usize {
+        self.intervals
+    }
+
+    #[inline]
+    fn initial(&self) -> [f64; 6] {
+        self.initial.to_array()
+    }
+
+    #[inline]
+    fn input_ranges(&self) -> [InputRange; 1] {
+        [InputRange { lower: -self.gimbal_limit_rad, upper: self.gimbal_limit_rad, unit: 1.0 }]
+    }
+
+    /// The end height first, then the end distance and the box.
+    fn append_conditions(&self, conditions: &mut Vec<Condition>) {
+        let end = self.intervals;
+        conditions.push(Condition { node: end, component: Z, sign: 1.0, offset: 0.0, equality: true });
+        let mut between = |node, component, lowest: f64, highest: f64| {
+            let at_least = Condition { node, component, sign: 1.0, offset: lowest, equality: false };
+            conditions.extend([at_least, Condition { sign: -1.0, offset: -highest, ..at_least }]);
+        };
+        between(end, X, -self.x_final_m, self.x_final_m);
+        if let Some(limits) = self.final_box {
+            let tilt = limits.pitch_error_deg.to_radians();
+            let rate = limits.pitch_rate_deg_s.to_radians();
+            between(end, U, limits.u_min_m_s, limits.u_max_m_s);
+            // From the end backwards, so that a horizon that is too short for all nodes keeps the order of the others.
+            for node in (1..=end).rev().take(limits.settled_nodes) {
+                between(node, THETA, FRAC_PI_2 - tilt, FRAC_PI_2 + tilt);
+                between(node, W, -limits.w_m_s, limits.w_m_s);
+                between(node, Q, -rate, rate);
+            }
+        }
+    }
+
+    #[inline]
+    fn settings(&self) -> Settings {
+        Settings {
+            max_iterations: self.solver.max_iterations,
+            tolerance: self.solver.kkt_tolerance,
+            penalty: self.solver.terminal_penalty,
+            first_barrier: FIRST_BARRIER,
+            guesses: NARROW_BENDS,
+            spare_guesses: BENDS_RAD.len() - NARROW_BENDS,
+            acceptable_miss: LANDING_MISS,
+        }
+    }
+
+    /// States on the straight line from the start to the target, the pitch bent by one full wave. The vehicle tilts one
+    /// way and then the other, which wastes surplus thrust and ends upright. The path need not be flyable. Inputs are
+    /// zero.
+    fn guess(&self, index: usize, states: &mut [[f64; 6]], inputs_rad: &mut [[f64; 1]]) {
+        let from = self.initial.to_array();
+        for (k, state) in states.iter_mut().enumerate() {
+            let share = k as f64 / self.intervals as f64;
+            *state = from_fn(|i| from[i] + share * (TARGET[i] - from[i]));
+            if k > 0 {
+                state[THETA] += BENDS_RAD[index] * libm::sin(2.0 * PI * share);
+            }
+        }
+        inputs_rad.fill([0.0]);
+    }
+
+    fn evaluate(
+        &self,
+        states: &[[f64; 6]],
+        inputs_rad: &[[f64; 1]],
+        costates: &[[f64; 6]],
+        derivatives: bool,
+        blocks: &mut Blocks,
+    ) {
+        if derivatives {
+            blocks.evaluate::<true>(self, states, inputs_rad, costates);
+        } else {
+            blocks.evaluate::<false>(self, states, inputs_rad, costates);
+        }
+    }
+
+    fn next(&self, _: usize, state: &[f64; 6], [gimbal_rad]: &[f64; 1]) -> [f64; 6] {
+        let state = PlanarState::from_array(*state);
+        self.model.rk4_step(&state, *gimbal_rad, self.thrust_n, self.step_s).to_array()
+    }
+
+    /// Running cost (Eq. 28 of the landing paper).
+    fn cost(&self, states: &[[f64; 6]], inputs_rad: &[[f64; 1]]) -> f64 {
+        let mut squares = [0.0; 6];
+        for state in &states[1..] {
+            let deviation = Self::deviation(state);
+            for (sum, value) in squares.iter_mut().zip(&deviation) {
+                *sum += value * value;
+            }
+        }
+        let state_part: f64 = squares.iter().zip(&self.state_weights).map(|(sum, weight)| sum * weight).sum();
+        let input_part: f64 = inputs_rad.iter().map(|[input]| input * input).sum();
+        0.5 * self.step_s * (state_part + self.input_weight * input_part)
+    }
+
+    #[inline]
+    fn state_slope(&self, _: usize, state: &[f64; 6]) -> [f64; 6] {
+        let (weights, deviation) = (self.node_weights(), Self::deviation(state));
+        from_fn(|i| weights[i] * deviation[i])
+    }
+
+    #[inline]
+    fn state_curvature(&self, _: usize, _: &[f64; 6]) -> [f64; 6] {
+        self.node_weights()
+    }
+
+    #[inline]
+    fn input_slope(&self, _: usize, [input_rad]: &[f64; 1]) -> [f64; 1] {
+        [self.input_weight * self.step_s * input_rad]
+    }
+
+    #[inline]
+    fn input_curvature(&self, _: usize, _: &[f64; 1]) -> [f64; 1] {
+        [self.input_weight * self.step_s]
+    }
+
+    fn slope_along(&self, states: &[[f64; 6]], changes: &[[f64; 6]]) -> f64 {
+        let mut along = [0.0; 6];
+        for (state, change) in states.iter().zip(changes) {
+            let deviation = Self::deviation(state);
+            for i in 0..6 {
+                along[i] += deviation[i] * change[i];
+            }
+        }
+        along
+            .iter()
+            .zip(&self.state_weights)
+            .fold(0.0, |slope, (sum, weight)| slope + self.step_s * weight * sum)
     }
 }
 
 // A lower bound of the touchdown speed with any controller.
 
-/// Sub-steps of the interval that contains the instant of contact.
+/// Steps in an interval.
 const SUB_STEPS: usize = 20;
 
 /// The slowest vertical touchdown that any gimbal commands can reach from the problem's start, m/s; 0 if the vehicle
@@ -235,55 +258,17 @@ const SUB_STEPS: usize = 20;
 /// touches down slower. The bound neglects the drag of sideways flight, which is below one thousandth of gravity at the
 /// landing paper's speeds, and the time to turn upright.
 pub fn best_touchdown_speed_m_s(problem: &Problem) -> f64 {
-    let (_, vertical_m_s) = problem.initial.ground_velocity_m_s();
-    let mut state = Upright { z_m: problem.initial.z_m, sink_m_s: -vertical_m_s };
-    let mut slowest_m_s = state.sink_m_s;
-    let sub_step_s = problem.step_s / SUB_STEPS as f64;
-    for (k, thrust_n) in problem.thrust_n.iter().enumerate() {
-        let params = problem.model_at(k).params;
-        if state.z_m <= 0.0 || slowest_m_s <= 0.0 {
-            return slowest_m_s.max(0.0);
+    let Problem { model, initial, thrust_n, .. } = problem;
+    let (_, vertical_m_s) = initial.ground_velocity_m_s();
+    let mut upright =
+        PlanarState { z_m: initial.z_m, theta_rad: FRAC_PI_2, u_m_s: vertical_m_s, ..PlanarState::default() };
+    let mut slowest_m_s = -vertical_m_s;
+    for _ in 0..problem.intervals * SUB_STEPS {
+        if upright.z_m <= 0.0 || slowest_m_s <= 0.0 {
+            break;
         }
-        let after = state.after(&params, *thrust_n, problem.step_s);
-        if after.z_m > 0.0 {
-            state = after;
-        } else {
-            for _ in 0..SUB_STEPS {
-                slowest_m_s = slowest_m_s.min(state.sink_m_s);
-                if state.z_m <= 0.0 || slowest_m_s <= 0.0 {
-                    return slowest_m_s.max(0.0);
-                }
-                state = state.after(&params, *thrust_n, sub_step_s);
-            }
-        }
-        slowest_m_s = slowest_m_s.min(state.sink_m_s);
+        upright = model.rk4_step(&upright, 0.0, *thrust_n, problem.step_s / SUB_STEPS as f64);
+        slowest_m_s = slowest_m_s.min(-upright.u_m_s);
     }
     slowest_m_s.max(0.0)
-}
-
-/// Height and rate of descent of an upright vehicle.
-#[derive(Clone, Copy)]
-struct Upright {
-    z_m: f64,
-    sink_m_s: f64,
-}
-
-impl Upright {
-    /// One step of the classical fourth-order Runge-Kutta method; the planar equations at `theta = pi/2`.
-    fn after(self, params: &PlanarParams, thrust_n: f64, step_s: f64) -> Self {
-        let gained = params.gravity_m_s2 - thrust_n / params.mass_kg;
-        let rate = |sink_m_s: f64| gained - params.drag_per_m * sink_m_s * sink_m_s.abs();
-        let s1 = self.sink_m_s;
-        let a1 = rate(s1);
-        let s2 = s1 + 0.5 * step_s * a1;
-        let a2 = rate(s2);
-        let s3 = s1 + 0.5 * step_s * a2;
-        let a3 = rate(s3);
-        let s4 = s1 + step_s * a3;
-        let a4 = rate(s4);
-        Self {
-            z_m: self.z_m - step_s / 6.0 * (s1 + 2.0 * (s2 + s3) + s4),
-            sink_m_s: s1 + step_s / 6.0 * (a1 + 2.0 * (a2 + a3) + a4),
-        }
-    }
 }

@@ -2,8 +2,8 @@
 //! really happens.
 
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
-use paper::problem::{HORIZON, PRINTED_THRUST_N, model, problem, start};
-use paper::plane::{LANDING_MISS, Problem, Solution, SolveStatus};
+use paper::plane::{LANDING_MISS, Problem, Solution, best_touchdown_speed_m_s, solve};
+use paper::problem::{HORIZON, PRINTED_THRUST_N, TOUCHDOWN_SPEED_MAX_M_S, model, problem, start};
 
 use super::{Finish, Sample};
 
@@ -23,31 +23,30 @@ pub(super) fn closed_loop(problem: &Problem) -> Finish {
 
 /// [`closed_loop`] of a vehicle that is kicked, and whose controller is deceived about its state.
 fn disturbed(problem: &Problem, kick: Disturbance, deceive: Disturbance) -> Finish {
-    let Problem { model, step_s, .. } = *problem;
+    let Problem { model, step_s, thrust_n, intervals, .. } = *problem;
     let mut state = problem.initial;
     let mut gimbal_rad = 0.0;
     let (mut plans, mut plan) = (Vec::new(), None::<Solution>);
     let mut path = vec![Sample { time_s: 0.0, state, gimbal_rad }];
-    for (sample, thrust_n) in problem.thrust_n.iter().enumerate() {
+    for sample in 0..intervals {
         kick(sample, &mut state);
         let mut known = state;
         deceive(sample, &mut known);
         let rest = Problem {
-            initial: model.rk4_step(&known, gimbal_rad, *thrust_n, step_s),
-            thrust_n: problem.thrust_n[sample + 1..].to_vec(),
+            initial: model.rk4_step(&known, gimbal_rad, thrust_n, step_s),
+            intervals: intervals - sample - 1,
             ..problem.clone()
         };
         for _ in 0..(step_s / STEP_S).round() as u32 {
-            state = model.rk4_step(&state, gimbal_rad, *thrust_n, STEP_S);
+            state = model.rk4_step(&state, gimbal_rad, thrust_n, STEP_S);
         }
         path.push(Sample { time_s: sample as f64 * step_s + step_s, state, gimbal_rad });
         // At the last sample there is nothing left to plan.
-        if !rest.thrust_n.is_empty() {
-            let solution = paper::plane::solve(&rest, plan.map(|plan| plan.shifted(1)).as_ref());
-            let converged =
-                solution.status == SolveStatus::Converged && solution.condition_miss <= LANDING_MISS;
-            plans.push((solution.cost, converged));
-            gimbal_rad = solution.inputs_rad.first().copied().unwrap_or(0.0);
+        if rest.intervals > 0 {
+            let solution = solve(&rest, plan.as_ref().map(|plan| plan.start(1)).as_ref());
+            plans
+                .push((solution.outcome.cost, solution.converged() && solution.outcome.miss <= LANDING_MISS));
+            gimbal_rad = solution.inputs_rad[0][0];
             plan = Some(solution);
         }
     }
@@ -61,9 +60,9 @@ pub(super) fn contact(
     model: PlanarModel,
     start: PlanarState,
     thrust_n: f64,
-    inputs_rad: &[f64],
+    inputs_rad: &[[f64; 1]],
 ) -> Option<(f64, PlanarState)> {
-    let burn = inputs_rad.iter().map(|input_rad| (*input_rad, thrust_n));
+    let burn = inputs_rad.iter().map(|[input_rad]| (*input_rad, thrust_n));
     let samples = burn.chain(std::iter::repeat_n((0.0, 0.0), 50));
     let steps = samples.flat_map(|sample| std::iter::repeat_n(sample, 100)).enumerate();
     let mut state = start;
@@ -114,31 +113,29 @@ pub(crate) struct AsPrinted {
 /// Solves and flies the landing with the equations as printed.
 pub(crate) fn as_printed() -> AsPrinted {
     let of_kind = |kind| PlanarModel { kind, ..model() };
-    let in_truth = Problem { thrust_n: vec![PRINTED_THRUST_N; HORIZON], ..problem(start(), HORIZON) };
+    let in_truth = Problem { thrust_n: PRINTED_THRUST_N, ..problem(start(), HORIZON) };
     let mut believed = Problem { model: of_kind(ModelKind::AsPrinted), ..in_truth.clone() };
     believed.solver.max_iterations = MAX_ITERATIONS;
-    // The bound that proves "not landable" follows from physics, which the printed equations violate.
-    believed.touchdown_speed_max_m_s = f64::INFINITY;
-    let promise = paper::plane::solve(&believed, None);
-    let promised = promise.states.last().copied().unwrap_or(in_truth.initial);
+    let promise = solve(&believed, None);
+    let promised = promise.end();
     AsPrinted {
         thrust_n: PRINTED_THRUST_N,
-        best_touchdown_speed_m_s: paper::plane::best_touchdown_speed_m_s(&in_truth),
-        limit_m_s: in_truth.touchdown_speed_max_m_s,
+        best_touchdown_speed_m_s: best_touchdown_speed_m_s(&in_truth),
+        limit_m_s: TOUCHDOWN_SPEED_MAX_M_S,
         energy_error_j_kg: [ModelKind::AsPrinted, ModelKind::Consistent]
             .map(of_kind)
             .map(coasting_energy_error),
         promised,
         promised_vertical_m_s: believed.model.derivative(&promised.to_array(), 0.0, 0.0)[1],
-        promised_lowest_m: promise.states.iter().map(|state| state.z_m).fold(f64::INFINITY, f64::min),
-        promise_converged: promise.status == SolveStatus::Converged,
+        promised_lowest_m: promise.states.iter().map(|[_, z_m, ..]| *z_m).fold(f64::INFINITY, f64::min),
+        promise_converged: promise.converged(),
         happens: contact(model(), start(), PRINTED_THRUST_N, &promise.inputs_rad).map(|(_, state)| state),
     }
 }
 
 /// Change of specific energy over 1 s without thrust and drag, from 30 degrees of tilt.
 fn coasting_energy_error(mut model: PlanarModel) -> f64 {
-    model.params.drag_per_m = 0.0;
+    model.drag_per_m = 0.0;
     let tilted = PlanarState { theta_rad: 60f64.to_radians(), ..start() };
     let mut state = tilted;
     for _ in 0..1000 {
@@ -151,7 +148,7 @@ fn coasting_energy_error(mut model: PlanarModel) -> f64 {
 mod tests {
     use core::f64::consts::FRAC_PI_2;
 
-    use paper::problem::{HORIZON, PRINTED_THRUST_N, model, settled, start};
+    use paper::problem::settled;
 
     use super::super::cases::broken;
     use super::*;
@@ -161,9 +158,8 @@ mod tests {
     fn assert_lands(name: &str, problem: &Problem, flown: &Finish) {
         let above = flown.path.iter().take_while(|sample| sample.state.z_m > 0.0).count();
         let last = &flown.path[above - 1];
-        let gimbals_rad: Vec<f64> = flown.path[above..].iter().map(|sample| sample.gimbal_rad).collect();
-        let (later_s, contact) =
-            contact(problem.model, last.state, problem.thrust_n[0], &gimbals_rad).unwrap();
+        let gimbals_rad: Vec<_> = flown.path[above..].iter().map(|sample| [sample.gimbal_rad]).collect();
+        let (later_s, contact) = contact(problem.model, last.state, problem.thrust_n, &gimbals_rad).unwrap();
         assert_eq!(broken(&contact), [""; 0], "{name}");
         assert!(last.time_s + later_s >= 4.95, "{name}: contact {later_s} s after {last:?}, under thrust");
     }
@@ -204,7 +200,7 @@ mod tests {
     fn half_a_percent_of_thrust_known_to_the_controller_lands() {
         for scale in [0.995, 1.005] {
             let mut problem = settled(start(), HORIZON);
-            problem.thrust_n.iter_mut().for_each(|thrust_n| *thrust_n *= scale);
+            problem.thrust_n *= scale;
             assert_lands(&format!("thrust {scale}"), &problem, &closed_loop(&problem));
         }
     }
@@ -258,10 +254,10 @@ mod tests {
     #[test]
     fn val_free_fall_from_rest_hits_the_ground_at_the_textbook_speed() {
         let mut model = model();
-        model.params.drag_per_m = 0.0;
+        model.drag_per_m = 0.0;
         let at_rest = PlanarState { z_m: 5.0, u_m_s: 0.0, ..start() };
         let (time_s, contact) = contact(model, at_rest, 0.0, &[]).unwrap();
-        let gravity = model.params.gravity_m_s2;
+        let gravity = model.gravity_m_s2;
         assert!((contact.u_m_s + (2.0 * gravity * 5.0).sqrt()).abs() < 1e-9, "{contact:?}");
         assert!((time_s - (2.0 * 5.0 / gravity).sqrt()).abs() < 1e-9, "{time_s}");
         assert!(contact.z_m >= 0.0 && contact.z_m < 1e-9);
@@ -270,7 +266,7 @@ mod tests {
     /// 30 N on 3 kg, upright all the way: on the ground at 3.2 s at -4.3 m/s (hand integration of the paper's case).
     #[test]
     fn val_hand_integration_thirty_newton_cannot_stop_the_vehicle() {
-        let (time_s, contact) = contact(model(), start(), PRINTED_THRUST_N, &[0.0; HORIZON]).unwrap();
+        let (time_s, contact) = contact(model(), start(), PRINTED_THRUST_N, &[[0.0]; HORIZON]).unwrap();
         assert!((time_s - 3.2).abs() < 0.05 && (contact.u_m_s + 4.3).abs() < 0.05, "{time_s} {contact:?}");
     }
 

@@ -19,7 +19,6 @@ mod text;
 
 use flight::vehicles::airframe::AirframeError;
 use flight::vehicles::motors::MotorError;
-use paper::plane::SolveStatus;
 use paper::plane::dynamics::PlanarState;
 use sim::world::whole::WorldError;
 
@@ -27,7 +26,7 @@ use campaign::figure::FigureError;
 pub(crate) use cases::{Case, Table};
 pub(crate) use flown::{AsPrinted, as_printed};
 pub(crate) use objective::Objective;
-pub(crate) use text::{to_json, write_stability, write_tables};
+pub(crate) use text::{write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,16 +111,14 @@ pub(crate) enum PaperError {
 fn experiment(case: Case) -> Row {
     let problem = case.problem();
     let solution = paper::plane::solve(&problem, None);
-    let inputs_rad = core::iter::once(0.0).chain(solution.inputs_rad.iter().copied());
-    let path = solution.states.iter().zip(inputs_rad).enumerate().map(|(node, (state, gimbal_rad))| Sample {
-        time_s: node as f64 * solution.step_s,
-        state: *state,
-        gimbal_rad,
+    let path = (0..solution.states.len()).map(|node| Sample {
+        time_s: node as f64 * problem.step_s,
+        state: solution.state(node),
+        gimbal_rad: if node == 0 { 0.0 } else { solution.inputs_rad[node - 1][0] },
     });
-    let converged = solution.status == SolveStatus::Converged;
     Row {
         paper_landed: case.paper.map(|row| cases::broken(&row.state()).is_empty()),
-        open_loop: Finish::judged(path.collect(), solution.cost, converged),
+        open_loop: Finish::judged(path.collect(), solution.outcome.cost, solution.converged()),
         closed_loop: flown::closed_loop(&problem),
         case,
     }

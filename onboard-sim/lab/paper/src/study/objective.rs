@@ -86,7 +86,7 @@ impl Landing<'_> {
         let nodes = self.states.iter().skip(1);
         nodes
             .map(|state| {
-                let deviation = self.problem.deviation(state);
+                let deviation = Problem::deviation(state);
                 let weights = self.problem.state_weights;
                 (0..6).map(|i| 0.5 * weights[i] * take(i, deviation[i]) * take(i, deviation[i])).sum::<f64>()
             })
@@ -95,7 +95,7 @@ impl Landing<'_> {
 
     fn scaled_sum(&self) -> [f64; 2] {
         let largest = |i: usize| {
-            let values = self.states.iter().map(|state| self.problem.deviation(state)[i].abs());
+            let values = self.states.iter().map(|state| Problem::deviation(state)[i].abs());
             values.fold(f64::MIN_POSITIVE, f64::max)
         };
         let scale: [f64; 6] = core::array::from_fn(largest);
@@ -141,7 +141,7 @@ impl Objective {
         let anew = SOLVED_ANEW.map(|(name, factor)| {
             let optimum = |problem: &Problem| {
                 let weight = factor * problem.input_weight;
-                paper::plane::solve(&Problem { input_weight: weight, ..problem.clone() }, None).cost
+                paper::plane::solve(&Problem { input_weight: weight, ..problem.clone() }, None).outcome.cost
             };
             Definition { name, values: problems.iter().map(optimum).collect() }
         });

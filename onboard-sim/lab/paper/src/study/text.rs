@@ -1,9 +1,8 @@
-//! Prints the tables and the map of `paper --stability`, for people and as JSON.
+//! Prints the tables and the map of `paper --stability`, for people.
 
 use std::io::{self, Write};
 
 use paper::plane::dynamics::PlanarState;
-use serde_json::{Value, json};
 
 use super::fall::HEIGHT_M;
 use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
@@ -248,79 +247,4 @@ pub(crate) fn write_stability(
         1e3 * (stability.cg_station_m - heavy_tail.cg_station_m),
         heavy_tail.count(Fate::Settles)
     )
-}
-
-/// Everything as one JSON value; units in the names, angles in degrees as in the paper.
-pub(crate) fn to_json(experiments: &Experiments, printed: &AsPrinted) -> Value {
-    json!({
-        "rows": experiments.rows.iter().map(row_json).collect::<Vec<_>>(),
-        "objective": objective_json(&experiments.objective),
-        "as_printed": {
-            "thrust_n": printed.thrust_n,
-            "landable": printed.best_touchdown_speed_m_s <= printed.limit_m_s,
-            "best_touchdown_speed_m_s": printed.best_touchdown_speed_m_s,
-            "limit_m_s": printed.limit_m_s,
-            "coasting_energy_error_j_kg": {
-                "as_printed": printed.energy_error_j_kg[0],
-                "consistent": printed.energy_error_j_kg[1],
-            },
-            "promised": state_json(&printed.promised),
-            "promised_vertical_m_s": printed.promised_vertical_m_s,
-            "promised_lowest_m": printed.promised_lowest_m,
-            "promise_converged": printed.promise_converged,
-            "happens": printed.happens.as_ref().map(state_json),
-        },
-    })
-}
-
-fn objective_json(objective: &Objective) -> Value {
-    let ours = objective
-        .definitions
-        .iter()
-        .map(|definition| json!({ "definition": definition.name.trim_start(), "values": definition.values }));
-    json!({
-        "input_weights": objective.weights,
-        "paper": objective.paper,
-        "cost_rate_at_the_papers_final_states": objective.at_paper_finals,
-        "ours": ours.collect::<Vec<_>>(),
-    })
-}
-
-fn row_json(row: &Row) -> Value {
-    json!({
-        "table": row.case.table.title(),
-        "case": row.case.name(),
-        "start": {
-            "pitch_deg": row.case.pitch_deg,
-            "w_m_s": row.case.w_m_s,
-            "pitch_rate_deg_s": row.case.pitch_rate_deg_s,
-        },
-        "input_weight": row.case.input_weight,
-        "paper": row.case.paper.map(|paper| json!({
-            "state": state_json(&paper.state()),
-            "inside_table_2": row.paper_landed,
-        })),
-        "open_loop": finish_json(&row.open_loop),
-        "closed_loop": finish_json(&row.closed_loop),
-    })
-}
-
-fn finish_json(finish: &Finish) -> Value {
-    json!({
-        "state": state_json(&finish.state),
-        "cost": finish.cost,
-        "converged": finish.converged,
-        "inside_table_2": finish.landed(),
-    })
-}
-
-fn state_json(state: &PlanarState) -> Value {
-    json!({
-        "x_m": state.x_m,
-        "z_m": state.z_m,
-        "pitch_deg": state.theta_rad.to_degrees(),
-        "u_m_s": state.u_m_s,
-        "w_m_s": state.w_m_s,
-        "pitch_rate_deg_s": state.q_rad_s.to_degrees(),
-    })
 }

@@ -1,5 +1,8 @@
 //! Many starts and many disturbances.
 
+use paper::plane::Outcome;
+use paper::problem::THRUST_N;
+
 use super::*;
 
 /// Pitch 60 to 120 deg, w within 3 m/s, q within 60 deg/s, height and speed within 20 %.
@@ -19,14 +22,17 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
             q_rad_s: between(-60.0, 60.0).to_radians(),
             ..nominal
         };
-        let solution = solve(&settled(start, HORIZON), None);
-        match solution.status {
-            SolveStatus::NotLandable => refused += 1,
-            SolveStatus::Converged => {
-                converged += 1;
-                landed += i32::from(solution.condition_miss < 1e-3);
-            }
-            status => println!("{status:?} after {} from {start:?}", solution.iterations),
+        let problem = settled(start, HORIZON);
+        if best_touchdown_speed_m_s(&problem) > TOUCHDOWN_SPEED_MAX_M_S {
+            refused += 1;
+            continue;
+        }
+        let Outcome { status, iterations, miss, .. } = solve(&problem, None).outcome;
+        if status == Status::Converged {
+            converged += 1;
+            landed += i32::from(miss < 1e-3);
+        } else {
+            println!("{status:?} after {iterations} from {start:?}");
         }
     }
     println!("{converged} of {STARTS} converged, {landed} of them to a landing; {refused} cannot be landed");
@@ -60,8 +66,7 @@ fn cold_starts_beside_a_saddle_converge() {
         ],
     ] {
         let start = PlanarState { z_m, theta_rad, u_m_s, w_m_s, q_rad_s, ..nominal_start() };
-        let solution = solve(&settled(start, HORIZON), None);
-        assert_eq!(solution.status, SolveStatus::Converged, "{start:?}");
+        assert!(solve(&settled(start, HORIZON), None).converged(), "{start:?}");
     }
 }
 
@@ -84,19 +89,17 @@ fn no_solve_fails_in_the_disturbed_closed_loop() {
     for pose in [problem as Pose, settled] {
         let mut draw = draws(1);
         let mut normal = || (0..12).map(|_| draw()).sum::<f64>() - 6.0;
-        let (mut workspace, mut solution, mut solves) = (Workspace::default(), Solution::default(), 0);
+        let mut solves = 0;
         for (name, start, _) in BEST_COSTS {
             let mut state = start();
-            workspace.solve(&pose(state, HORIZON), None, &mut solution);
+            let mut solution = solve(&pose(state, HORIZON), None);
             for k in 1..HORIZON {
-                state = model.rk4_step(&state, solution.inputs_rad[0], THRUST_N, 0.1);
+                state = model.rk4_step(&state, solution.inputs_rad[0][0], THRUST_N, 0.1);
                 state.u_m_s += 0.002 * normal();
                 state.w_m_s += 0.002 * normal();
                 state.q_rad_s += 0.05_f64.to_radians() * normal();
-                let problem = pose(state, HORIZON - k);
-                let warm = solution.shifted(1);
-                workspace.solve(&problem, Some(&warm), &mut solution);
-                assert_eq!(solution.status, SolveStatus::Converged, "{name} after {k}");
+                solution = solve(&pose(state, HORIZON - k), Some(&solution.start(1)));
+                assert!(solution.converged(), "{name} after {k}");
                 solves += 1;
             }
         }

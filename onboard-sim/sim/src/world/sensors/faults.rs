@@ -60,7 +60,7 @@ struct Broken {
 
 impl Default for SensorFaults {
     fn default() -> Self {
-        Self { broken: Vec::new(), noise: Normal::new(0, 0) }
+        Self { broken: Vec::new(), noise: Normal::new(0, 0, 1.0) }
     }
 }
 

@@ -30,6 +30,9 @@ pub use self::switches::SwitchParams;
 use crate::world::whole::World;
 
 const MS_S: f64 = 1e-3;
+/// Errors of sensors for a flight whose state is known, as a multiple of real ones. They are not zero, because a sensor that repeats
+/// one value counts as broken.
+pub const NEARLY_EXACT: f64 = 1e-3;
 /// A hobby receiver loses its satellites under the acceleration of the ascent motor (its tracking loops follow 4 g) and
 /// finds them again this long after it, ms: a hot start takes 1 to 2 s.
 const REACQUIRED_MS: u32 = 1500;
@@ -148,15 +151,15 @@ impl Sensors {
         self.start_s -= time_s;
     }
 
-    /// Draws one flight's sensors; `start_s` is the flight computer's time at the start of the simulation.
+    /// Draws one flight's sensors. Their errors are this share of what the parameters say: 1, or [`NEARLY_EXACT`].
     ///
     /// # Errors
     /// A parameter is out of range.
-    pub fn new(params: &SensorParams, seed: u64, start_s: f64) -> Result<Self, SensorParamError> {
+    pub fn new(params: &SensorParams, seed: u64, share: f64) -> Result<Self, SensorParamError> {
         params.validate()?;
         let (imu, gnss) = (&params.imu, &params.gnss);
         let [mut imu_noise, mut barometer_noise, mut gnss_noise, lidar_noise] =
-            [0, 1, 2, 3].map(|stream| Normal::new(seed, stream));
+            [0, 1, 2, 3].map(|stream| Normal::new(seed, stream, share));
         let errors = SensorErrors {
             gyro_bias_rad_s: imu_noise.next3() * imu.gyro_bias_deg_s.to_radians(),
             accelerometer_bias_m_s2: imu_noise.next3() * (imu.accelerometer_bias_mg * 1e-3 * GRAVITY_M_S2),
@@ -174,7 +177,7 @@ impl Sensors {
         }
         Ok(Self {
             params: *params,
-            start_s,
+            start_s: 0.0,
             elapsed_ms: 0,
             imu_noise,
             barometer_noise,
@@ -188,7 +191,7 @@ impl Sensors {
             on_its_way: None,
             rate_sum_rad_s: Vector3::zeros(),
             force_sum_m_s2: Vector3::zeros(),
-            flaws: Flaws::draw(params, seed),
+            flaws: Flaws::draw(params, seed, share),
             contact_ms: None,
             boosted_ms: None,
         })

@@ -9,20 +9,21 @@ use rand_chacha::ChaCha12Rng;
 
 use super::SensorParams;
 
-/// Standard normal numbers by Box and Muller, on `libm` so that they are the same on every machine.
+/// Normal numbers by Box and Muller, on `libm` so that they are the same on every machine.
 #[derive(Debug, Clone)]
 pub(super) struct Normal {
     random: ChaCha12Rng,
     /// The second number of the pair.
     spare: Option<f64>,
+    sigma: f64,
 }
 
 impl Normal {
     /// The streams of a seed are independent, so a fault in one sensor does not change the noise of another.
-    pub(super) fn new(seed: u64, stream: u64) -> Self {
+    pub(super) fn new(seed: u64, stream: u64, sigma: f64) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         random.set_stream(stream);
-        Self { random, spare: None }
+        Self { random, spare: None, sigma }
     }
 
     pub(super) fn next(&mut self) -> f64 {
@@ -31,8 +32,8 @@ impl Normal {
         }
         let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
         let (sin, cos) = libm::sincos(core::f64::consts::TAU * self.unit());
-        self.spare = Some(radius * sin);
-        radius * cos
+        self.spare = Some(self.sigma * (radius * sin));
+        self.sigma * (radius * cos)
     }
 
     pub(super) fn next3(&mut self) -> Vector3<f64> {
@@ -121,9 +122,9 @@ pub(super) struct Flaws {
 }
 
 impl Flaws {
-    pub(super) fn draw(params: &SensorParams, seed: u64) -> Self {
-        let mut drawn = Normal::new(seed, DRAWN_STREAM);
-        let mut satellites = Normal::new(seed, SATELLITE_STREAM);
+    pub(super) fn draw(params: &SensorParams, seed: u64, share: f64) -> Self {
+        let mut drawn = Normal::new(seed, DRAWN_STREAM, share);
+        let mut satellites = Normal::new(seed, SATELLITE_STREAM, share);
         let (imu, barometer, gnss) = (&params.imu, &params.barometer, &params.gnss);
         let lidar = &params.lidar;
         let between = |[least, most]: [f64; 2], share: f64| least + (most - least) * share;
@@ -153,9 +154,9 @@ impl Flaws {
             velocity_wander: [(); 3].map(|()| {
                 Wander::new(gnss.velocity_wander_m_s, gnss.velocity_wander_correlation_s, &mut satellites)
             }),
-            vibration: Normal::new(seed, VIBRATION_STREAM),
-            gnss: Normal::new(seed, GNSS_STREAM),
-            lidar: Normal::new(seed, LIDAR_STREAM),
+            vibration: Normal::new(seed, VIBRATION_STREAM, share),
+            gnss: Normal::new(seed, GNSS_STREAM, share),
+            lidar: Normal::new(seed, LIDAR_STREAM, share),
             satellites,
         }
     }
@@ -179,7 +180,7 @@ const STREAM: u64 = 4;
 /// The true state with errors drawn from the stated uncertainty. The rotation rate has no error, because the gyro
 /// replaces it in the first frame.
 pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: u64) -> RigidState {
-    let mut normal = Normal::new(seed, STREAM);
+    let mut normal = Normal::new(seed, STREAM, 1.0);
     let position_m = Vector3::new(uncertainty.horizontal_m, uncertainty.horizontal_m, uncertainty.height_m);
     let turn_rad = Vector3::new(uncertainty.tilt_deg, uncertainty.tilt_deg, uncertainty.heading_deg)
         .map(f64::to_radians);
@@ -198,7 +199,7 @@ mod tests {
 
     #[test]
     fn normal_numbers_have_mean_zero_and_variance_one() {
-        let mut normal = Normal::new(3, 0);
+        let mut normal = Normal::new(3, 0, 1.0);
         let n = 40_000;
         let draws: Vec<f64> = (0..n).map(|_| normal.next()).collect();
         let mean = draws.iter().sum::<f64>() / f64::from(n);
@@ -210,7 +211,7 @@ mod tests {
 
     #[test]
     fn the_wander_is_stationary_and_its_correlation_decays_at_the_stated_rate() {
-        let mut normal = Normal::new(5, 1);
+        let mut normal = Normal::new(5, 1, 1.0);
         let (mut squares, mut products) = (0.0, 0.0);
         let n = 20_000;
         for _ in 0..n {

@@ -307,15 +307,6 @@ impl World {
             ..other
         })
     }
-
-    /// The same moment of the same flight with the vehicle at another position, attitude or motion; all else continues.
-    ///
-    /// # Errors
-    /// The state is not finite, or its attitude is not a rotation.
-    pub fn placed(&self, state: &RigidState) -> Result<Self, WorldError> {
-        check_state(state)?;
-        Ok(Self { state: *state, ..self.clone() })
-    }
 }
 
 #[cfg(test)]
@@ -357,25 +348,6 @@ mod tests {
             assert_eq!(format!("{:?}", same.state()), format!("{:?}", world.state()));
         }
         assert_eq!(same.time_s().to_bits(), world.time_s().to_bits());
-    }
-
-    #[test]
-    fn a_moved_vehicle_keeps_everything_but_its_state() {
-        let mut world = burning();
-        let mut same = world.placed(world.state()).unwrap();
-        let mut there = *world.state();
-        there.position_m.x += 3.0;
-        let mut moved = world.placed(&there).unwrap();
-        for _ in 0..300 {
-            world.step(&IGNITED);
-            same.step(&IGNITED);
-            moved.step(&IGNITED);
-        }
-        assert_eq!(format!("{:?}", same.state()), format!("{:?}", world.state()));
-        assert!((moved.state().position_m.x - world.state().position_m.x - 3.0).abs() < 1e-9);
-        assert!((moved.state().velocity_m_s - world.state().velocity_m_s).norm() < 1e-9);
-        there.velocity_m_s.y = f64::NAN;
-        assert!(matches!(world.placed(&there), Err(WorldError::State(_))));
     }
 
     #[test]

@@ -295,7 +295,7 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
         (Phase::PadArmed, &[Asked::Start, Asked::Hold], Phase::Powered),
     ];
     for (phase, asked, way_down) in ways {
-        let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(phase);
+        let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(phase);
         for asked in asked {
             assert_eq!(rocket.request(*asked).ending, Ending::Accepted);
         }

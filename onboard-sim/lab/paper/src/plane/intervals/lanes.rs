@@ -29,17 +29,6 @@ impl Lanes {
         Self(from_fn(|lane| sqrt(self.0[lane])))
     }
 
-    #[inline(always)]
-    pub(super) fn abs(self) -> Self {
-        Self(from_fn(|lane| self.0[lane].abs()))
-    }
-
-    /// 1 with the sign of `self`, that of zero too.
-    #[inline(always)]
-    pub(super) fn signum(self) -> Self {
-        Self(from_fn(|lane| 1.0_f64.copysign(self.0[lane])))
-    }
-
     /// `1 / self` where `self` exceeds `least`, else 0.
     #[inline(always)]
     pub(super) fn reciprocal_above(self, least: f64) -> Self {

@@ -39,11 +39,9 @@ impl Blocks {
         inputs_rad: &[[f64; 1]],
         costates: &[[f64; 6]],
     ) {
-        let constants = &Constants::of(&problem.model, problem.step_s);
+        let constants = &Constants::of(&problem.model, problem.thrust_n, problem.step_s);
         let count = inputs_rad.len();
-        let (thrust_n, mass_kg) = (&problem.thrust_n, &problem.mass_kg);
-        let across = constants.pushed_across();
-        let mut points = Points::rest(constants);
+        let mut points = Points::EMPTY;
         let arch = Arch::new();
         self.step_s = problem.step_s;
         for (index, (block, lines)) in self.evaluated.iter_mut().zip(&mut self.lines).enumerate() {
@@ -55,17 +53,12 @@ impl Blocks {
                     points.costate[i].0[lane] = costates[k + 1][i];
                 }
                 points.gimbal.0[lane] = inputs_rad[k][0];
-                points.thrust.0[lane] = thrust_n[k];
-                if let Some(mass_kg) = mass_kg.get(k) {
-                    points.inverse_mass.0[lane] = 1.0 / mass_kg;
-                    points.lightness.0[lane] = constants.mass_kg / mass_kg;
-                }
             }
             let points = &points;
-            match (constants.printed, across) {
-                (true, _) => Kernel::<DERIVATIVES, true, false> { constants, points, block }.run(arch),
-                (false, true) => Kernel::<DERIVATIVES, false, true> { constants, points, block }.run(arch),
-                (false, false) => Kernel::<DERIVATIVES, false, false> { constants, points, block }.run(arch),
+            if constants.printed {
+                arch.dispatch(Kernel::<DERIVATIVES, true> { constants, points, block });
+            } else {
+                arch.dispatch(Kernel::<DERIVATIVES, false> { constants, points, block });
             }
             if DERIVATIVES {
                 rows::write(block, lines);
@@ -106,28 +99,18 @@ impl stages::Intervals<6, 1> for Blocks {
 }
 
 /// One block, evaluated in the widest vectors that the machine has.
-struct Kernel<'a, const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> {
+struct Kernel<'a, const DERIVATIVES: bool, const PRINTED: bool> {
     constants: &'a Constants,
     points: &'a Points,
     block: &'a mut Block,
 }
 
-impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool> NullaryFnOnce
-    for Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
-{
+impl<const DERIVATIVES: bool, const PRINTED: bool> NullaryFnOnce for Kernel<'_, DERIVATIVES, PRINTED> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        evaluate::<DERIVATIVES, PRINTED, ACROSS>(self.constants, self.points, self.block);
-    }
-}
-
-impl<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>
-    Kernel<'_, DERIVATIVES, PRINTED, ACROSS>
-{
-    fn run(self, arch: Arch) {
-        arch.dispatch(self);
+        evaluate::<DERIVATIVES, PRINTED>(self.constants, self.points, self.block);
     }
 }
 
@@ -158,63 +141,37 @@ const fn lateral_sign(printed: bool) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Constants {
     step_s: f64,
-    mass_kg: f64,
-    arm_per_inertia: f64,
-    /// These three at the model's own mass.
+    /// Acceleration and pitch acceleration of the whole thrust, m/s^2 and rad/s^2.
+    thrust_m_s2: f64,
+    turning_rad_s2: f64,
     drag_per_m: f64,
-    lateral_drag_per_m: f64,
-    crossflow_per_m: f64,
     gravity_m_s2: f64,
     printed: bool,
 }
 
 impl Constants {
-    fn of(model: &PlanarModel, step_s: f64) -> Self {
-        let params = &model.params;
-        let printed = model.kind == ModelKind::AsPrinted;
+    fn of(model: &PlanarModel, thrust_n: f64, step_s: f64) -> Self {
         Self {
             step_s,
-            mass_kg: params.mass_kg,
-            arm_per_inertia: params.thrust_arm_m / params.pitch_inertia_kg_m2,
-            drag_per_m: params.drag_per_m,
-            lateral_drag_per_m: params.lateral_drag_per_m,
-            crossflow_per_m: params.crossflow_per_m,
-            gravity_m_s2: params.gravity_m_s2,
-            printed,
+            thrust_m_s2: thrust_n * (1.0 / model.mass_kg),
+            turning_rad_s2: thrust_n * (model.thrust_arm_m / model.pitch_inertia_kg_m2),
+            drag_per_m: model.drag_per_m,
+            gravity_m_s2: model.gravity_m_s2,
+            printed: model.kind == ModelKind::AsPrinted,
         }
-    }
-
-    /// Whether there is an air force across the body; without it the equations are shorter.
-    fn pushed_across(&self) -> bool {
-        !self.printed && (self.lateral_drag_per_m != 0.0 || self.crossflow_per_m != 0.0)
     }
 }
 
-/// The points of linearisation: state at the beginning of each interval, input, thrust, mass, and the costate of the
-/// state after it.
+/// The points of linearisation: state at the beginning of each interval, input, and the costate of the state after it.
 #[derive(Debug, Clone, Copy)]
 struct Points {
     state: [Lanes; 6],
     gimbal: Lanes,
-    thrust: Lanes,
-    inverse_mass: Lanes,
-    /// The model's own mass divided by the mass in the interval.
-    lightness: Lanes,
     costate: [Lanes; 6],
 }
 
 impl Points {
-    /// At rest, at the model's own mass.
-    fn rest(c: &Constants) -> Self {
-        Self {
-            state: [Lanes::ZERO; 6],
-            gimbal: Lanes::ZERO,
-            thrust: Lanes::ZERO,
-            inverse_mass: Lanes::splat(1.0 / c.mass_kg),
-            lightness: Lanes::splat(1.0),
-            costate: [Lanes::ZERO; 6],
-        }
-    }
+    const EMPTY: Self = Self { state: [Lanes::ZERO; 6], gimbal: Lanes::ZERO, costate: [Lanes::ZERO; 6] };
 }
 
 /// Intervals and their derivatives.
@@ -252,26 +209,17 @@ struct Held {
     /// Pitch acceleration, rad/s^2, and its derivative by the gimbal angle.
     turn_acc: Lanes,
     turn_acc_d: Lanes,
-    /// Air forces per mass and squared speed, 1/m.
-    drag: Lanes,
-    lateral_drag: Lanes,
-    crossflow: Lanes,
 }
 
 impl Held {
     #[inline(always)]
-    fn of(c: &Constants, points: &Points) -> Self {
-        let (sin, cos) = points.gimbal.sin_cos();
-        let acceleration = points.thrust * points.inverse_mass;
-        let torque = points.thrust * c.arm_per_inertia;
+    fn of(c: &Constants, gimbal: Lanes) -> Self {
+        let (sin, cos) = gimbal.sin_cos();
         Self {
-            push: acceleration * cos,
-            side: -(acceleration * sin),
-            turn_acc: -(torque * sin),
-            turn_acc_d: -(torque * cos),
-            drag: points.lightness * c.drag_per_m,
-            lateral_drag: points.lightness * c.lateral_drag_per_m,
-            crossflow: points.lightness * c.crossflow_per_m,
+            push: cos * c.thrust_m_s2,
+            side: -(sin * c.thrust_m_s2),
+            turn_acc: -(sin * c.turning_rad_s2),
+            turn_acc_d: -(cos * c.turning_rad_s2),
         }
     }
 }
@@ -291,9 +239,6 @@ struct Stage {
     /// Derivative of the drag's acceleration by u and w.
     drag_u: Lanes,
     drag_w: Lanes,
-    /// Derivative of the air's acceleration across the body by u and w.
-    across_u: Lanes,
-    across_w: Lanes,
     /// u and w over the speed.
     along: Lanes,
     across: Lanes,

@@ -4,7 +4,6 @@
 //! [`crate::plane::dynamics`]. The code uses these simplifications:
 //!
 //! * Nothing depends on `x` and `z`: they are integrals, and no direction of differentiation.
-//! * Mass and thrust are held over an interval, and forces in the air scale with `m_0 / m`.
 //! * `q'` depends on `delta` alone, so `q` and `theta` of every stage are known in closed form, and of the tangents
 //!   only those of `u` and `w` are propagated.
 //!
@@ -21,18 +20,18 @@ use super::{
 const REST_SPEED_M_S: f64 = 1e-9;
 
 /// Evaluates intervals. With `DERIVATIVES` it fills in tangent and curvature, too, otherwise only `after` and `pulled`.
-/// `PRINTED` and `ACROSS` select the equations: [`Constants::printed`], [`Constants::pushed_across`].
+/// `PRINTED` selects the equations: [`Constants::printed`].
 #[inline(always)]
 #[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
-pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROSS: bool>(
+pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool>(
     c: &Constants,
     points: &Points,
     block: &mut Block,
 ) {
     let h = c.step_s;
     let [x0, z0, th0, u0, w0, q0] = points.state;
-    let held = Held::of(c, points);
-    let Held { push, side, turn_acc, turn_acc_d, drag: drag_per_m, lateral_drag, crossflow } = held;
+    let held = Held::of(c, points.gimbal);
+    let Held { push, side, turn_acc, turn_acc_d } = held;
 
     // The four stages.
     let mut stages = [Stage {
@@ -47,8 +46,6 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROS
         w_dot: Lanes::ZERO,
         drag_u: Lanes::ZERO,
         drag_w: Lanes::ZERO,
-        across_u: Lanes::ZERO,
-        across_w: Lanes::ZERO,
         along: Lanes::ZERO,
         across: Lanes::ZERO,
     }; 4];
@@ -72,56 +69,31 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROS
             let (sin, cos) = theta.sin_cos();
             let squared = u * u + w * w;
             let (drag, drag_u, drag_w, along, across);
-            let (mut across_acc, mut across_u, mut across_w) = (Lanes::ZERO, Lanes::ZERO, Lanes::ZERO);
             if PRINTED {
-                drag = squared * drag_per_m;
-                drag_u = u * (drag_per_m * 2.0);
-                drag_w = w * (drag_per_m * 2.0);
+                drag = squared * c.drag_per_m;
+                drag_u = u * (c.drag_per_m * 2.0);
+                drag_w = w * (c.drag_per_m * 2.0);
                 (along, across) = (Lanes::ZERO, Lanes::ZERO);
             } else {
                 let speed = squared.sqrt();
                 let inverse = speed.reciprocal_above(REST_SPEED_M_S);
                 along = u * inverse;
                 across = w * inverse;
-                drag = speed * u * -drag_per_m;
-                drag_u = (speed + u * along) * -drag_per_m;
-                drag_w = u * across * -drag_per_m;
-                if ACROSS {
-                    let aside = w.abs();
-                    across_acc = -((lateral_drag * speed + crossflow * aside) * w);
-                    across_u = -(lateral_drag * (u * across));
-                    across_w = -(lateral_drag * (speed + w * across) + crossflow * aside * 2.0);
-                }
+                drag = speed * u * -c.drag_per_m;
+                drag_u = (speed + u * along) * -c.drag_per_m;
+                drag_w = u * across * -c.drag_per_m;
             }
             let lateral = w * lateral_sign(PRINTED);
             let x_dot = u * cos + lateral * sin;
             let z_dot = u * sin - lateral * cos;
             let u_dot = push + drag - sin * c.gravity_m_s2 - q * w;
-            let mut w_dot = side + cos * c.gravity_m_s2 + q * u;
-            if ACROSS {
-                w_dot += across_acc;
-            }
+            let w_dot = side + cos * c.gravity_m_s2 + q * u;
             x_sum += x_dot * WEIGHTS[I];
             z_sum += z_dot * WEIGHTS[I];
             u_sum += u_dot * WEIGHTS[I];
             w_sum += w_dot * WEIGHTS[I];
-            stages[I] = Stage {
-                sin,
-                cos,
-                u,
-                w,
-                q,
-                x_dot,
-                z_dot,
-                u_dot,
-                w_dot,
-                drag_u,
-                drag_w,
-                across_u,
-                across_w,
-                along,
-                across,
-            };
+            stages[I] =
+                Stage { sin, cos, u, w, q, x_dot, z_dot, u_dot, w_dot, drag_u, drag_w, along, across };
         }};
     }
     stage!(0);
@@ -164,10 +136,6 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROS
                 sideways + ku * (stage.drag_w - stage.q),
                 kt - ku * stage.w + kw * stage.u,
             ];
-            if ACROSS {
-                later[U] += kw * stage.across_u;
-                later[W] += kw * stage.across_w;
-            }
             pulled[TH] += later[TH];
             pulled[U] += later[U];
             pulled[W] += later[W];
@@ -182,7 +150,7 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROS
     back!(0);
     block.pulled = pulled;
     if DERIVATIVES {
-        differentiate::<PRINTED, ACROSS>(c, &held, &stages, &slope_adjoints, block);
+        differentiate::<PRINTED>(c, &held, &stages, &slope_adjoints, block);
     }
 }
 
@@ -194,7 +162,7 @@ pub(super) fn evaluate<const DERIVATIVES: bool, const PRINTED: bool, const ACROS
 /// Fills in a block's tangent and curvature from the stages and the adjoints of their slopes by (x, z, u, w, q).
 #[inline(always)]
 #[expect(clippy::too_many_lines, reason = "one straight line of arithmetic, in the order of the equations")]
-pub(super) fn differentiate<const PRINTED: bool, const ACROSS: bool>(
+pub(super) fn differentiate<const PRINTED: bool>(
     c: &Constants,
     held: &Held,
     stages: &[Stage; 4],
@@ -202,7 +170,7 @@ pub(super) fn differentiate<const PRINTED: bool, const ACROSS: bool>(
     block: &mut Block,
 ) {
     let h = c.step_s;
-    let Held { push, side, turn_acc, turn_acc_d, drag, lateral_drag, crossflow } = *held;
+    let Held { push, side, turn_acc, turn_acc_d } = *held;
     // Tangents of u and w from stage to stage, tangents of x, z, u and w over the step, and the curvature.
     let mut tu = [Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO, Lanes::ZERO];
     let mut tw = [Lanes::ZERO, Lanes::ZERO, Lanes::splat(1.0), Lanes::ZERO, Lanes::ZERO];
@@ -221,24 +189,17 @@ pub(super) fn differentiate<const PRINTED: bool, const ACROSS: bool>(
             let tt = (ku * s.sin - kw * s.cos) * c.gravity_m_s2 - kx * s.x_dot - kz * s.z_dot;
             let t_u = kz * s.cos - kx * s.sin;
             let t_w = (kx * s.cos + kz * s.sin) * lateral_sign(PRINTED);
-            let (mut uu, mut uw, mut ww);
+            let (uu, uw, ww);
             if PRINTED {
-                uu = ku * (drag * 2.0);
+                uu = ku * (c.drag_per_m * 2.0);
                 ww = uu;
                 uw = Lanes::ZERO;
             } else {
-                let scale = ku * -drag;
+                let scale = ku * -c.drag_per_m;
                 let (aa, bb) = (s.along * s.along, s.across * s.across);
                 uu = scale * s.along * (Lanes::splat(3.0) - aa);
                 ww = scale * s.along * (Lanes::splat(1.0) - bb);
                 uw = scale * s.across * (Lanes::splat(1.0) - aa);
-                if ACROSS {
-                    let scale = kw * -lateral_drag;
-                    uu += scale * s.across * (Lanes::splat(1.0) - aa);
-                    uw += scale * s.along * (Lanes::splat(1.0) - bb);
-                    // The crossflow's second derivative changes sign with w.
-                    ww += scale * s.across * (Lanes::splat(3.0) - bb) - kw * crossflow * 2.0 * s.w.signum();
-                }
             }
             let (u_q, w_q) = (kw, -ku);
             if I == 0 {
@@ -289,7 +250,6 @@ pub(super) fn differentiate<const PRINTED: bool, const ACROSS: bool>(
             let ut = s.cos * -c.gravity_m_s2;
             let wt = s.sin * -c.gravity_m_s2;
             let (ru, rw) = (s.drag_u, s.drag_w - s.q);
-            let wu = if ACROSS { s.q + s.across_u } else { s.q };
             let mut du = [Lanes::ZERO; DIRECTIONS];
             let mut dw = [Lanes::ZERO; DIRECTIONS];
             let mut dx = [Lanes::ZERO; DIRECTIONS];
@@ -297,16 +257,13 @@ pub(super) fn differentiate<const PRINTED: bool, const ACROSS: bool>(
             let (ls, lc) = (s.sin * lateral_sign(PRINTED), s.cos * lateral_sign(PRINTED));
             if I == 0 {
                 du = [ut, ru, rw, -s.w, side];
-                dw = [wt, wu, s.across_w, s.u, -push];
+                dw = [wt, s.q, Lanes::ZERO, s.u, -push];
                 dx = [-s.z_dot, s.cos, ls, Lanes::ZERO, Lanes::ZERO];
                 dz = [s.x_dot, s.sin, -lc, Lanes::ZERO, Lanes::ZERO];
             } else {
                 for j in 0..DIRECTIONS {
                     du[j] = ru * tu[j] + rw * tw[j];
-                    dw[j] = wu * tu[j];
-                    if ACROSS {
-                        dw[j] += s.across_w * tw[j];
-                    }
+                    dw[j] = s.q * tu[j];
                     dx[j] = s.cos * tu[j] + ls * tw[j];
                     dz[j] = s.sin * tu[j] - lc * tw[j];
                 }

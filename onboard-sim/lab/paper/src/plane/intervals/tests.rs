@@ -2,48 +2,33 @@ use proptest::prelude::*;
 use pulp::{Scalar, Simd, WithSimd};
 use stages::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
-use super::lanes::Lanes;
 use super::*;
-use super::{DIRECTIONS, pair};
-use crate::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
-use crate::problem;
+use crate::plane::dynamics::PlanarState;
+use crate::problem::{self, THRUST_N};
 
 const STEP_S: f64 = 0.1;
-const THRUST_N: f64 = 33.3;
 
 /// State, gimbal angle and costate.
 type Point = ([f64; 6], f64, [f64; 6]);
 
-/// A model and the vehicle's mass, kg.
-type Vehicle = (PlanarModel, f64);
-
-/// Both kinds of the paper's vehicle, and a lighter vehicle with air forces across the body.
-fn vehicles() -> [Vehicle; 3] {
-    let paper = paper::model();
-    let mut in_air = paper;
-    in_air.params.lateral_drag_per_m = 0.07;
-    in_air.params.crossflow_per_m = 0.04;
-    let mass_kg = paper.params.mass_kg;
-    let printed = PlanarModel { kind: ModelKind::AsPrinted, ..paper };
-    [(paper, mass_kg), (printed, mass_kg), (in_air, 0.9 * mass_kg)]
+/// Both kinds of the paper's vehicle.
+fn models() -> [PlanarModel; 2] {
+    [ModelKind::Consistent, ModelKind::AsPrinted].map(|kind| PlanarModel { kind, ..problem::model() })
 }
 
 /// Evaluates the interval in every lane and returns the last lane's result.
-fn block((model, mass_kg): &Vehicle, (state, gimbal, costate): &Point) -> Block {
-    let constants = Constants::of(model, STEP_S);
+fn block(model: &PlanarModel, (state, gimbal, costate): &Point) -> Block {
+    let constants = Constants::of(model, THRUST_N, STEP_S);
     let points = Points {
         state: state.map(Lanes::splat),
         gimbal: Lanes::splat(*gimbal),
-        thrust: Lanes::splat(THRUST_N),
-        inverse_mass: Lanes::splat(1.0 / mass_kg),
-        lightness: Lanes::splat(model.params.mass_kg / mass_kg),
         costate: costate.map(Lanes::splat),
     };
     let mut block = Block::EMPTY;
-    match (constants.printed, constants.pushed_across()) {
-        (true, _) => evaluate::<true, true, false>(&constants, &points, &mut block),
-        (false, true) => evaluate::<true, false, true>(&constants, &points, &mut block),
-        (false, false) => evaluate::<true, false, false>(&constants, &points, &mut block),
+    if constants.printed {
+        evaluate::<true, true>(&constants, &points, &mut block);
+    } else {
+        evaluate::<true, false>(&constants, &points, &mut block);
     }
     block
 }
@@ -59,20 +44,8 @@ fn moved((state, gimbal, costate): &Point, direction: usize, by: f64) -> Point {
 }
 
 /// The model's own step, with its own sine and cosine.
-fn step((model, mass_kg): &Vehicle, (state, gimbal, _): &Point) -> [f64; 6] {
-    let model = model.with_mass(*mass_kg);
+fn step(model: &PlanarModel, (state, gimbal, _): &Point) -> [f64; 6] {
     model.rk4_step(&PlanarState::from_array(*state), *gimbal, THRUST_N, STEP_S).to_array()
-}
-
-/// Whether a stage comes so close to zero speed across the body, where the crossflow's curvature jumps, that a
-/// difference quotient may contain the jump.
-fn near_the_jump((model, mass_kg): &Vehicle, (state, gimbal, _): &Point) -> bool {
-    const NEAR_M_S: f64 = 1e-3;
-    let mut problem = paper::problem(PlanarState::from_array(*state), 1);
-    problem.model = model.with_mass(*mass_kg);
-    problem.thrust_n = vec![THRUST_N];
-    let (stages, _) = crate::plane::rollout::stages(&problem, 0, state, *gimbal);
-    model.params.crossflow_per_m != 0.0 && stages.iter().any(|stage| stage[4].abs() < NEAR_M_S)
 }
 
 fn point() -> impl Strategy<Value = Point> {
@@ -84,9 +57,9 @@ fn point() -> impl Strategy<Value = Point> {
 proptest! {
     #[test]
     fn val_planar_model_step(point in point()) {
-        for vehicle in &vehicles() {
-            let block = block(vehicle, &point);
-            for (value, expected) in block.after.iter().zip(step(vehicle, &point)) {
+        for model in &models() {
+            let block = block(model, &point);
+            for (value, expected) in block.after.iter().zip(step(model, &point)) {
                 let error = (value.0[LANES - 1] - expected).abs();
                 prop_assert!(error < 1e-13 * (1.0 + expected.abs()), "{error}");
             }
@@ -96,10 +69,10 @@ proptest! {
     #[test]
     fn val_finite_differences_tangent_and_adjoint(point in point()) {
         const H: f64 = 1e-5;
-        for vehicle in &vehicles() {
-            let block = block(vehicle, &point);
+        for model in &models() {
+            let block = block(model, &point);
             for j in 0..DIRECTIONS {
-                let (ahead, behind) = (step(vehicle, &moved(&point, j, H)), step(vehicle, &moved(&point, j, -H)));
+                let (ahead, behind) = (step(model, &moved(&point, j, H)), step(model, &moved(&point, j, -H)));
                 let column: [f64; 6] = core::array::from_fn(|i| (ahead[i] - behind[i]) / (2.0 * H));
                 for (row, state) in [0, 1, 3, 4].into_iter().enumerate() {
                     let error = (block.tangent[row][j].0[0] - column[state]).abs();
@@ -108,7 +81,7 @@ proptest! {
                 let expected: f64 = column.iter().zip(&point.2).map(|(slope, weight)| slope * weight).sum();
                 prop_assert!((block.pulled[j].0[0] - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{j}");
             }
-            let turn = (step(vehicle, &moved(&point, 4, H))[5] - step(vehicle, &moved(&point, 4, -H))[5]) / (2.0 * H);
+            let turn = (step(model, &moved(&point, 4, H))[5] - step(model, &moved(&point, 4, -H))[5]) / (2.0 * H);
             prop_assert!((block.turn.0[0] - turn).abs() < 1e-8 * (1.0 + turn.abs()));
         }
     }
@@ -116,12 +89,11 @@ proptest! {
     #[test]
     fn val_finite_differences_curvature(point in point()) {
         const H: f64 = 1e-5;
-        for vehicle in &vehicles() {
-            prop_assume!(!near_the_jump(vehicle, &point));
-            let curvature = block(vehicle, &point).curvature;
+        for model in &models() {
+            let curvature = block(model, &point).curvature;
             for column in 0..DIRECTIONS {
-                let ahead = block(vehicle, &moved(&point, column, H)).pulled;
-                let behind = block(vehicle, &moved(&point, column, -H)).pulled;
+                let ahead = block(model, &moved(&point, column, H)).pulled;
+                let behind = block(model, &moved(&point, column, -H)).pulled;
                 for row in 0..=column {
                     let expected = (ahead[row].0[0] - behind[row].0[0]) / (2.0 * H);
                     let error = (curvature[pair(row, column)].0[0] - expected).abs();
@@ -171,8 +143,8 @@ proptest! {
     #[test]
     fn the_rows_pull_and_eliminate_as_the_matrices_that_they_stand_for(point in point(), p in symmetric()) {
         let unit = |i: usize| from_fn(|j| f64::from(u8::from(i == j)));
-        for vehicle in &vehicles() {
-            let block = block(vehicle, &point);
+        for model in &models() {
+            let block = block(model, &point);
             let mut lines = [Line::EMPTY; LANES];
             super::rows::write(&block, &mut lines);
             let rows = Rows::of(&block, &lines[1], 1, STEP_S);
@@ -248,16 +220,13 @@ fn the_width_of_the_vectors_does_not_change_any_bit() {
         .collect();
     let costates: Vec<[f64; 6]> = states.iter().map(|state| state.map(|value| 30.0 - 7.0 * value)).collect();
     let inputs_rad: Vec<[f64; 1]> = (0..COUNT).map(|k| [0.3 - 0.012 * k as f64]).collect();
-    for vehicle in vehicles() {
-        let mut problem = paper::problem(paper::start(), COUNT);
-        problem.model = vehicle.0;
-        problem.mass_kg = vec![vehicle.1; COUNT];
-        problem.thrust_n = vec![THRUST_N; COUNT];
+    for model in models() {
+        let problem = Problem { model, ..problem::problem(problem::start(), COUNT) };
         let mut wide = Blocks::default();
         wide.resize(COUNT);
         wide.evaluate::<true>(&problem, &states, &inputs_rad, &costates);
         for k in 0..COUNT {
-            let plain = block(&vehicle, &(states[k], inputs_rad[k][0], costates[k + 1]));
+            let plain = block(&model, &(states[k], inputs_rad[k][0], costates[k + 1]));
             let (wide, lane) = (&wide.evaluated[k / LANES], k % LANES);
             let rows = wide.tangent.as_flattened().iter().zip(plain.tangent.as_flattened());
             let others =

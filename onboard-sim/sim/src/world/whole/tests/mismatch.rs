@@ -13,9 +13,7 @@ fn air_n(truth: &Truth, lit: bool) -> f64 {
     state.velocity_m_s.z = -30.0;
     let mut world = world("mk2", &truth, &state).with_fins_at(FRAC_PI_2);
     world.advance(if lit { &LIT } else { &OPEN }, 500);
-    let state =
-        RigidState { position_m: state.position_m, velocity_m_s: state.velocity_m_s, ..*world.state() };
-    let mut world = world.placed(&state).unwrap();
+    (world.state.position_m, world.state.velocity_m_s) = (state.position_m, state.velocity_m_s);
     world.step(if lit { &LIT } else { &OPEN });
     world.specific_force_m_s2().x * world.mass().mass_kg - world.thrust_n()
 }
