@@ -112,6 +112,8 @@ impl Flight {
             }
             Ok(frame)
         });
+        // Half a flight says nothing of the whole.
+        thoughts.retain(|_| again.is_some());
         let pilot = again.as_ref().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
         info.findings = found.map(|found| findings::facts(&recording, info.verdict.as_ref(), &found));

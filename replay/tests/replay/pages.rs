@@ -1,7 +1,10 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
 use flight::vehicle::mission::StartPoint;
+use replay::log::Recording;
+use replay::refly::{ReflyOptions, print_refly, refly};
 use replay::report::{report, report_with};
+use replay::verify::explain::explain;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{self, LANDED};
@@ -156,7 +159,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
 /// The estimate is compared with the truth in every direction, up to contact and not after it.
 #[test]
 fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
-    let recording = replay::log::Recording::open(&LANDED.log).unwrap();
+    let recording = Recording::open(&LANDED.log).unwrap();
     let page = report(&LANDED.log).unwrap().html;
     let section = page.split("Estimator error</h2>").nth(1).unwrap().split("<h2").next().unwrap();
     for row in
@@ -204,4 +207,25 @@ fn the_report_of_a_broken_flight_names_its_cause_first() {
     assert!(page.contains("Simulated: flown again without gimbal-jams:4@powered: STANDS UNDAMAGED"));
     // In every picture of the burn the finding stands where it began.
     assert!(page.matches("class=\"limit\"").count() > 10);
+}
+
+/// Report and a flight flown again name the same plans, and what is said of one when it is explained is the same.
+#[test]
+fn the_worst_plans_are_named_alike() {
+    let recording = Recording::open(&DISPERSED.log).unwrap();
+    let flown = refly(&recording, &ReflyOptions::default()).unwrap();
+    let worst = &flown.worst_plans;
+    assert!((1..=3).contains(&worst.len()) && worst.is_sorted_by(|a, b| a.price >= b.price), "{worst:?}");
+    let mut text = Vec::new();
+    print_refly(&flown, &mut text).unwrap();
+    let (text, page) = (String::from_utf8(text).unwrap(), report(&DISPERSED.log).unwrap().html);
+    for plan in worst {
+        let words = format!("frame {} (T+{:.2} s): {} at node", plan.frame, plan.time_s, plan.condition);
+        assert!(page.contains(&format!("Worst: {words}")), "{words}");
+        assert!(text.contains(&format!("worst plan: {words}")), "{text}");
+    }
+    let judged = explain(&recording, worst[0].frame).unwrap().judged.unwrap().flown;
+    let condition = format!("{} at node {}", worst[0].condition, worst[0].node);
+    assert_eq!(judged.broken_condition, Some(condition));
+    assert!((judged.merit - judged.cost - worst[0].price).abs() < 1e-9, "{judged:?}");
 }

@@ -177,7 +177,7 @@ pub(super) fn saturation(flight: &Flight) -> Option<String> {
     let mut flying = world.iter().zip(&flight.track).filter(|(sample, Sample { phase, .. })| {
         !sample.in_contact && phase.is_some_and(|phase| !phase.on_pad())
     });
-    let ((from, _), (to, _)) = flying.next().zip(flying.last())?;
+    let ((from, _), (to, _)) = flying.next().zip(flying.next_back())?;
     let total_s = to.time_s - from.time_s;
     let mut rows = Vec::new();
     let mut put = |what: String, angles: &Series, holds: &dyn Fn(f64, f64, f64) -> bool| {

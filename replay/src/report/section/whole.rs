@@ -140,7 +140,7 @@ fn moments(flight: &Flight) -> Vec<(&'static str, &Sample, bool)> {
         world.iter().rposition(|sample| sample.thrust_n > sample.mass_kg * mission.gravity_m_s2)
     });
     let falls = carried.and_then(|last| flight.track.get(last + 1));
-    let mut moments = vec![
+    let moments = [
         ("lift-off", enters(Phase::Boost), true),
         ("burn-out", enters(Phase::Coast), true),
         ("separation", separated.and_then(|pair| at(pair[1].time_s)), true),
@@ -149,12 +149,14 @@ fn moments(flight: &Flight) -> Vec<(&'static str, &Sample, bool)> {
         ("ignition", flight.ignition_s.and_then(at), true),
         ("half of nominal thrust", lit.and_then(|sample| at(sample.time_s)), false),
         ("thrust confirmed on board", enters(Phase::Powered), false),
-        ("contact", flown().last().filter(|_| flight.touchdown_s.is_some()), true),
+        ("contact", flown().next_back().filter(|_| flight.touchdown_s.is_some()), true),
         ("thrust fell through weight", falls, false),
     ];
-    moments.sort_by(|a, b| {
-        let time_s = |sample: Option<&Sample>| sample.map_or(0.0, |sample| sample.time_s);
-        time_s(a.1).total_cmp(&time_s(b.1))
-    });
-    moments.into_iter().filter_map(|(name, sample, drawn)| Some((name, sample?, drawn))).collect()
+    // Telemetry may begin without a place.
+    let known = |sample: &&Sample| sample.state[..5].iter().all(|value| value.is_finite());
+    let known =
+        moments.into_iter().filter_map(|(name, sample, drawn)| Some((name, sample.filter(known)?, drawn)));
+    let mut moments: Vec<_> = known.collect();
+    moments.sort_by(|a, b| a.1.time_s.total_cmp(&b.1.time_s));
+    moments
 }
