@@ -9,7 +9,7 @@ use protocol::log::computer_v1::ComputerFrame;
 
 use super::rms_and_max;
 use crate::report::chart::{Chart, Line};
-use crate::report::html::{charts, paragraph, table};
+use crate::report::html::{paragraph, table};
 use crate::report::track::{Flight, Part, Thought, named_aids};
 
 pub(super) fn aids(flight: &Flight) -> Option<String> {
@@ -59,21 +59,21 @@ fn error(flight: &Flight, thought: &Thought) -> Option<[f64; 9]> {
 /// Samples of one spectrum, 1.28 s at 200 Hz.
 const SEGMENT: usize = 256;
 
-pub(super) fn vibration(flight: &Flight) -> String {
+/// What the inertial unit felt along the nose, over frequency.
+pub(super) fn vibration(flight: &Flight) -> Chart {
     let line = |name, class, belongs: fn(Phase) -> bool| {
         let frames = flight.recording.frames.iter();
         let frames = frames.filter(|frame| phase_of(&frame.output).is_some_and(belongs));
         let felt = |frame: &ComputerFrame| Some(frame.input.measured.imu.specific_force_m_s2.x);
         Line { name, class, points: spectrum(&frames.filter_map(felt).collect::<Vec<f64>>()) }
     };
-    let spectra = Chart {
+    Chart {
         title: "Specific force along the nose, m/s^2 per sqrt(Hz)".to_owned(),
         x_label: "Hz",
         lines: vec![line("descent", "a", Phase::in_descent), line("burn", "b", Phase::in_landing_burn)],
         own_x: true,
         ..Chart::default()
-    };
-    charts(&[spectra.svg()])
+    }
 }
 
 /// Amplitude spectral density by Welch's method: half overlapping segments under a Hann window, without their means. Hz, and

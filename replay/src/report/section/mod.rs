@@ -33,7 +33,7 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         ("descent", "Wind, fins, roll and sensors", String::new()),
         ("sensors", "Sensors and estimator", text(estimate::aids(flight))),
         ("estimator", "Estimator error", text(estimate::errors(flight))),
-        ("battery", "Battery and vibration", estimate::vibration(flight)),
+        ("battery", "Battery and vibration", String::new()),
         ("whole", "The whole flight", whole::moments_and_views(flight)),
         ("events", "Events", text(whole::events(flight))),
         ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),

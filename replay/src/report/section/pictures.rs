@@ -1,6 +1,7 @@
 //! Every picture over time, by section.
 
 use super::burn::{AHEAD_S, tracking_errors};
+use super::estimate::vibration;
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::report::chart::{Chart, Line};
 use crate::report::track::{Flight, Part, Series, Thought, named_aids, planned};
@@ -215,6 +216,7 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
     draw.draw("sensors", Whole, "Gyro bias as estimated, deg/s", &[], lines);
     let battery = flight.framed(|frame| frame.input.battery_v);
     draw.draw("battery", Whole, "Battery, V", &[], [("", "a", battery)]);
+    draw.all.push(("battery", vibration(flight)));
 
     let age = flight.heard(|told| told.link_age_s);
     draw.draw("link", Whole, "Age of the last heartbeat, s", &[], [("", "a", age)]);
