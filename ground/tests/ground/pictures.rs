@@ -2,7 +2,7 @@
 //!
 //! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground --test ground pictures`
 //! also writes those that README.md and CREW.md show, the moving one included, to `ground/pictures`, from the flight that is recorded there:
-//! `onboard-sim fly --profile mk2 --start pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and
+//! `onboard-sim fly --start pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and
 //! `ground --auto --connect udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
 
 use std::fs;
