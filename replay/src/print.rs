@@ -62,8 +62,7 @@ pub(crate) fn verdict_rows<'a>(
         )
     };
     let mut limits: Vec<&VerdictLimit> = Vec::new();
-    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(|verdict| verdict.of_the_legs())
-    {
+    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(VerdictFacts::of_the_legs) {
         if !limits.iter().any(|known| known.name == limit.name) {
             limits.push(limit);
         }

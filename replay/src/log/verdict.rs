@@ -78,7 +78,7 @@ impl VerdictFacts {
             limits.collect()
         };
         Self {
-            landing: landing_of(&verdict.landing),
+            landing: landing_of(verdict.landing),
             ending: verdict.ending.clone().unwrap_or_default(),
             time_s: verdict.time_s,
             clock: Clock::Flight,
@@ -186,7 +186,7 @@ impl Heard {
         };
         let ending = FlightEnding {
             aborted: self.aborted,
-            landing: landing_of(&landing),
+            landing: landing_of(landing),
             failure: if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken },
         };
         Some(v1::LandingVerdict {
@@ -199,8 +199,8 @@ impl Heard {
     }
 }
 
-fn landing_of(recorded: &v1::Landing) -> Landing {
-    let v1::Landing { stands, upright, envelope, table_2 } = *recorded;
+fn landing_of(recorded: v1::Landing) -> Landing {
+    let v1::Landing { stands, upright, envelope, table_2 } = recorded;
     Landing { stands, upright, envelope, table_2 }
 }
 
@@ -228,7 +228,7 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
     // Legs that cannot give way have borne nothing that is told: their envelope decides.
     let sound = kept(borne) && (!borne.is_empty() || landing.envelope);
     let told = [sound && landing.upright, landing.upright, kept(envelope), kept(table_2)];
-    let said = landing_of(landing).flags();
+    let said = landing_of(*landing).flags();
     let place = (0..4).find(|place| told[*place] != said[*place])?;
     let is_not = if said[place] { "it says" } else { "it does not say" };
     Some(format!("{is_not} `{}`, against its limits", Landing::WORDS[place]))

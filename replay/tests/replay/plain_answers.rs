@@ -71,7 +71,7 @@ fn a_frame_without_a_solve_names_the_nearest_frame_with_one() {
     let first = (MK2.recording().release_frame + 1).to_string();
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &first]));
     assert!(
-        code == 0 && stdout.contains("this frame solves no landing; the nearest that does is "),
+        code == 0 && stdout.contains("this frame plans no landing; the nearest that does is "),
         "{stdout}"
     );
 }

@@ -3,8 +3,8 @@
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::vehicle::mission::Mission;
 
-use super::pictures::gimbal_rad;
-use super::{COMPONENTS, rms_and_max};
+use super::pictures::gimbal_deg;
+use super::{COMPONENTS, DEGREES, rms_and_max};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, paragraph, table};
 use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned, planned_at};
@@ -190,27 +190,16 @@ pub(super) fn saturation(flight: &Flight) -> Option<String> {
     };
     let slews = |rate: f64| move |a: f64, b: f64, dt_s: f64| (b - a).abs() >= AT_LIMIT * rate * dt_s;
     for (axis, name) in ["pitch", "yaw"].into_iter().enumerate() {
-        let [actual, _] = gimbal_rad(flight, axis);
-        let stop_rad = airframe.gimbal.limit_rad();
-        put(
-            format!("gimbal {name} at its stop of {:.1} deg", airframe.gimbal.limit_deg),
-            &actual,
-            &|_, b, _| b.abs() >= AT_LIMIT * stop_rad,
-        );
-        put(
-            format!("gimbal {name} at its fastest slew"),
-            &actual,
-            &slews(airframe.gimbal.servo.rate_rad_s()),
-        );
+        let ([actual, _], gimbal) = (gimbal_deg(flight, axis), &airframe.gimbal);
+        let at_stop = |_: f64, b: f64, _: f64| b.abs() >= AT_LIMIT * gimbal.limit_deg;
+        put(format!("gimbal {name} at its stop of {:.1} deg", gimbal.limit_deg), &actual, &at_stop);
+        put(format!("gimbal {name} at its fastest slew"), &actual, &slews(gimbal.servo.rate_deg_s));
     }
     for fin in 0..from.fins_actual_rad.len() {
-        let angles = flight.truth(|sample| sample.fins_actual_rad.get(fin).copied());
-        let servo = &airframe.fins.servo;
-        put(
-            format!("fin {} at its fastest slew of {:.0} deg/s", fin + 1, servo.rate_deg_s),
-            &angles,
-            &slews(servo.rate_rad_s()),
-        );
+        let angles = flight.truth(|sample| Some(DEGREES * sample.fins_actual_rad.get(fin)?));
+        let rate_deg_s = airframe.fins.servo.rate_deg_s;
+        let what = format!("fin {} at its fastest slew of {rate_deg_s:.0} deg/s", fin + 1);
+        put(what, &angles, &slews(rate_deg_s));
     }
     let words = paragraph(&format!("Of {total_s:.2} s in the air."));
     Some(words + &table(&["actuator", "#time", "#share"], &rows))

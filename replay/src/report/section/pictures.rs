@@ -1,17 +1,14 @@
 //! Every picture over time, by section.
 
+use flight::computer::pilot::Pilot;
+use nalgebra::Vector2;
+
 use super::burn::{AHEAD_S, tracking_errors};
 use super::estimate::vibration;
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::report::chart::{Chart, Line};
+use crate::report::track::Part::{Air, Burn, Whole};
 use crate::report::track::{Flight, Part, Series, Thought, named_aids, planned};
-
-/// The pictures that take the width of the page.
-const FULL: [&str; 3] = [
-    "Thrust, N",
-    "Distance between the planned and the actual position, m",
-    "Test ratio of each measurement; above 1 it was refused",
-];
 
 /// Name and class of a line, and its values.
 type Row = (&'static str, &'static str, Series);
@@ -36,7 +33,7 @@ impl Pictures<'_> {
         let lines = lines.into_iter().map(|(name, class, points)| Line { name, class, points }).collect();
         let chart = Chart {
             limits: limits.to_vec(),
-            full: FULL.contains(&title),
+            full: matches!(section, "thrust" | "tracking"),
             ..self.flight.over_time(part, title, lines)
         };
         self.all.push((section, chart));
@@ -45,19 +42,24 @@ impl Pictures<'_> {
 
 /// The pictures, each with its section.
 pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
-    use Part::{Air, Burn, Whole};
     let mut pictures = Pictures { flight, all: Vec::new() };
-    let draw = &mut pictures;
-    let mission = flight.pilot.as_ref().map(|pilot| pilot.mission());
-    let none = Series::new;
+    burn(flight, &mut pictures);
+    plans(flight, &mut pictures);
+    descent(flight, &mut pictures);
+    sensors(flight, &mut pictures);
+    pictures.all
+}
 
+/// What flew, and the thrust.
+fn burn(flight: &Flight, draw: &mut Pictures<'_>) {
+    let mission = flight.pilot.as_ref().map(Pilot::mission);
     let barometer = flight.framed(|frame| frame.input.measured.pressure_altitude_m);
     let height = [("barometer", "thin", barometer), ("feet", "a", flight.flown(|state| state[HEIGHT]))];
     draw.draw("first", Whole, "Height over the whole flight, m", &[], height);
 
     for (component, (name, unit, factor)) in COMPONENTS.into_iter().enumerate() {
         let estimate = flight.thought(|thought| Some(factor * thought.state?[component]));
-        let beside = if flight.recording.world.is_empty() { none() } else { estimate };
+        let beside = if flight.recording.world.is_empty() { Series::new() } else { estimate };
         let flown = flight.flown(|state| factor * state[component]);
         draw.draw(
             "burn",
@@ -70,8 +72,7 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
     for (axis, name) in ["pitch", "yaw"].into_iter().enumerate() {
         let limit = mission.map(|mission| mission.airframe.gimbal.limit_deg);
         let limits: Vec<f64> = limit.into_iter().flat_map(|limit| [-limit, limit]).collect();
-        let [actual, commanded] = gimbal_rad(flight, axis)
-            .map(|angles| angles.into_iter().map(|(at_s, rad)| (at_s, DEGREES * rad)).collect());
+        let [actual, commanded] = gimbal_deg(flight, axis);
         let lines = [("actual", "a", actual), ("commanded", "b", commanded)];
         draw.draw("burn", Burn, &format!("Gimbal {name}, deg"), &limits, lines);
     }
@@ -89,7 +90,10 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
         ];
         draw.draw("thrust", Burn, "Thrust, N", &[weight_n], lines);
     }
+}
 
+/// What the plans predicted, and how they were solved.
+fn plans(flight: &Flight, draw: &mut Pictures<'_>) {
     let mut predicted = |title: &str, actual: Option<f64>, value: &dyn Fn(&Thought) -> Option<f64>| {
         let values = flight.thought(value);
         let ends = [values.first(), values.last()];
@@ -129,10 +133,15 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
         errors.map(|(time_s, error)| (flight.axis_s(time_s), apart_m(error))).collect()
     });
     let lines = [("0.5 s ahead", "b", far), ("0.1 s ahead", "a", near)];
-    draw.draw("tracking", Burn, FULL[1], &[], lines);
+    draw.draw("tracking", Burn, "Distance between the planned and the actual position, m", &[], lines);
+}
 
+/// Along a direction of the ground.
+type Along = fn(&Vector2<f64>) -> f64;
+
+/// The way down: wind, fins, roll, and what was sensed against the truth.
+fn descent(flight: &Flight, draw: &mut Pictures<'_>) {
     // East is against y.
-    type Along = fn(&nalgebra::Vector2<f64>) -> f64;
     let winds: [(&str, Along); 2] = [("north", |wind| wind.x), ("east", |wind| -wind.y)];
     for (towards, along) in winds {
         let wind = flight.truth(|sample| Some(along(&[sample.wind_m_s.x, sample.wind_m_s.y].into())));
@@ -182,7 +191,10 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
             ("up", "c", fix([0.0, 0.0, 1.0])),
         ],
     );
+}
 
+/// What the estimator made of its sensors; battery, vibration and link.
+fn sensors(flight: &Flight, draw: &mut Pictures<'_>) {
     let names = flight.pilot.as_ref().map(|pilot| named_aids(pilot).map(|(name, _)| name));
     let ratios = |place: usize, class| {
         let ratios = flight.test_ratios[place].iter();
@@ -190,7 +202,7 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
         (names.map_or("", |names| names[place]), class, drawn)
     };
     let lines = [ratios(0, "thin"), ratios(1, "a"), ratios(2, "c"), ratios(3, "b")];
-    draw.draw("sensors", Whole, FULL[2], &[1.0], lines);
+    draw.draw("sensors", Whole, "Test ratio of each measurement; above 1 it was refused", &[1.0], lines);
     draw.draw(
         "sensors",
         Whole,
@@ -224,19 +236,19 @@ pub(super) fn all(flight: &Flight) -> Vec<(&'static str, Chart)> {
     draw.draw("link", Whole, "Frames lost, %", &[], [("", "a", loss)]);
     let received = flight.heard(|told| told.link_rx_bytes_s);
     draw.draw("link", Whole, "Received, bytes/s", &[], [("", "a", received)]);
-    pictures.all
 }
 
-/// Actual and commanded angle of a gimbal's axis, rad.
-pub(super) fn gimbal_rad(flight: &Flight, axis: usize) -> [Series; 2] {
+/// Actual and commanded angle of a gimbal's axis, deg.
+pub(super) fn gimbal_deg(flight: &Flight, axis: usize) -> [Series; 2] {
+    let deg = |angles_rad: &[f64]| angles_rad.get(axis).map(|rad| DEGREES * rad);
     if flight.recording.world.is_empty() {
         return [
-            flight.heard(|told| told.gimbal_measured_rad.get(axis).copied()),
-            flight.heard(|told| told.gimbal_commanded_rad.get(axis).copied()),
+            flight.heard(|told| deg(&told.gimbal_measured_rad)),
+            flight.heard(|told| deg(&told.gimbal_commanded_rad)),
         ];
     }
     [
-        flight.truth(|sample| sample.gimbal_actual_rad.get(axis).copied()),
-        flight.truth(|sample| sample.gimbal_commanded_rad.get(axis).copied()),
+        flight.truth(|sample| deg(&sample.gimbal_actual_rad)),
+        flight.truth(|sample| deg(&sample.gimbal_commanded_rad)),
     ]
 }

@@ -1,5 +1,6 @@
 //! The whole flight: its moments, its path, its events, its mission, and what the log holds.
 
+use flight::computer::pilot::Pilot;
 use flight::rules::phase::Phase;
 use flight::vehicles::mission::BUILTIN;
 
@@ -131,7 +132,7 @@ fn moments(flight: &Flight) -> Vec<(&'static str, &Sample, bool)> {
     let mut pairs = world.windows(2);
     let separated =
         pairs.find(|pair| pair[0].booster_thrust_n.is_some() && pair[1].booster_thrust_n.is_none());
-    let mission = flight.pilot.as_ref().map(|pilot| pilot.mission());
+    let mission = flight.pilot.as_ref().map(Pilot::mission);
     let lit = mission.and_then(|mission| {
         let half_n = 0.5 * mission.motor_curve.total_impulse_n_s() / mission.motor_curve.burn_time_s();
         world.iter().find(|sample| sample.thrust_n >= half_n)
