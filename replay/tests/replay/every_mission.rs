@@ -8,6 +8,7 @@ use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission::BUILTIN;
 use flight_log::frame::phase_of;
+use protocol::log::computer_v1::ComputerFrame;
 use replay::evaluate::{EvaluateError, evaluate, print_evaluate};
 use replay::settings::Setting;
 use replay::verify::explain::explain;
@@ -185,8 +186,8 @@ impl Case {
         let faults = fault.iter().map(|fault| fault.parse().unwrap()).collect();
         let flown = to_nobody(|link| simulate_recipe(Recipe { faults, ..recipe }, &[link]));
         let recording = flown.recording();
-        let burns = |frame: &&_| phase_of(&frame.output) == Some(Phase::Powered);
-        let mut middle: Vec<_> = recording.frames.iter().filter(burns).collect();
+        let burns = |frame: &&ComputerFrame| phase_of(&frame.output) == Some(Phase::Powered);
+        let mut middle: Vec<&ComputerFrame> = recording.frames.iter().filter(burns).collect();
         if middle.is_empty() {
             middle = recording.frames.iter().collect();
         }
