@@ -187,7 +187,7 @@ impl Case {
         let flown = to_nobody(|link| simulate_recipe(Recipe { faults, ..recipe }, &[link]));
         let recording = flown.recording();
         let burns = |frame: &&ComputerFrame| phase_of(&frame.output) == Some(Phase::Powered);
-        let mut middle: Vec<_> = recording.frames.iter().filter(burns).collect();
+        let mut middle: Vec<&ComputerFrame> = recording.frames.iter().filter(burns).collect();
         if middle.is_empty() {
             middle = recording.frames.iter().collect();
         }
