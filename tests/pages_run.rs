@@ -58,7 +58,11 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ground/packaging/README.md", "ground stop", "tests/first_flight.rs runs it"),
     ("ground/packaging/README.md", "ground/packaging/build", "needs containers of Debian for two processors"),
     ("onboard-sim/board/README.md", "onboard-sim/board/emulate", "needs QEMU and cross compilers"),
-    ("onboard-sim/lab/paper/benches/peers/README.md", "onboard-sim/lab/paper/benches/peers/run", "installs peers"),
+    (
+        "onboard-sim/lab/paper/benches/peers/README.md",
+        "onboard-sim/lab/paper/benches/peers/run",
+        "installs peers",
+    ),
     ("tests/README.md", "cargo bench", "lasts two hours"),
 ];
 

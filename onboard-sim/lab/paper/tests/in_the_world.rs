@@ -1,12 +1,11 @@
 //! The planar equations are the motion of the simulated world in its x-z plane.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::{RigidState, upright};
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
-use flight::vehicles::{airframe, motors};
+use flight::vehicles::airframe;
 use nalgebra::{UnitQuaternion, Vector3};
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
 use sim::world::{Actuators, STEP_S, Truth, World};
