@@ -27,7 +27,7 @@ fn the_demonstration_lands_and_its_log_replays_bit_for_bit() {
     let info =
         Running::to_end(program(Program::Replay).args(["info", "--json"]).arg(folder.path().join(log)));
     assert_eq!(info.code, Some(0), "{}", info.output);
-    for words in ["mission mk2", "/computer/frame", "/mavlink/rx/raw", "/mavlink/tx/raw", "bit-exact"] {
+    for words in ["mission mk3", "/computer/frame", "/mavlink/rx/raw", "/mavlink/tx/raw", "bit-exact"] {
         assert!(info.output.contains(words), "no {words} in:\n{}", info.output);
     }
 }

@@ -94,7 +94,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
 
 /// What a station records ten times a second, of the vehicle's state: which of its moments it takes depends on the machine.
 const STATE: [&str; 8] =
-    ["phase", "altitude_m", "x_m", "pitch_rad", "u_m_s", "w_m_s", "q_rad_s", "gimbal_measured_rad"];
+    ["phase", "north_m", "east_m", "altitude_m", "north_m_s", "climb_m_s", "tilt_rad", "turn_rate_rad_s"];
 
 /// The vehicle's state after each frame in a `.tlog` that tells of it, and once before the first.
 fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
@@ -105,13 +105,13 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
         let told_now = told.record(0.0);
         states.push([
             told_now.phase.map(f64::from),
+            told_now.north_m,
+            told_now.east_m,
             told_now.altitude_m,
-            told_now.x_m,
-            told_now.pitch_rad,
-            told_now.u_m_s,
-            told_now.w_m_s,
-            told_now.q_rad_s,
-            told_now.gimbal_measured_rad,
+            told_now.north_m_s,
+            told_now.climb_m_s,
+            told_now.tilt_rad,
+            told_now.turn_rate_rad_s,
         ]);
         let mut heard =
             std::iter::from_fn(|| frames.next_frame().expect("a file can be read")).filter_map(|frame| {

@@ -36,7 +36,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ENGINEER.md", "ground ", "tests/demo.rs flies it"),
     (
         "ENGINEER.md",
-        "onboard-sim fly --profile mk2 --mavlink udpout:192.168.1.20:14550",
+        "onboard-sim fly --mavlink udpout:192.168.1.20:14550",
         "waits for a station, as on CREW.md",
     ),
     (
@@ -68,7 +68,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
 const SAID: [(&str, &str); 16] = [
-    ("onboard-sim fly --profile mk2 --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
+    ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "attainable_low_m"),
     ("replay info flight.mcap", "verdict"),
     ("replay verify flight.mcap ", "frames identical"),
@@ -80,7 +80,7 @@ const SAID: [(&str, &str); 16] = [
     ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
     ("replay export flight.mcap --to parquet", "tables"),
     ("replay fit flight.mcap ", "drag"),
-    ("replay fit fits.json --mission mk2 --flights", "GO"),
+    ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay verify logs --baseline baseline.json --accept", "new"),
     ("replay verify logs --baseline baseline.json   ", "same"),
     ("onboard-sim motors --mission mini-f10 ", "scatter"),

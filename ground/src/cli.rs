@@ -18,7 +18,7 @@ use crate::model::words;
 use crate::view::theme::Palette;
 
 /// The profile that the demonstration flies by default.
-const DEMO_PROFILE: &str = "mk2";
+const DEMO_PROFILE: &str = simulated_vehicle::fly::DEFAULT_MISSION;
 const DEMO_SEED: u64 = 1;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
@@ -145,7 +145,7 @@ pub struct StationArgs {
     #[arg(long, value_name = "FILE|none")]
     pub tlog: Option<LogChoice>,
 
-    /// Demonstration: built-in mission or profile, or TOML file. Default: mk2.
+    /// Demonstration: built-in mission or profile, or TOML file. Default: mk3.
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect")]
     pub profile: Option<String>,
 
@@ -494,7 +494,7 @@ mod tests {
     fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap().station;
         let expected = Demonstration {
-            profile: "mk2",
+            profile: "mk3",
             start: None,
             seed: 1,
             speed: Speed::Factor(1.0),

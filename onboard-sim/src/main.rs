@@ -17,7 +17,7 @@ use simulated_vehicle::fly::load_flight;
 #[command(
     version,
     arg_required_else_help = true,
-    after_help = "Example: onboard-sim fly --profile mk2 --log flight.mcap"
+    after_help = "Example: onboard-sim fly --profile mk3 --log flight.mcap"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -33,12 +33,12 @@ enum Command {
     /// Exit codes: 0 landed inside every limit (from apogee: on its legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     #[command(
-        after_help = "Examples:\n  onboard-sim fly --profile mk2 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
+        after_help = "Examples:\n  onboard-sim fly --profile mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
     Fly(cli::fly::FlyArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     #[command(
-        after_help = "Example: onboard-sim campaign --profile mk2 --dispersion real --flights 1000 --out mk2-real"
+        after_help = "Example: onboard-sim campaign --profile mk3 --dispersion real --flights 1000 --out mk3-real"
     )]
     Campaign(cli::campaign::CampaignArguments),
     /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
@@ -60,7 +60,7 @@ enum Command {
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
-    #[command(after_help = "Example: onboard-sim hazard --profile mk2 --wind 0,3,6 --svg hazard.svg")]
+    #[command(after_help = "Example: onboard-sim hazard --profile mk3 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
@@ -75,7 +75,7 @@ enum Command {
         passphrase: bool,
     },
     /// List the built-in profiles, or print one as a file to start from.
-    #[command(after_help = "Example: onboard-sim profiles --show mk2")]
+    #[command(after_help = "Example: onboard-sim profiles --show mk3")]
     Profiles {
         /// Print this profile's TOML.
         #[arg(long, value_name = "NAME")]

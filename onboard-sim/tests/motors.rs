@@ -97,8 +97,8 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
 #[test]
 fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights() {
     let directory = tempfile::tempdir().unwrap();
-    let arguments =
-        ["card", "--wind", "6,0", "--flights", "2", "--hazard-flights", "3", "--wind-from", "225"];
+    let few = ["--flights", "2", "--hazard-flights", "3"];
+    let arguments = [&["card", "--mission", "mk2", "--wind", "6,0", "--wind-from", "225"], &few[..]].concat();
     let written = run(directory.path(), &arguments);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
     let progress = stderr(&written);
@@ -204,7 +204,9 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
     }
     let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
     assert!(
-        csv.starts_with("wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,landed\n0,as planned,0,"),
+        csv.starts_with(
+            "wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,stands,upright,envelope,table_2\n0,as planned,0,"
+        ),
         "{csv}"
     );
     let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();

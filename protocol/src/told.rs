@@ -8,7 +8,7 @@ use crate::dialect::{
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
 };
 use crate::log::v1::Telemetry;
-use crate::motion::{Attitude, BodySpeed, Deflection, Motion};
+use crate::motion::{Attitude, Deflection, Motion};
 
 /// Whether a heartbeat is one that our vehicles send. Whether it is ours only its `TD_FLIGHT_STATUS` shows.
 pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
@@ -73,7 +73,6 @@ impl Told {
     pub fn record(&self, time_s: f64) -> Telemetry {
         let motion = self.motion.or(self.vertical);
         let known = |value: f64| Some(value).filter(|value| value.is_finite());
-        let body = self.attitude.zip(self.motion).map(|(attitude, motion)| BodySpeed::of(&attitude, &motion));
         let fins: Vec<Deflection> = self
             .fins
             .iter()
@@ -84,9 +83,14 @@ impl Told {
                     .map(|(commanded, measured)| Deflection::of_centidegrees(*commanded, *measured))
             })
             .collect();
-        let gimbal = self.gimbal.as_ref();
-        let gimbal =
-            gimbal.map(|data| Deflection::of_centidegrees(data.pitch_commanded, data.pitch_measured));
+        let gimbal: Vec<Deflection> = self
+            .gimbal
+            .iter()
+            .flat_map(|data| {
+                [(data.pitch_commanded, data.pitch_measured), (data.yaw_commanded, data.yaw_measured)]
+                    .map(|(commanded, measured)| Deflection::of_centidegrees(commanded, measured))
+            })
+            .collect();
         let controller = self.controller.as_ref();
         Telemetry {
             time_s,
@@ -97,16 +101,18 @@ impl Told {
                 .as_ref()
                 .map(|status| status.countdown_ms)
                 .filter(|left| *left != i32::MAX),
+            north_m: motion.and_then(|motion| known(motion.x_m)),
+            east_m: motion.and_then(|motion| known(motion.y_m)),
             altitude_m: motion.map(|motion| motion.altitude_m),
-            x_m: motion.and_then(|motion| known(motion.x_m)),
-            pitch_rad: self.attitude.map(|attitude| attitude.pitch_rad),
-            u_m_s: body.map(|speed| speed.u_m_s),
-            w_m_s: body.map(|speed| speed.w_m_s),
-            q_rad_s: self.attitude.map(|attitude| attitude.pitch_rate_rad_s),
+            north_m_s: motion.and_then(|motion| known(motion.vx_m_s)),
+            east_m_s: motion.and_then(|motion| known(motion.vy_m_s)),
+            climb_m_s: motion.map(|motion| motion.climb_m_s),
+            tilt_rad: self.attitude.map(|attitude| attitude.tilt_rad),
+            turn_rate_rad_s: self.attitude.map(|attitude| attitude.turn_rate_rad_s()),
             fin_commanded_rad: fins.iter().map(|fin| fin.commanded_rad).collect(),
             fin_measured_rad: fins.iter().map(|fin| fin.measured_rad).collect(),
-            gimbal_commanded_rad: gimbal.map(|angle| angle.commanded_rad),
-            gimbal_measured_rad: gimbal.map(|angle| angle.measured_rad),
+            gimbal_commanded_rad: gimbal.iter().map(|angle| angle.commanded_rad).collect(),
+            gimbal_measured_rad: gimbal.iter().map(|angle| angle.measured_rad).collect(),
             control_level: controller.map(|controller| controller.level as u32),
             solver_status: controller.map(|controller| controller.solver_status as u32),
             iterations: controller.map(|controller| u32::from(controller.iterations)),
@@ -146,18 +152,17 @@ mod tests {
         told.record(0.0)
     }
 
-    /// A roll turns the lateral axes and nothing else, and both signs of a quaternion are one attitude.
+    /// A roll does not change where the nose points, and both signs of a quaternion are one attitude.
     #[test]
-    fn pitch_and_axial_speed_do_not_depend_on_the_roll() {
+    fn tilt_does_not_depend_on_the_roll() {
         for roll_deg in [0.0, 50.0, 180.0, 300.0] {
             for sign in [1.0, -1.0] {
                 let record = falling(60.0, roll_deg, sign);
                 let near = |found: Option<f64>, expected: f64| {
                     assert!((found.unwrap() - expected).abs() < 1e-5, "{found:?}, not {expected}");
                 };
-                near(record.pitch_rad, 60.0_f64.to_radians());
-                near(record.u_m_s, -20.0 * 0.866_025_4);
-                near(record.w_m_s, 20.0 * 0.5 * libm::cos(roll_deg.to_radians()));
+                near(record.tilt_rad, 30.0_f64.to_radians());
+                near(record.climb_m_s, -20.0);
             }
         }
     }

@@ -57,7 +57,7 @@ impl World {
             let ignition_delay_s = delay_s.max(0.02);
             let truth = Truth { impulse_scale, burn_time_scale, ignition_delay_s, ..drawn.truth };
             let draw = Draw { truth, ..drawn };
-            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw)?.run().legs)
+            Ok(Sortie::drawn_as(&recipe.mission, &recipe.dispersion, &draw)?.run().landing.stands)
         };
         let landed = in_parallel(&motors, one, &|_| {});
         let flights = motors.into_iter().zip(landed).map(|((_, motor), landed)| Ok((motor, landed?)));

@@ -2,9 +2,10 @@
 //! landing broke.
 
 use flight::computer::findings::{Findings, Sign};
+use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
-use crate::controller::LoggedComputer;
+use crate::controller::{FrameError, LoggedComputer};
 use crate::log::{Recording, VerdictFacts, VerdictLimit};
 
 /// One finding.
@@ -24,18 +25,28 @@ pub struct FindingFacts {
 /// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
 /// did: what it would have commanded says nothing of surfaces that followed other commands.
 pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Option<Vec<FindingFacts>> {
+    let (_, findings) = run_again(recording, LoggedComputer::run_again)?;
+    Some(facts(recording, verdict, &findings?))
+}
+
+/// The computer of a recorded flight after all its frames, each of which `run` has run again; `None` if that cannot be. Beside
+/// it what it shows; `None` if it decides otherwise than it did.
+pub(crate) fn run_again(
+    recording: &Recording,
+    mut run: impl FnMut(&mut LoggedComputer, &ComputerFrame) -> Result<ComputerFrame, FrameError>,
+) -> Option<(LoggedComputer, Option<Findings>)> {
     let (start, frames) = recording.replayable_frames().ok()?;
     let toml = recording.profile_toml().ok()?;
     let mut computer = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
-    let mut findings = Findings::default();
+    let mut findings = Some(Findings::default());
     for frame in frames {
-        let again = computer.run_again(frame).ok()?;
-        if again.output != frame.output {
-            return None;
+        let again = run(&mut computer, frame).ok()?;
+        findings = findings.filter(|_| again.output == frame.output);
+        if let Some(findings) = &mut findings {
+            findings.note(computer.computer());
         }
-        findings.note(computer.computer());
     }
-    Some(facts(recording, verdict, &findings))
+    Some((computer, findings))
 }
 
 /// The findings of a computer that was run again with the recorded decisions, and the limits that were broken.

@@ -8,6 +8,7 @@
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
+//! * [`worst_plans`]: the plans of a landing burn that the judge finds worst.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
 //!   holds a directory of logs against a baseline, and proves the books of ground stations.
@@ -42,6 +43,7 @@ pub mod report;
 pub mod settings;
 pub mod table;
 pub mod verify;
+pub mod worst_plans;
 
 use std::io::Write as _;
 
@@ -116,7 +118,7 @@ enum Command {
     /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
     /// setting by setting; exit code 1 if one differs.
     #[command(
-        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk2 day/mission.toml"
+        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
     Compare(compare::Args),
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
@@ -147,7 +149,7 @@ enum Command {
     /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
     /// NO-GO (exit code 1) if not.
     #[command(
-        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk2 --day day --flights 1000"
+        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]
     Fit(fit::Args),
     /// Prints a shell's completions.

@@ -9,7 +9,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::rules::phase::Phase;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
-use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
+use protocol::dialect::{HEARTBEAT_DATA, MavMessage, TdLanding};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
 use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
@@ -80,7 +80,8 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             drop(update(model, Msg::Tick, now));
         }
     }
+    const STANDS: TdLanding = TdLanding::TD_LANDING_STANDS;
     let landed = vehicle.judged().is_some_and(|judged| judged.landing.stands);
-    let told = model.vehicle.verdict().is_some_and(|verdict| verdict.value.landed);
+    let told = model.vehicle.verdict().is_some_and(|verdict| verdict.value.landing.contains(STANDS));
     Ok(landed && told)
 }

@@ -426,7 +426,7 @@ impl Ending {
         };
         match self {
             Self::Stands => at_contact(),
-            Self::Upright => format!(", taken as damaged{}", at_contact()),
+            Self::Upright => format!(", damaged{}", at_contact()),
             Self::UnderParachute => format!(", sinking at {:.1} m/s", touchdown.vertical_m_s.abs()),
             Self::Hard => match touchdown.violations() {
                 Some(names) => format!(": not upright, outside {names}"),

@@ -6,7 +6,7 @@ use mavlink::MessageData;
 use protocol::dialect::{
     HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
     SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_PREDICTED_PATH_DATA, TdPhase, TdStart,
+    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 pub use protocol::told::{phase_from_number, phase_of};
@@ -53,15 +53,9 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
         }
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
-            let touchdown = Touchdown {
-                distance_m: data.distance_m.into(),
-                height_m: data.height_m.into(),
-                vertical_m_s: data.vertical_m_s.into(),
-                lateral_m_s: data.lateral_m_s.into(),
-                tilt_rad: data.tilt_rad.into(),
-                rate_rad_s: data.rate_rad_s.into(),
-                violated: data.limits_violated,
-            };
+            let [distance, height, rate] = [data.distance_m, data.height_m, data.rate_rad_s];
+            let at = [distance, height, data.vertical_m_s, data.lateral_m_s, data.tilt_rad, rate];
+            let touchdown = touchdown(at, data.limits_violated);
             let time_to_go_s = f64::from(data.time_to_go_ms) / 1_000.0;
             vehicle.prediction = Some(Sample::new(Prediction { time_to_go_s, touchdown }, now));
         }
@@ -111,17 +105,10 @@ impl Vehicle {
 
     /// The vehicle's own verdict on its landing.
     pub fn verdict(&self) -> Option<Sample<Verdict>> {
-        self.converted(|data: &TD_LANDING_VERDICT_DATA| Verdict {
-            landing: data.landing,
-            touchdown: Touchdown {
-                distance_m: data.distance_m.into(),
-                height_m: 0.0,
-                vertical_m_s: data.vertical_m_s.into(),
-                lateral_m_s: data.lateral_m_s.into(),
-                tilt_rad: data.tilt_rad.into(),
-                rate_rad_s: data.rate_rad_s.into(),
-                violated: data.limits_violated,
-            },
+        self.converted(|data: &TD_LANDING_VERDICT_DATA| {
+            let [distance, rate] = [data.distance_m, data.rate_rad_s];
+            let at = [distance, 0.0, data.vertical_m_s, data.lateral_m_s, data.tilt_rad, rate];
+            Verdict { landing: data.landing, touchdown: touchdown(at, data.limits_violated) }
         })
     }
 
@@ -212,6 +199,12 @@ fn path(data: &TD_PREDICTED_PATH_DATA) -> Vec<(f64, f64)> {
 fn name(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     protocol::text::printable(&bytes[..end])
+}
+
+/// Distance, height, vertical and lateral speed, tilt and rate at touchdown, as both messages tell them.
+fn touchdown(at: [f32; 6], violated: TdLimit) -> Touchdown {
+    let [distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s] = at.map(f64::from);
+    Touchdown { distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s, violated }
 }
 
 #[cfg(test)]

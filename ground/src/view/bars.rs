@@ -114,7 +114,7 @@ fn limit(
     let mark = row.used.is_finite().then_some((LIMIT_AT, style));
     bar([0.0, LIMIT_AT * row.used], ink, mark, frame, bar_at);
     if limit_columns > 0 {
-        let words = theme.either_side(&format!(" {} {}", row.limit, row.unit));
+        let words = theme.either_side(&format!(" {}", row.limit));
         draw_line(
             frame,
             Rect { x: at.right() - limit_columns, width: limit_columns, ..at },

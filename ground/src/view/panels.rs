@@ -255,7 +255,7 @@ pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> 
         let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
         let limit = match bit {
             TdLimit::TD_LIMIT_DISTANCE | TdLimit::TD_LIMIT_HEIGHT => String::new(),
-            _ if limits.is_none() => "--".to_owned(),
+            _ if limits.is_none() => format!("-- {unit}"),
             _ => format!("±{} {unit}", shortest(most)),
         };
         LimitRow { name, value, unit, limit, used: value.abs() / most, kept: !at.violated.contains(bit) }
@@ -323,8 +323,8 @@ mod limit_rows_tests {
     const LIMITS: TD_TOUCHDOWN_LIMITS_DATA = TD_TOUCHDOWN_LIMITS_DATA {
         vertical_m_s: 1.5,
         lateral_m_s: 0.6,
-        tilt_rad: 0.1,
-        rate_rad_s: 0.2,
+        tilt_rad: 7.5_f32.to_radians(),
+        rate_rad_s: 12_f32.to_radians(),
         fence_m: 120.0,
         gimbal_limit_rad: 0.1,
     };
@@ -336,8 +336,8 @@ mod limit_rows_tests {
             height_m: 0.0,
             vertical_m_s: -1.5 * share,
             lateral_m_s: 0.6 * share,
-            tilt_rad: 0.1 * share,
-            rate_rad_s: 0.2 * share,
+            tilt_rad: share * 7.5_f64.to_radians(),
+            rate_rad_s: share * 12_f64.to_radians(),
             violated: TdLimit::empty(),
         }
     }
@@ -345,8 +345,8 @@ mod limit_rows_tests {
     #[test]
     fn limits_are_the_vehicles_own_and_unknown_before_it_reports_them() {
         let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
-        assert_eq!(words(None), ["", "", "--", "--", "--", "--"]);
-        assert_eq!(words(Some(&LIMITS)), ["", "", "±1.5 m/s", "±0.6 m/s", "±5.7 deg", "±11.5 deg/s"]);
+        assert_eq!(words(None), ["", "", "-- m/s", "-- m/s", "-- deg", "-- deg/s"]);
+        assert_eq!(words(Some(&LIMITS)), ["", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);
     }
 
     #[test]

@@ -44,7 +44,7 @@ fn each_end_has_its_word_everywhere() {
         ),
         (
             judged([1.4, 0.1], UPRIGHT, sink, STOWED),
-            "UPRIGHT, taken as damaged, outside the design envelope of its legs, outside Table 2",
+            "UPRIGHT, damaged, outside the design envelope of its legs, outside Table 2",
         ),
         (judged([6.1, 9.0], UPRIGHT, sink, OPEN), "DOWN UNDER THE PARACHUTE, sinking at 6.1 m/s"),
         (

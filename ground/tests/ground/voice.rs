@@ -70,7 +70,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
         "powered",
         "touchdown",
         "do not approach",
-        "landed",
+        "stands undamaged",
     ];
     assert_eq!(said(&mut rig), expected);
 }
@@ -79,7 +79,10 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
 fn more_or_less_is_called_out_as_the_crew_wants() {
     let mut few = rig(Amount::Few, true);
     fly(&mut few);
-    assert_eq!(said(&mut few), ["liftoff", "apogee", "ignition", "touchdown", "do not approach", "landed"]);
+    assert_eq!(
+        said(&mut few),
+        ["liftoff", "apogee", "ignition", "touchdown", "do not approach", "stands undamaged"]
+    );
     let mut all = rig(Amount::All, true);
     fly(&mut all);
     let all = said(&mut all);

@@ -40,6 +40,13 @@ impl Share {
     }
 }
 
+impl fmt::Display for Share {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [share, low, high] = [self.share, self.low, self.high].map(|share| 100.0 * share);
+        write!(out, "{} of {}: {share:.1} % ({low:.1} to {high:.1} %)", self.count, self.of)
+    }
+}
+
 /// How many of some flights ended as each word of a [`Landing`] says.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Landings {
@@ -69,13 +76,7 @@ impl Landings {
 impl fmt::Display for Landings {
     /// What stands undamaged, never without what was inside the design envelope of its legs.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Share { count, of, share, low, high } = self.stands;
-        let [share, low, high] = [share, low, high].map(|share| 100.0 * share);
-        write!(
-            out,
-            "{count} of {of}: {share:.0} % ({low:.0} to {high:.0}), {} inside the envelope",
-            self.envelope.count
-        )
+        write!(out, "{}, {} inside the envelope", self.stands, self.envelope.count)
     }
 }
 

@@ -189,7 +189,7 @@ impl Summary {
     }
 }
 
-fn failures(rows: &[Row]) -> Vec<Failures> {
+pub(crate) fn failures(rows: &[Row]) -> Vec<Failures> {
     let mut found: Vec<Failures> = Vec::new();
     for row in rows.iter().filter(|row| !row.failure.is_empty()) {
         match found.iter_mut().find(|known| known.reason == row.failure) {
@@ -282,17 +282,6 @@ pub fn to_markdown(summary: &Summary) -> String {
     format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n\n## Pictures\n\n{pictures}", to_text(summary))
 }
 
-fn percent(share: &Share) -> String {
-    format!(
-        "{} of {}: {:.1} % ({:.1} to {:.1} %)",
-        share.count,
-        share.of,
-        100.0 * share.share,
-        100.0 * share.low,
-        100.0 * share.high
-    )
-}
-
 /// What attainable means.
 const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height
 is the same for all flights; once the thrust begins, motor, mass and drag are
@@ -370,16 +359,12 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     )?;
     writeln!(out, "{}", what(&summary.manifest))?;
     for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
-        writeln!(out, "{word:<38}  {}", percent(share))?;
+        writeln!(out, "{word:<38}  {share}")?;
     }
     if let Some(attainable) = &summary.attainable {
         let Attainable { command_height_m, .. } = attainable;
-        writeln!(
-            out,
-            "attainable, ignition command at {command_height_m:.1} m  {}",
-            percent(&attainable.attainable)
-        )?;
-        writeln!(out, "landed of attainable  {}{}", percent(&attainable.landed), others(attainable))?;
+        writeln!(out, "attainable, ignition command at {command_height_m:.1} m  {}", attainable.attainable)?;
+        writeln!(out, "landed of attainable  {}{}", attainable.landed, others(attainable))?;
         writeln!(out, "({ATTAINABLE})")?;
     }
     writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
@@ -404,7 +389,7 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
     write_text(&distributions(summary), out)?;
     let told = sensitivities(summary);
     if told.len() == 1 {
-        return writeln!(out, "\nwhat costs landings: {} flights do not tell", of);
+        return writeln!(out, "\nwhat costs landings: {of} flights do not tell");
     }
     writeln!(
         out,

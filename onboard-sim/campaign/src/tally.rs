@@ -4,7 +4,9 @@
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
+use flight::vehicle::mission::LegLimits;
 use nmpc::Status;
+use sim::outcome::by_envelope;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
@@ -22,7 +24,6 @@ const MOTOR_KNOWN_S: f64 = 3.0;
 pub struct Tally {
     number: u64,
     flight: Sortie,
-    leg_limits: [f64; 4],
     gimbal_limit_rad: f64,
     ignition: Option<AtIgnition>,
     onset: Option<(f64, f64)>,
@@ -50,11 +51,9 @@ impl Tally {
     /// The flight cannot be set up.
     pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
         let mission = &recipe.mission;
-        let legs = &mission.leg_limits;
         Ok(Self {
             number,
             flight: Sortie::new(recipe, number)?,
-            leg_limits: [legs.vertical_m_s, legs.lateral_m_s, legs.tilt_deg, legs.rate_deg_s],
             gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
             ignition: None,
             onset: None,
@@ -181,7 +180,7 @@ impl Tally {
             touchdown_x_m: at(|touchdown| touchdown.state.position_m.x),
             touchdown_y_m: at(|touchdown| touchdown.state.position_m.y),
             touchdown_thrust_over_weight: at(|touchdown| touchdown.thrust_n / touchdown.weight_n),
-            leg_use: touchdown.map(|touchdown| self.leg_use(touchdown)),
+            leg_use: touchdown.map(|contact| leg_use(&self.flight.mission().leg_limits, contact)),
             stands: landing.stands,
             upright: landing.upright,
             envelope: landing.envelope,
@@ -211,16 +210,12 @@ impl Tally {
             flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
         }
     }
+}
 
-    fn leg_use(&self, touchdown: &FirstContact) -> f64 {
-        let found = [
-            touchdown.over_ground.vertical_m_s.abs(),
-            touchdown.over_ground.lateral_m_s,
-            touchdown.over_ground.tilt_rad.to_degrees(),
-            touchdown.over_ground.rate_rad_s.to_degrees(),
-        ];
-        found.iter().zip(&self.leg_limits).fold(0.0, |most, (found, limit)| (found / limit).max(most))
-    }
+/// The largest share of the legs' design envelope.
+fn leg_use(legs: &LegLimits, contact: &FirstContact) -> f64 {
+    let shares = by_envelope(legs, contact).results.map(|limit| limit.value.abs() / limit.highest);
+    shares.into_iter().fold(0.0, f64::max)
 }
 
 /// Flies a whole flight.

@@ -7,6 +7,7 @@ use std::path::Path;
 use campaign::row;
 use campaign::run::{publish, run, threads};
 use campaign::store::{CHUNK_FLIGHTS, Order, Shard, Store, StoreError, merge};
+use flight::rules::verdict::Landing;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::RowAccessor as _;
 use sim::dispersion;
@@ -84,16 +85,16 @@ fn read_them(out: &Path) {
     let reader = SerializedFileReader::new(fs::File::open(out.join("flights.parquet")).unwrap()).unwrap();
     let columns = reader.metadata().file_metadata().schema_descr().columns().to_vec();
     let column = |name: &str| columns.iter().position(|column| column.name() == name).unwrap();
-    let [number, impulse, vertical, legs, failure, onset] =
-        ["number", "impulse_scale", "touchdown_vertical_m_s", "legs", "failure", "onset_height_m"]
-            .map(column);
+    let [number, impulse, vertical, failure, onset] =
+        ["number", "impulse_scale", "touchdown_vertical_m_s", "failure", "onset_height_m"].map(column);
+    let landing = Landing::COLUMNS.map(column);
     let mut count = 0;
     for (record, row) in reader.get_row_iter(None).unwrap().zip(&rows) {
         let record = record.unwrap();
         assert_eq!(record.get_long(number).unwrap(), i64::try_from(row.number).unwrap());
         assert_eq!(record.get_double(impulse).unwrap().to_bits(), row.impulse_scale.to_bits());
         assert_eq!(record.get_double(vertical).ok(), row.touchdown_vertical_m_s);
-        assert_eq!(record.get_bool(legs).unwrap(), row.stands);
+        assert_eq!(landing.map(|word| record.get_bool(word).unwrap()), row.landing().flags());
         assert_eq!(record.get_string(failure).unwrap(), &row.failure);
         assert_eq!(record.get_double(onset).ok(), row.onset_height_m);
         count += 1;
@@ -102,7 +103,9 @@ fn read_them(out: &Path) {
 
     let summary: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
-    assert_eq!(summary["legs"]["of"], FLIGHTS);
+    for word in Landing::COLUMNS {
+        assert_eq!(summary[word]["of"], FLIGHTS, "{word}");
+    }
     assert_eq!(summary["attainable"]["attainable"]["of"], FLIGHTS);
     assert_eq!(summary["attainable"]["landed"]["of"], summary["attainable"]["attainable"]["count"]);
     let markdown = fs::read_to_string(out.join("summary.md")).unwrap();

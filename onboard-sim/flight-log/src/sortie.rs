@@ -179,9 +179,9 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     })
 }
 
-/// Each limit with its result, as records.
-fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
-    let limits = verdict.results.iter().filter(|result| result.highest.is_finite());
+/// Each limit with its result, as records; what is not limited has none.
+pub fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
+    let limits = verdict.results.iter().filter(|result| !result.highest.is_infinite());
     let limits = limits.map(|result| v1::LimitResult {
         name: result.name.to_owned(),
         value: result.value,

@@ -1,8 +1,8 @@
-//! The landing in space, written from the equations in the documentation of [`nmpc::space`]: dynamics of an interval for any
+//! The landing in space, written from the equations in the documentation of [`nmpc`]: dynamics of an interval for any
 //! kind of number, running cost, and conditions.
 
 use nalgebra::{SMatrix, SVector, Vector3};
-use nmpc::{INPUTS, STATES, Problem};
+use nmpc::{INPUTS, Problem, STATES};
 use num_dual::{DualNum, DualNumCopy, HyperDual64};
 
 /// States and inputs of a node, one after the other.

@@ -13,12 +13,13 @@ mod sqp;
 
 use std::f64::consts::PI;
 
-use nmpc::{INPUTS, STATES, Problem, State};
+use nmpc::{INPUTS, Problem, STATES, State};
 
 use self::landing::{Node, Range, after, cost_at, ranges};
 use self::sqp::Search;
 
-/// A plan by the judge's own dynamics and conditions. NaN throughout if the plan has another number of intervals.
+/// A plan by the judge's own dynamics and conditions. NaN throughout if the plan has another number of intervals, or does not fly
+/// on finite numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
     /// The running cost.
@@ -51,18 +52,23 @@ pub struct Judgement {
 const GUESSES: [(f64, f64); 5] = [(1.0, 0.0), (-1.0, 0.0), (1.0, PI), (-1.0, PI), (0.0, 0.0)];
 
 /// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the answer. A plan with
-/// another number of intervals is not used. The final time is that of the problem.
+/// another number of intervals is not used. The final time is that of the problem. The score is NaN if the problem has no
+/// intervals, or numbers that are not finite.
 pub fn solve(problem: &Problem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {
     let search = Search::of(problem);
     let given = start.and_then(|(states, inputs)| nodes(problem, states, inputs));
-    let starts = given.into_iter().chain(GUESSES.iter().map(|guess| search.guess(*guess)));
+    let guesses = GUESSES.iter().filter(|_| !problem.pushes.is_empty()).map(|guess| search.guess(*guess));
+    let starts = given.into_iter().chain(guesses);
     let mut iterations = 0;
     let mut best: Option<(bool, Score, Vec<Node>)> = None;
     for start in starts {
         let end = search.descend(start);
         iterations += end.iterations;
+        if end.nodes.is_empty() {
+            continue;
+        }
         let score = scored(problem, &search.ranges, &end.nodes);
-        if best.as_ref().is_none_or(|(_, best, _)| score.merit < best.merit || best.merit.is_nan()) {
+        if best.as_ref().is_none_or(|(_, best, _)| score.merit < best.merit) {
             best = Some((end.converged, score, end.nodes));
         }
     }
@@ -88,12 +94,13 @@ impl Score {
         Self { cost: f64::NAN, merit: f64::NAN, miss: f64::NAN, worst: None, defect: f64::NAN };
 }
 
+/// The nodes of a plan, if it has the problem's intervals.
 fn nodes(problem: &Problem, states: &[State], inputs: &[[f64; INPUTS]]) -> Option<Vec<Node>> {
     let intervals = problem.pushes.len();
-    let inputs = inputs.iter().chain(std::iter::once(&[0.0; INPUTS]));
-    let nodes: Vec<Node> =
-        states.iter().zip(inputs).map(|(x, u)| Node::from_iterator(x.iter().chain(u).copied())).collect();
-    (intervals > 0 && states.len() == intervals + 1 && nodes.len() == states.len()).then_some(nodes)
+    let fits = intervals > 0 && inputs.len() == intervals && states.len() == intervals + 1;
+    let inputs = inputs.iter().chain([&[0.0; INPUTS]]);
+    let node = |(x, u): (&State, &[f64; INPUTS])| Node::from_iterator(x.iter().chain(u).copied());
+    fits.then(|| states.iter().zip(inputs).map(node).collect())
 }
 
 fn scored(problem: &Problem, ranges: &[Range], nodes: &[Node]) -> Score {
@@ -107,7 +114,11 @@ fn scored(problem: &Problem, ranges: &[Range], nodes: &[Node]) -> Score {
             None => problem.initial,
         };
         for (from, here) in from.iter().zip(node) {
-            score.defect = score.defect.max((from - here).abs());
+            let gap = (from - here).abs();
+            if !gap.is_finite() {
+                return Score::NONE;
+            }
+            score.defect = score.defect.max(gap);
         }
     }
     score.merit = score.cost;

@@ -8,7 +8,7 @@
 use stages::add_multiple;
 
 use super::stage::{ACCELERATIONS, Bend, DIRECTIONS, LandingInterval};
-use super::{Drag, INPUTS, Nose, Push, Problem, State, Vector, dot, plus, times};
+use super::{Drag, INPUTS, Nose, Problem, Push, State, Vector, dot, plus, times};
 
 /// What an interval is computed from: nose, rates and air at their means.
 struct Middle<'a> {

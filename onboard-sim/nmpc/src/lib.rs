@@ -77,11 +77,7 @@ pub fn solve(
 }
 
 /// [`stages::Workspace::lagrangian`], compiled here as well.
-pub fn lagrangian(
-    workspace: &mut Workspace,
-    problem: &Problem,
-    solution: &Start<'_, STATES, INPUTS>,
-) -> f64 {
+pub fn lagrangian(workspace: &mut Workspace, problem: &Problem, solution: &Start<'_, STATES, INPUTS>) -> f64 {
     workspace.lagrangian(problem, solution)
 }
 

@@ -454,7 +454,8 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
-    /// `None` before the motor has lit, and where its scales are over another curve than the truth's. The accelerometer cannot tell more impulse from less mass.
+    /// `None` before the motor has lit, and where its scales are over another curve than the truth's. The accelerometer cannot
+    /// tell more impulse from less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {

@@ -28,7 +28,7 @@ pub(crate) struct CampaignArguments {
     #[command(subcommand)]
     command: Option<CampaignCommand>,
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
@@ -68,7 +68,7 @@ pub(crate) struct CampaignArguments {
 #[derive(Subcommand)]
 enum CampaignCommand {
     /// Map where a mission lands, over two quantities: one simulated flight for each cell.
-    #[command(after_help = "Example: onboard-sim campaign map --profile mk2 --svg mk2.svg")]
+    #[command(after_help = "Example: onboard-sim campaign map --svg mk3.svg")]
     Map(MapOfMission),
     /// Merge the parts of a campaign that was flown in shards.
     #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
@@ -153,7 +153,7 @@ fn program() -> anyhow::Result<String> {
 #[derive(Args)]
 struct MapOfMission {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
     /// Columns: QUANTITY=FROM:TO:COUNT.
     ///

@@ -53,7 +53,7 @@ fn log_choice(given: &str) -> Result<LogChoice, String> {
 )]
 pub(crate) struct FlyArguments {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once.

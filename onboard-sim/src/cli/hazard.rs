@@ -22,7 +22,7 @@ const SHOWN: u64 = 30;
 #[derive(Args)]
 pub(crate) struct HazardArguments {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     profile: String,
     /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
     #[arg(long, value_name = "START")]

@@ -227,7 +227,7 @@ fn named(name: &str, found: &[Found]) -> anyhow::Result<Candidate> {
 #[derive(Args)]
 struct Choices {
     /// Built-in mission or TOML file: airframe, guidance and limits. Its motor is replaced.
-    #[arg(long, default_value = "mk2", value_name = "NAME|FILE")]
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
     mission: String,
     /// Motors: an .eng or .rse file, a folder of them, or the .json of the npm package thrustcurve-db; may be repeated. The
     /// built-in motors if not given.

@@ -39,8 +39,12 @@ pub const PLOTS: [Plot; 11] = [
     plot("Thrust, N", TRUTH, &[".thrust_n"]),
     plot("Time of a frame that plans, s", TIMING, &[".solve_time_s", ".deadline_s"]),
     plot("Altitude, m (telemetry)", TELEMETRY, &[".altitude_m"]),
-    plot("Pitch, rad (telemetry)", TELEMETRY, &[".pitch_rad"]),
-    plot("Gimbal, rad (telemetry)", TELEMETRY, &[".gimbal_commanded_rad", ".gimbal_measured_rad"]),
+    plot("Tilt, rad (telemetry)", TELEMETRY, &[".tilt_rad"]),
+    plot(
+        "Gimbal in pitch, rad (telemetry)",
+        TELEMETRY,
+        &[".gimbal_commanded_rad[0]", ".gimbal_measured_rad[0]"],
+    ),
 ];
 
 impl Plot {

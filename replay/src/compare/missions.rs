@@ -1,6 +1,6 @@
 //! Compares missions: every setting that only one of two has, or that has another value, with the airframe's.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -41,41 +41,41 @@ pub(super) fn is_mission(path: &Path) -> bool {
 /// # Errors
 /// One cannot be read, or is no TOML.
 pub(super) fn compare_missions(baseline: &Path, others: &[&Path]) -> Result<Vec<MissionComparison>> {
-    let read = |path: &Path| -> Result<(String, BTreeMap<String, String>)> {
+    let read = |path: &Path| -> Result<(String, String)> {
         ensure!(is_mission(path), "{}: is no mission, and the other one is", path.display());
         let name = path.display().to_string();
-        let settings = values(&text_of(&name, BUILTIN, "mission")?, &name)?;
-        Ok((name, settings))
+        let text = text_of(&name, BUILTIN, "mission")?;
+        Ok((name, text))
     };
-    let (baseline, wanted) = read(baseline)?;
-    let compared = others.iter().map(|other| {
-        let (other, found) = read(other)?;
-        let keys: std::collections::BTreeSet<&String> = wanted.keys().chain(found.keys()).collect();
-        let differs = |setting: &&String| wanted.get(*setting) != found.get(*setting);
-        let differences: Vec<SettingDifference> = keys
-            .iter()
-            .copied()
-            .filter(differs)
-            .map(|setting| SettingDifference {
-                setting: setting.clone(),
-                baseline: wanted.get(setting).cloned(),
-                other: found.get(setting).cloned(),
-            })
-            .collect();
-        Ok(MissionComparison {
-            baseline: baseline.clone(),
-            other,
-            same: keys.len() - differences.len(),
-            differences,
-        })
-    });
-    compared.collect()
+    let baseline = read(baseline)?;
+    others.iter().map(|other| Ok(compared(baseline.clone(), read(other)?)?)).collect()
 }
 
-/// The settings of a mission by their names, as text.
-fn values(text: &str, origin: &str) -> Result<BTreeMap<String, String>, SettingError> {
-    let settings = settings_of_mission(text, origin)?;
-    Ok(settings.into_iter().map(|setting| (setting.path, setting.value.to_string())).collect())
+/// Compares two missions, each a name and its text.
+///
+/// # Errors
+/// A text is no TOML.
+pub(crate) fn compared(
+    (baseline, wanted): (String, String),
+    (other, found): (String, String),
+) -> Result<MissionComparison, SettingError> {
+    let values = |text: &str, origin: &str| -> Result<BTreeMap<String, String>, SettingError> {
+        let settings = settings_of_mission(text, origin)?;
+        Ok(settings.into_iter().map(|setting| (setting.path, setting.value.to_string())).collect())
+    };
+    let (wanted, found) = (values(&wanted, &baseline)?, values(&found, &other)?);
+    let keys: BTreeSet<&String> = wanted.keys().chain(found.keys()).collect();
+    let of = |setting: &String| SettingDifference {
+        setting: setting.clone(),
+        baseline: wanted.get(setting).cloned(),
+        other: found.get(setting).cloned(),
+    };
+    let differences: Vec<SettingDifference> = keys
+        .iter()
+        .map(|setting| of(setting))
+        .filter(|difference| difference.baseline != difference.other)
+        .collect();
+    Ok(MissionComparison { same: keys.len() - differences.len(), baseline, other, differences })
 }
 
 /// Writes the settings that differ as text.

@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
+pub(crate) use missions::compared;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission, print_missions};
 pub use print::print_compare;

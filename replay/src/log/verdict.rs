@@ -1,8 +1,9 @@
 //! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
 
-use flight::rules::verdict::{FlightEnding, Landing, UNDER_PARACHUTE};
+use flight::rules::verdict::{FlightEnding, Landing, LandingVerdict, Limits, Touchdown, UNDER_PARACHUTE};
+use flight_log::sortie::limits_to_log;
 use protocol::dialect::{
-    MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdLimit, TdPhase,
+    MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdPhase,
 };
 use protocol::frame::{Frame, Framer};
 use protocol::log::reader::LogChannel;
@@ -15,7 +16,6 @@ use super::{Clock, ClockTime, Entry, StampedEntry};
 
 /// A value of the verdict whose limit no message has given.
 const NOT_TOLD: f64 = f64::NAN;
-const DEGREES: f64 = 180.0 / core::f64::consts::PI;
 
 /// The landing verdict, as recorded or heard.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -157,34 +157,27 @@ impl Heard {
         let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
             self.limits.as_ref().map_or(NOT_TOLD, |limits| f64::from(limit(limits)))
         };
-        let rows = [
-            (
-                "vertical speed",
-                verdict.vertical_m_s,
-                told(|l| l.vertical_m_s),
-                TdLimit::TD_LIMIT_VERTICAL_SPEED,
-            ),
-            ("lateral speed", verdict.lateral_m_s, told(|l| l.lateral_m_s), TdLimit::TD_LIMIT_LATERAL_SPEED),
-            ("tilt", verdict.tilt_rad, told(|l| l.tilt_rad), TdLimit::TD_LIMIT_TILT),
-            ("rotation rate", verdict.rate_rad_s, told(|l| l.rate_rad_s), TdLimit::TD_LIMIT_RATE),
-        ];
-        let limits = rows.map(|(name, value, maximum, bit)| {
-            let (factor, unit) = match bit {
-                TdLimit::TD_LIMIT_TILT => (DEGREES, "deg"),
-                TdLimit::TD_LIMIT_RATE => (DEGREES, "deg/s"),
-                _ => (1.0, "m/s"),
-            };
-            let is_signed = bit == TdLimit::TD_LIMIT_VERTICAL_SPEED;
-            v1::LimitResult {
-                name: name.to_owned(),
-                value: factor * f64::from(value),
-                minimum: if is_signed { -maximum } else { 0.0 },
-                maximum: factor * maximum,
-                unit: unit.to_owned(),
-                passed: !verdict.limits_violated.contains(bit),
-            }
-        });
-        let broken = limits.iter().find(|limit| !limit.passed).map(|limit| limit.name.as_str());
+        let limits = Limits {
+            distance_m: f64::INFINITY,
+            height_m: f64::INFINITY,
+            vertical_m_s: told(|l| l.vertical_m_s),
+            lateral_m_s: told(|l| l.lateral_m_s),
+            tilt_rad: told(|l| l.tilt_rad),
+            rate_rad_s: told(|l| l.rate_rad_s),
+        };
+        let at = Touchdown {
+            distance_m: verdict.distance_m.into(),
+            height_m: 0.0,
+            vertical_m_s: verdict.vertical_m_s.into(),
+            lateral_m_s: verdict.lateral_m_s.into(),
+            tilt_rad: verdict.tilt_rad.into(),
+            rate_rad_s: verdict.rate_rad_s.into(),
+        };
+        let mut envelope = LandingVerdict::judge(&limits, &at);
+        for (place, limit) in envelope.results.iter_mut().enumerate() {
+            limit.passed = verdict.limits_violated.bits() & (1 << place) == 0;
+        }
+        let broken = envelope.failures().next().map(|limit| limit.name);
         let landing = v1::Landing {
             stands: verdict.landing.contains(TdLanding::TD_LANDING_STANDS),
             upright: verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT),
@@ -200,7 +193,7 @@ impl Heard {
             time_s: f64::from(verdict.contact_ms) / 1e3,
             ending: Some(ending.to_string()),
             landing,
-            envelope: limits.into(),
+            envelope: limits_to_log(&envelope),
             ..v1::LandingVerdict::default()
         })
     }

@@ -41,6 +41,7 @@ use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
+use crate::worst_plans::BrokenPlan;
 
 /// Where to begin.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -163,6 +164,8 @@ pub struct ReflyReport {
     /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
     /// it, negative outside. `None` without a contact.
     pub margin: Option<f64>,
+    /// The plans of the landing burn that break their conditions most.
+    pub worst_plans: Vec<BrokenPlan>,
     /// Frames that the controller ran.
     pub frames: usize,
     /// Of these, how many have a recorded frame of the same number.
@@ -252,6 +255,7 @@ pub fn refly_flight(
         recorded,
         margin: reflown.as_ref().map(margin),
         reflown,
+        worst_plans: rerun.worst_plans(),
         frames: rerun.frames().filter(|frame| frame.input.frame >= first_frame).count(),
         commands_recorded: 0,
         commands_identical: 0,
@@ -526,6 +530,9 @@ pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<
     };
     let margin = report.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
     writeln!(output, "{answer}; margin to the nearest limit {margin}")?;
+    for plan in &report.worst_plans {
+        writeln!(output, "worst plan: {}", shown(&plan.words()))?;
+    }
     writeln!(
         output,
         "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",

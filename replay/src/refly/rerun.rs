@@ -1,6 +1,9 @@
 //! A recorded flight, flown again frame by frame from the facts in its log.
 
-use flight::computer::FRAME_S;
+use std::time::Duration;
+
+use flight::computer::pilot::FRAMES_PER_PLAN;
+use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::vehicle::mission::Mission;
 use flight_log::frame::accepts_abort;
 use flight_log::logged::{state_from_log, vector_from_log};
@@ -8,7 +11,7 @@ use flight_log::sortie::{self as sortie_log, LastFrame};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
 use sim::fault::{Breakage, FaultError, TimedFault};
-use sim::outside::Outside;
+use sim::outside::{Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
@@ -16,6 +19,7 @@ use super::{FaultChanges, ReflyError};
 use crate::controller::LoggedComputer;
 use crate::log::Recording;
 use crate::settings::Schedule;
+use crate::worst_plans::{BrokenPlan, worst};
 
 /// Stands for every recorded fault.
 const EVERY_FAULT: &str = "all";
@@ -29,9 +33,33 @@ pub(super) struct Rerun {
     pub(super) schedule: Option<Schedule<Mission>>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
-    last: LastFrame,
+    seen: Seen,
     /// With vehicle times, s.
     pub(super) records: Vec<(f64, Record)>,
+}
+
+/// What is looked at while it flies.
+#[derive(Default)]
+struct Seen {
+    last: LastFrame,
+    /// Added to a frame's number for its number in the log.
+    release_frame: u64,
+    /// The computer before a frame that may plan a landing.
+    before: Option<Computer>,
+    broken: Vec<BrokenPlan>,
+}
+
+impl Watch for Seen {
+    fn now(&mut self) -> Duration {
+        self.last.now()
+    }
+
+    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
+        self.last.decided(input, output, computer);
+        let solved = self.before.take().and_then(|mut before| before.step_inspected(input).1);
+        let frame = self.release_frame + input.frame;
+        self.broken.extend(solved.and_then(|solved| BrokenPlan::of(frame, input.time_s, &solved)));
+    }
 }
 
 impl Rerun {
@@ -83,7 +111,8 @@ impl Rerun {
         let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie_log::start(&flight);
         let start = ComputerStart { believed, gyro_bias_rad_s, ..*start };
         let records = vec![(0.0, Record::ComputerStart(Box::new(start)))];
-        Ok(Self { recipe, number, flight, schedule: None, aborts, last: LastFrame::default(), records })
+        let seen = Seen { release_frame: recording.release_frame, ..Seen::default() };
+        Ok(Self { recipe, number, flight, schedule: None, aborts, seen, records })
     }
 
     /// Flies up to a frame, or to the end.
@@ -103,10 +132,17 @@ impl Rerun {
         if self.aborts.binary_search(&number).is_ok() {
             self.flight.abort();
         }
-        self.flight.step_with(&Outside::NOBODY, &mut self.last);
-        let records = sortie_log::frame_and_phase(&self.flight, &mut self.last, phase);
+        let plans = number.is_multiple_of(FRAMES_PER_PLAN) && phase.in_landing_burn();
+        self.seen.before = plans.then(|| self.flight.computer().clone());
+        self.flight.step_with(&Outside::NOBODY, &mut self.seen);
+        let records = sortie_log::frame_and_phase(&self.flight, &mut self.seen.last, phase);
         self.records.extend(records.into_iter().map(|record| (time_s, record)));
         self.flight.goes_on()
+    }
+
+    /// The plans that break their conditions, the worst.
+    pub(super) fn worst_plans(&mut self) -> Vec<BrokenPlan> {
+        worst(std::mem::take(&mut self.seen.broken))
     }
 
     /// Its frames beside the recorded ones of the same numbers; a log may have lost some.

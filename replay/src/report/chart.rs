@@ -36,6 +36,7 @@ const THEME: [(&str, &str); 14] = [
 ];
 
 /// A line of a chart.
+#[derive(Clone)]
 pub(super) struct Line {
     /// Its name in the legend; empty for none.
     pub(super) name: &'static str,
@@ -44,7 +45,7 @@ pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
 }
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Chart {
     pub(super) title: String,
     pub(super) x_label: &'static str,

@@ -1,8 +1,7 @@
 //! Writes a flight as one HTML page with its pictures inside, without scripts and without network access.
 //!
-//! The verdict comes first, each value against its limit; then what led to it: phases, path, states, input, tracking,
-//! saturation, solver, predictions, thrust, estimator, link, and how complete the log is. If the log lacks something,
-//! the section says so. A flight is shown in the plane of its landing.
+//! The verdict comes first, each value against its limit; then what led to it: path, states, input, thrust, plans, actuators,
+//! estimator, moments, events, link, and how complete the log is. If the log lacks something, the section says so.
 
 mod chart;
 mod html;
@@ -15,7 +14,6 @@ use anyhow::{Result, bail};
 use track::Flight;
 
 use crate::cli::{Outcome, answer};
-use crate::findings;
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
 use crate::output::{Destination, Overwrite, same_file, write_whole};
@@ -58,9 +56,7 @@ pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let mut info = described(path)?;
-    let (flight, watched) = Flight::of(recording);
-    info.findings = watched.map(|found| findings::facts(&flight.recording, info.verdict.as_ref(), &found));
-    Ok((flight.with(&info), info))
+    Ok((Flight::of(recording, &mut info), info))
 }
 
 #[derive(Debug, clap::Args)]

@@ -179,7 +179,7 @@ fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>,
 }
 
 /// Whether a landing is planned in a frame.
-fn plans(frame: &ComputerFrame) -> bool {
+pub(crate) fn plans(frame: &ComputerFrame) -> bool {
     let idle = u32::from(ControlLevel::Idle.index());
     frame.input.frame.is_multiple_of(FRAMES_PER_PLAN) && frame.output.level != idle
 }
@@ -201,10 +201,8 @@ pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, Explai
 pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, ExplainError> {
     let explained = inspected(recording, None)?;
     let progress = Stopwatch::start();
-    let one = |frame: &Explained| FrameReport {
-        judged: frame.solved.as_ref().map(judged),
-        ..frame.report.clone()
-    };
+    let one =
+        |frame: &Explained| FrameReport { judged: frame.solved.as_ref().map(judged), ..frame.report.clone() };
     Ok(in_parallel(&explained, one, &|done| progress.show(done, explained.len(), "plans")))
 }
 
@@ -355,7 +353,11 @@ fn print_all(file: &str, reports: &[FrameReport], output: &mut impl Write) -> io
         count(&|judged| judged.flown_dearer > SAME_SHARE),
         count(&|judged| judged.flown_dearer < -SAME_SHARE),
     )?;
-    writeln!(output, "{:>8} {:>8} {:<14} {:>10} {:>9} {:>9}  broken", "frame", "T+, s", "level", "merit", "dearer", "first")?;
+    writeln!(
+        output,
+        "{:>8} {:>8} {:<14} {:>10} {:>9} {:>9}  broken",
+        "frame", "T+, s", "level", "merit", "dearer", "first"
+    )?;
     for (report, judged) in judged {
         let flown = &judged.flown;
         writeln!(
@@ -378,10 +380,13 @@ pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Outcome> {
     warn_of_what_is_missing(&recording);
     if frame == "all" {
         let reports = explain_all(&recording)?;
-        answer(|output| if json { print_json(&reports, output) } else { print_all(&recording.name, &reports, output) })?;
+        answer(|output| {
+            if json { print_json(&reports, output) } else { print_all(&recording.name, &reports, output) }
+        })?;
         return Ok(Outcome::Given);
     }
-    let number = frame.parse().with_context(|| format!("--explain {frame}: neither a frame's number nor `all`"))?;
+    let number =
+        frame.parse().with_context(|| format!("--explain {frame}: neither a frame's number nor `all`"))?;
     let report = explain(&recording, number)?;
     answer(|output| if json { print_json(&report, output) } else { print_explained(&report, output) })?;
     Ok(Outcome::Given)

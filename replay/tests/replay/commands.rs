@@ -103,12 +103,12 @@ fn a_frame_is_shown_and_a_missing_frame_exits_2() {
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
     assert_eq!(code, 0);
     for part in [
+        "the judge agrees",
         "identical bit for bit",
-        "warm     converged",
-        "cold     converged",
-        "clarabel converged",
-        "active   z_m = 0",
-        "path     +0.0 s",
+        "flown    converged",
+        "judge    converged",
+        "cold     ",
+        "path     +0.00 s",
     ] {
         assert!(stdout.contains(part), "{part} is not in\n{stdout}");
     }
@@ -119,10 +119,10 @@ fn a_frame_is_shown_and_a_missing_frame_exits_2() {
     assert!(code == 2 && stderr.contains("no frame 300000"), "{stderr}");
 }
 
-/// The reference solver and its Clarabel share only the equations of motion with the solver that flies. They find the plan
-/// that flew, if its solve converged, or settle on a dearer branch.
+/// The judge shares no function with the solver that flies. It finds the plan that flew, if its solve converged, or one that costs
+/// at most a per cent less.
 #[test]
-fn val_clarabel_finds_no_better_plan_than_the_one_that_flew() {
+fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
     let recording = MK2.recording();
     let (_, frames) = recording.replayable_frames().unwrap();
     let in_burn = |frame: &&ComputerFrame| {
@@ -137,14 +137,15 @@ fn val_clarabel_finds_no_better_plan_than_the_one_that_flew() {
             .unwrap()
             .judged
             .unwrap();
-        assert!(judged.flown_dearer < 1e-6, "{frame}: {judged:?}");
-        if judged.flown_dearer > -1e-6 {
+        assert!(judged.flown_dearer < 0.01, "{frame}: {judged:?}");
+        if judged.flown_dearer.abs() < 1e-4 {
             same += 1;
-            assert!(judged.first_input_rad < 1e-4, "{frame}: {judged:?}");
-            assert!(judged.touchdown_m < 1e-3 && judged.touchdown_m_s < 1e-3, "{frame}: {judged:?}");
+            assert!(judged.first_input_deg < 0.1, "{frame}: {judged:?}");
+            let [ours, theirs] = [&judged.flown, &judged.judge].map(|plan| plan.touchdown_m);
+            assert!(libm::hypot(ours[0] - theirs[0], ours[1] - theirs[1]) < 0.05, "{frame}: {judged:?}");
         }
     }
-    assert!(same >= 3, "{same} of 5 plans are the reference's");
+    assert!(same >= 3, "{same} of 5 plans are the judge's");
 }
 
 /// Exports to every format and imports again.

@@ -1,7 +1,10 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
 use flight::vehicle::mission::StartPoint;
+use replay::log::Recording;
+use replay::refly::{ReflyOptions, print_refly, refly};
 use replay::report::{report, report_with};
+use replay::verify::explain::explain;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{self, LANDED};
@@ -27,31 +30,40 @@ fn check(page: &str) {
     }
 }
 
-/// A flight is shown in the plane of its landing; the flight computer is run again to get its plans.
+/// A flight is shown in space; the flight computer is run again to get its plans.
 #[test]
 fn the_report_says_the_verdict_first_and_then_why() {
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log] {
         says_the_verdict_first_and_then_why(&report(log).unwrap().html);
     }
+    let recipe = sim::recipe::Recipe::built_in("mk3", "none").unwrap();
+    says_the_verdict_first_and_then_why(&report(&from_apogee::fly_recipe(&recipe).log).unwrap().html);
 }
 
 fn says_the_verdict_first_and_then_why(page: &str) {
     check(page);
     let order = [
         "STANDS UNDAMAGED",
-        "Worst of the limits: ",
+        "Worst of the legs' limits: ",
         "Touchdown at T+",
         "Findings, first in time",
-        "by what its legs bear",
-        "by the landing paper's Table 2",
+        "<th>inside the design envelope of its legs</th>",
+        "<summary>inside Table 2</summary>",
         "Height over the whole flight, m",
         "Seen from above: ground track",
-        "Path of the landing in its plane",
+        "The landing: height over the distance from the pad",
+        "The landing from above",
+        "level speed, m/s",
+        "rotation rate, deg/s",
         "Gimbal pitch, deg",
         "Gimbal yaw, deg",
         "inferred impulse at the end, of expected",
         "Thrust, N",
-        "x at touchdown, m",
+        "north at touchdown, m",
+        "iterations.</p>",
+        "Newton iterations of each plan",
+        "predicted ahead",
+        "gimbal yaw at its stop of ",
         "Wind towards north, m/s",
         "Roll rate, deg/s",
         "Test ratio of each measurement",
@@ -59,10 +71,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
         "estimate less truth",
         "Battery, V",
         "Specific force along the nose",
-        "Tracking error by phase</h2>",
-        "gimbal yaw at its stop of 7.0 deg",
-        "Newton iterations of each plan",
-        "ignition delay",
+        "thrust confirmed on board",
         "thrust fell through weight",
         "Events</h2>",
         "Mission against the built-in one</h2>",
@@ -72,6 +81,7 @@ fn says_the_verdict_first_and_then_why(page: &str) {
     let places: Vec<usize> =
         order.iter().map(|words| page.find(words).unwrap_or_else(|| panic!("{words}"))).collect();
     assert!(places.is_sorted(), "{places:?}");
+    assert!(!page.contains("in its plane") && !page.contains("the plane of"));
     assert!(page.contains("\nplanned\n") && page.contains("prefers-color-scheme: dark"));
     assert!(page.matches("<svg").count() > 15);
 }
@@ -139,13 +149,17 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
         assert!(whole.contains(part), "{part}");
     }
     assert_eq!(whole.matches("<svg").count(), 2);
-    assert_eq!(whole.matches("<circle").count(), 2 * moments.len());
+    assert_eq!(
+        whole.matches("<circle").count(),
+        2 * moments.len(),
+        "the thrust's moments are in the table only"
+    );
 }
 
 /// The estimate is compared with the truth in every direction, up to contact and not after it.
 #[test]
 fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
-    let recording = replay::log::Recording::open(&LANDED.log).unwrap();
+    let recording = Recording::open(&LANDED.log).unwrap();
     let page = report(&LANDED.log).unwrap().html;
     let section = page.split("Estimator error</h2>").nth(1).unwrap().split("<h2").next().unwrap();
     for row in
@@ -169,7 +183,7 @@ fn a_report_with_another_log_draws_both_flights() {
     let page = report_with(&MK2.log, &DISPERSED.log).unwrap().html;
     check(&page);
     let both = page.split("<h2").find(|section| section.contains(">Two flights</h2>")).unwrap();
-    for words in ["Both paths of the landing", "altitude of both, m", "commanded, deg", "STANDS UNDAMAGED"] {
+    for words in ["The landing from above", "Both: height, m", "Both: Gimbal yaw, deg", "STANDS UNDAMAGED"] {
         assert!(both.contains(words), "{words} is not in {both}");
     }
     for figure in both.split("<figure").skip(1) {
@@ -193,4 +207,25 @@ fn the_report_of_a_broken_flight_names_its_cause_first() {
     assert!(page.contains("Simulated: flown again without gimbal-jams:4@powered: STANDS UNDAMAGED"));
     // In every picture of the burn the finding stands where it began.
     assert!(page.matches("class=\"limit\"").count() > 10);
+}
+
+/// Report and a flight flown again name the same plans, and what is said of one when it is explained is the same.
+#[test]
+fn the_worst_plans_are_named_alike() {
+    let recording = Recording::open(&DISPERSED.log).unwrap();
+    let flown = refly(&recording, &ReflyOptions::default()).unwrap();
+    let worst = &flown.worst_plans;
+    assert!((1..=3).contains(&worst.len()) && worst.is_sorted_by(|a, b| a.price >= b.price), "{worst:?}");
+    let mut text = Vec::new();
+    print_refly(&flown, &mut text).unwrap();
+    let (text, page) = (String::from_utf8(text).unwrap(), report(&DISPERSED.log).unwrap().html);
+    for plan in worst {
+        let words = format!("frame {} (T+{:.2} s): {} at node", plan.frame, plan.time_s, plan.condition);
+        assert!(page.contains(&format!("Worst: {words}")), "{words}");
+        assert!(text.contains(&format!("worst plan: {words}")), "{text}");
+    }
+    let judged = explain(&recording, worst[0].frame).unwrap().judged.unwrap().flown;
+    let condition = format!("{} at node {}", worst[0].condition, worst[0].node);
+    assert_eq!(judged.broken_condition, Some(condition));
+    assert!((judged.merit - judged.cost - worst[0].price).abs() < 1e-9, "{judged:?}");
 }

@@ -10,6 +10,7 @@ use super::source::{Candidate, Found, Unusable};
 use crate::row::Row;
 use crate::run::in_parallel;
 use crate::statistics::Landings;
+use crate::summary::failures;
 use crate::tally;
 
 /// What to look for.
@@ -200,20 +201,11 @@ pub fn fly(recipes: &[&Recipe], flights: u64, done: &(dyn Fn(usize) + Sync)) -> 
 impl Flown {
     /// What rows of a set of dispersions come to.
     fn of(set: &str, rows: &[Row]) -> Self {
-        let mut failures: Vec<(String, u64)> = Vec::new();
-        for row in rows.iter().filter(|row| !row.stands) {
-            let reason = if row.failure.is_empty() { "did not land" } else { &row.failure };
-            match failures.iter_mut().find(|(known, _)| known == reason) {
-                Some((_, count)) => *count += 1,
-                None => failures.push((reason.to_owned(), 1)),
-            }
-        }
-        // Among equally frequent ones the first flown.
-        let failure = failures.into_iter().reduce(|most, next| if next.1 > most.1 { next } else { most });
+        let most = failures(rows).into_iter().next();
         Self {
             set: set.to_owned(),
             landings: Landings::of(rows.iter().map(Row::landing)),
-            failure,
+            failure: most.map(|failure| (failure.reason, failure.flights)),
             solver_iterations: rows.iter().map(|row| row.solver_iterations).sum(),
         }
     }

@@ -217,12 +217,6 @@ impl Landing {
     }
 }
 
-impl From<[bool; 4]> for Landing {
-    fn from([stands, upright, envelope, table_2]: [bool; 4]) -> Self {
-        Self { stands, upright, envelope, table_2 }
-    }
-}
-
 /// How a flight that touched the ground ended; it is displayed as one sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlightEnding<'a> {
@@ -246,7 +240,7 @@ impl fmt::Display for FlightEnding<'_> {
         match failure {
             _ if stands => out.write_str("STANDS UNDAMAGED")?,
             UNDER_PARACHUTE => return out.write_str("DOWN UNDER THE PARACHUTE, not landed"),
-            _ if upright => write!(out, "UPRIGHT, taken as damaged: {failure}")?,
+            _ if upright => write!(out, "UPRIGHT, damaged: {failure}")?,
             _ => return write!(out, "NOT LANDED: {failure}"),
         }
         let side = |is_inside| if is_inside { "inside" } else { "outside" };
@@ -322,8 +316,9 @@ mod tests {
 
     #[test]
     fn an_ending_says_whether_legs_were_inside_their_envelope() {
-        let said = |flags, failure| {
-            FlightEnding { aborted: false, landing: Landing::from(flags), failure }.to_string()
+        let said = |[stands, upright, envelope, table_2]: [bool; 4], failure| {
+            let landing = Landing { stands, upright, envelope, table_2 };
+            FlightEnding { aborted: false, landing, failure }.to_string()
         };
         assert_eq!(
             said([true, true, false, false], None),
@@ -331,7 +326,7 @@ mod tests {
         );
         assert_eq!(
             said([false, true, true, false], Some("leg overloaded")),
-            "UPRIGHT, taken as damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
+            "UPRIGHT, damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
         );
         assert_eq!(said([false, false, true, true], Some("tipped over")), "NOT LANDED: tipped over");
         let under = FlightEnding { aborted: true, failure: Some(UNDER_PARACHUTE), ..FlightEnding::default() };

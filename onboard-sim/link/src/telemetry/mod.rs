@@ -67,7 +67,7 @@ pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) ->
         TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state)),
         TD_DESCENT_DATA::ID => motion::descent(state),
         ESTIMATOR_STATUS_DATA::ID => motion::estimator(state),
-        HIGHRES_IMU_DATA::ID => motion::imu(state),
+        HIGHRES_IMU_DATA::ID => Some(motion::imu(state)),
         BATTERY_STATUS_DATA::ID => Some(battery(state)),
         STORAGE_INFORMATION_DATA::ID => storage(state),
         ATTITUDE_DATA::ID => Some(motion::attitude(state)),

@@ -123,9 +123,10 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let [north_m_s, east_m_s, _] = motion.velocity_m_s;
     let (lat, lon) = degrees_e7(state, north_m, east_m);
     let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
-    let fix_type = match state.computer.sensors().gnss_speaks() {
-        true => GpsFixType::GPS_FIX_TYPE_3D_FIX,
-        false => GpsFixType::GPS_FIX_TYPE_NO_FIX,
+    let fix_type = if state.computer.sensors().gnss_speaks() {
+        GpsFixType::GPS_FIX_TYPE_3D_FIX
+    } else {
+        GpsFixType::GPS_FIX_TYPE_NO_FIX
     };
     let unknown = GPS_RAW_INT_DATA {
         time_usec: (1e6 * state.time_s) as u64,
@@ -271,7 +272,7 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
 }
 
 /// There is no magnetometer and no thermometer: their fields are not marked as updated.
-pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn imu(state: &VehicleState<'_>) -> MavMessage {
     use HighresImuUpdatedFlags as U;
     let imu = state.input().measured.imu;
     let pressure_altitude_m = state.computer.sensors().pressure_altitude_m();
@@ -284,7 +285,7 @@ pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
     fields_updated.set(U::HIGHRES_IMU_UPDATED_PRESSURE_ALT, pressure_altitude_m.is_some());
     let [xacc, yacc, zacc] = <[f64; 3]>::from(imu.specific_force_m_s2).map(|force| force as f32);
     let [xgyro, ygyro, zgyro] = <[f64; 3]>::from(imu.gyro_rad_s).map(|rate| rate as f32);
-    Some(MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
+    MavMessage::HIGHRES_IMU(HIGHRES_IMU_DATA {
         time_usec: (1e6 * state.time_s) as u64,
         xacc,
         yacc,
@@ -295,7 +296,7 @@ pub(super) fn imu(state: &VehicleState<'_>) -> Option<MavMessage> {
         pressure_alt: pressure_altitude_m.unwrap_or(f64::NAN) as f32,
         fields_updated,
         ..HIGHRES_IMU_DATA::default()
-    }))
+    })
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use flight::computer::FRAME_S;
 use flight::computer::news::Severity;
 use flight::rules::phase::Phase;
 pub use flight::vehicle::mission::StartPoint;
+pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;

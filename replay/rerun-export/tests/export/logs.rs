@@ -52,7 +52,9 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
         passed: true,
     };
     let time_s = FRAMES as f64 * FRAME_S;
-    let verdict = v1::LandingVerdict { time_s, landed: true, limits: vec![limit], ..Default::default() };
+    let landing = v1::Landing { stands: true, upright: true, envelope: true, table_2: true };
+    let (envelope, table_2) = (vec![limit.clone()], vec![limit]);
+    let verdict = v1::LandingVerdict { time_s, landing, envelope, table_2, ..Default::default() };
     log.write(&Record::LandingVerdict(Box::new(verdict)), nanoseconds(time_s)).unwrap();
     log.finish().unwrap();
 }
@@ -140,7 +142,7 @@ pub(crate) fn write_telemetry_log(path: &Path) {
             phase: Some(u32::from(Phase::Powered.index())),
             // No pose has been received in the first second.
             altitude_m: (second > 0).then_some(15.0),
-            pitch_rad: Some(std::f64::consts::FRAC_PI_2),
+            tilt_rad: Some(0.0),
             control_level: Some(u32::from(ControlLevel::Converged.index())),
             ..v1::Telemetry::default()
         };

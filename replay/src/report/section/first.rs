@@ -2,24 +2,26 @@
 
 use flight::rules::verdict::Landing;
 
-use crate::findings::over;
+use crate::findings::{FindingFacts, over};
 use crate::info::{Info, rounded};
 use crate::log::{VerdictFacts, VerdictLimit};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
-use crate::report::chart::{Chart, Line};
-use crate::report::html::{escaped, paragraph, put, table_of_limits};
+use crate::report::chart::Chart;
+use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
-use super::motion;
+use super::whole::{FROM_ABOVE, view};
 
-pub(super) fn html(flight: &Flight, info: &Info) -> String {
+pub(super) fn html(flight: &Flight, info: &Info, pictures: &[(&str, Chart)]) -> String {
     let mut html = verdict(info);
     html += "<div class=\"first\">\n<div>\n";
     html += &findings(flight, info);
     html += &limits(info);
     html += "</div>\n<div class=\"charts\">\n";
-    html += &height(flight);
-    html += &motion::from_above(flight);
+    for (_, chart) in pictures.iter().filter(|(section, _)| *section == "first") {
+        html += &Chart { spans: flight.spans.clone(), marks: Vec::new(), ..chart.clone() }.svg();
+    }
+    html += &view(flight, FROM_ABOVE, true);
     html += "</div>\n</div>\n";
     html + &paragraph(
         "Backgrounds are phases; red numbers are the findings, where they begin. Drag in a picture to see a part of the \
@@ -37,62 +39,41 @@ fn verdict(info: &Info) -> String {
         Some(_) | None => "",
     };
     let mut html = format!("<p class=\"verdict{class}\">{}</p>\n", escaped(ending));
-    let mut words = Vec::new();
-    if let Some(verdict) = &info.verdict {
-        let sorted = worst_first(verdict.of_the_legs());
-        let broken = sorted.iter().filter(|(limit, _)| !limit.passed).count();
-        if let Some((worst, share)) = sorted.first().filter(|(_, share)| share.is_finite()) {
-            let far =
-                if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
-            let all = sorted.len();
-            words.push(format!(
-                "Worst of the legs' limits: {} {:.2} {}, {far}; {broken} of {all} broken.",
-                worst.name,
-                worst.value.abs(),
-                worst.unit
-            ));
-        }
-        words.push(format!("Touchdown at {}.", info.clocks.words(verdict.contact())));
-    } else {
-        words.push(
-            "The vehicle did not touch down while it was recorded, or its verdict was not recorded."
-                .to_owned(),
-        );
-    }
     if let Some(first) = info.findings.iter().flatten().next() {
-        words.insert(0, format!("First sign: {}, at T+{:.2} s.", first.words, first.since_s));
+        html += &paragraph(&format!("First sign: {}, at T+{:.2} s.", first.words, first.since_s));
     }
-    for words in words {
-        html += &paragraph(&words);
+    let Some(verdict) = &info.verdict else {
+        let none = "The vehicle did not touch down while it was recorded, or its verdict was not recorded.";
+        return html + &paragraph(none);
+    };
+    let sorted = worst_first(verdict.of_the_legs());
+    let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
+    if let Some((worst, share)) = sorted.first().filter(|(_, share)| share.is_finite()) {
+        let far = if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
+        let VerdictLimit { name, value, unit, .. } = worst;
+        let value = value.abs();
+        html += &paragraph(&format!(
+            "Worst of the limits: {name} {value:.2} {unit}, {far}; {broken} of {all} broken."
+        ));
     }
-    html
+    html + &paragraph(&format!("Touchdown at {}.", info.clocks.words(verdict.contact())))
 }
 
 fn findings(flight: &Flight, info: &Info) -> String {
     let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
-        return html
-            + &paragraph(
-                "Nothing was looked for: the log has no frames, or this build does not make their decisions again.",
-            );
+        let none = "Nothing was looked for: the log has no frames, or this build does not make their decisions again.";
+        return html + &paragraph(none);
     };
     if findings.is_empty() {
         html += &paragraph(info.no_findings());
     }
-    html += "<ol class=\"findings\">\n";
-    for finding in findings {
-        put(
-            &mut html,
-            format_args!(
-                "<li><b>T+{:.2} s</b> <a href=\"#{}\">{}</a></li>\n",
-                finding.since_s,
-                finding.section,
-                escaped(&finding.words)
-            ),
-        );
-    }
-    html += "</ol>\n";
-    html + &without_its_faults(flight)
+    let item = |finding: &FindingFacts| {
+        let FindingFacts { since_s, section, words, .. } = finding;
+        format!("<li><b>T+{since_s:.2} s</b> <a href=\"#{section}\">{}</a></li>\n", escaped(words))
+    };
+    let items: String = findings.iter().map(item).collect();
+    html + "<ol class=\"findings\">\n" + &items + "</ol>\n" + &without_its_faults(flight)
 }
 
 /// A simulated flight flown again with nothing broken in it.
@@ -139,7 +120,9 @@ fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    table_of_limits(&[title, "#value", "#limit", "share; the mark is the limit", ""], &rows)
+    let html = table(&[title, "#value", "#limit", "share; the mark is the limit", ""], &rows);
+    // On a narrow screen its pictures are left out.
+    html.replacen("class=\"wide\"", "class=\"wide limits\"", 1)
 }
 
 /// A value's share of its limit, up to half more than it.
@@ -158,23 +141,4 @@ fn bar(limit: &VerdictLimit, share: f64) -> String {
         px(share),
         px(1.0) - 1.0
     )
-}
-
-/// The whole flight: height over time, and what the barometer said.
-fn height(flight: &Flight) -> String {
-    let track = flight.track.iter().map(|sample| (flight.axis_s(sample.time_s), sample.state[1]));
-    let frames = flight.recording.frames.iter().filter_map(|frame| {
-        let height_m = frame.input.measured.pressure_altitude_m?;
-        Some((flight.axis_s(frame.input.time_s), height_m))
-    });
-    let lines = vec![
-        Line { name: "barometer", class: "thin", points: frames.collect() },
-        Line { name: "feet", class: "a", points: track.collect() },
-    ];
-    Chart {
-        spans: flight.spans.clone(),
-        marks: Vec::new(),
-        ..flight.over_time("Height over the whole flight, m", lines)
-    }
-    .svg()
 }

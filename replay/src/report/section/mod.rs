@@ -1,12 +1,13 @@
 //! The sections of a report, in the order they are read.
 
-mod control;
+mod burn;
+mod estimate;
 mod first;
-mod motion;
-mod outcome;
 pub(super) mod overlay;
-mod sensors;
+mod pictures;
+mod whole;
 
+use super::html::{charts, paragraph};
 use super::track::Flight;
 use crate::info::Info;
 
@@ -17,37 +18,36 @@ pub(super) struct Section {
     pub(super) html: String,
 }
 
-/// Every section.
+/// Every section: its words and tables, then its pictures.
 pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
-    let section = |id, title, html| Section { id, title, html };
-    let mut all = vec![
-        section("first", "", first::html(flight, info)),
-        section("burn", "Path, states and input", motion::motion(flight)),
-        section("thrust", "Thrust expected against inferred", control::thrust(flight)),
-        section("touchdown", "Predicted against actual touchdown", control::prediction(flight)),
+    let pictures = pictures::all(flight);
+    let text = Option::unwrap_or_default;
+    let sections = [
+        ("first", "", first::html(flight, info, &pictures)),
+        ("burn", "Path, states and input", burn::path(flight)),
+        ("thrust", "Thrust expected against inferred", burn::thrust(flight)),
+        ("touchdown", "Predicted against actual touchdown", String::new()),
+        ("solver", "Plans", text(burn::plans(flight))),
+        ("tracking", "Tracking error", text(burn::tracking(flight))),
+        ("saturation", "Gimbal and fin saturation", text(burn::saturation(flight))),
+        ("descent", "Wind, fins, roll and sensors", String::new()),
+        ("sensors", "Sensors and estimator", text(estimate::aids(flight))),
+        ("estimator", "Estimator error", text(estimate::errors(flight))),
+        ("battery", "Battery and vibration", String::new()),
+        ("whole", "The whole flight", whole::moments_and_views(flight)),
+        ("events", "Events", text(whole::events(flight))),
+        ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),
+        ("link", "Link", String::new()),
+        ("log", "Log", whole::described(info)),
     ];
-    if flight.in_space.is_some() {
-        all.push(section("descent", "Wind, fins, roll and sensors", motion::descent(flight)));
-    }
-    all.extend([
-        section("sensors", "Sensors and estimator", sensors::sensors(flight)),
-        section("estimator", "Estimator error", control::estimator(flight)),
-        section("battery", "Battery and vibration", sensors::battery_and_vibration(flight)),
-        section("tracking", "Tracking error by phase", control::tracking(flight)),
-        section("saturation", "Gimbal and fin saturation", control::saturation(flight)),
-        section("solver", "Solver", control::solver(flight, info)),
-    ]);
-    if flight.in_space.is_some() {
-        all.push(section("whole", "The whole flight", motion::whole_flight(flight)));
-    }
-    all.extend([
-        section("phases", "Phases", outcome::phases(flight, info)),
-        section("events", "Events", outcome::events(flight)),
-        section("mission", "Mission against the built-in one", sensors::mission(flight, info)),
-        section("link", "Link", outcome::link(flight)),
-        section("log", "Log", outcome::described(info)),
-    ]);
-    all
+    let section = |(id, title, words): (&'static str, &'static str, String)| {
+        let here = pictures.iter().filter(|(section, _)| *section == id && id != "first");
+        let drawn: Vec<String> = here.map(|(_, chart)| chart.svg()).collect();
+        let html = words + &charts(&drawn);
+        let html = if html.is_empty() { paragraph("The log has no records for this.") } else { html };
+        Section { id, title, html }
+    };
+    sections.into_iter().map(section).collect()
 }
 
 /// Root mean square and largest magnitude of some numbers; `None` without any.
@@ -61,14 +61,17 @@ fn rms_and_max(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     (count > 0).then(|| (libm::sqrt(squares / f64::from(count)), largest))
 }
 
-/// A column of the six state components: name, unit, and the factor to that unit.
-const COMPONENTS: [(&str, &str, f64); 6] = [
-    ("x", "m", 1.0),
-    ("altitude", "m", 1.0),
-    ("pitch", "deg", DEGREES),
-    ("u", "m/s", 1.0),
-    ("w", "m/s", 1.0),
-    ("pitch rate", "deg/s", DEGREES),
+/// The components of a state: name, unit, and the factor to that unit.
+const COMPONENTS: [(&str, &str, f64); 7] = [
+    ("north", "m", 1.0),
+    ("east", "m", 1.0),
+    ("height", "m", 1.0),
+    ("level speed", "m/s", 1.0),
+    ("vertical speed", "m/s", 1.0),
+    ("tilt", "deg", DEGREES),
+    ("rotation rate", "deg/s", DEGREES),
 ];
+/// Of [`COMPONENTS`] the height.
+const HEIGHT: usize = 2;
 
 const DEGREES: f64 = 180.0 / core::f64::consts::PI;

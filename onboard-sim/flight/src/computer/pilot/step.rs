@@ -378,7 +378,7 @@ impl Pilot {
     }
 
     /// Height of the feet, m.
-    pub(super) fn feet_height_m(&self, estimate: &Estimate) -> f64 {
+    pub fn feet_height_m(&self, estimate: &Estimate) -> f64 {
         estimate.state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0))
     }
 

@@ -295,9 +295,9 @@ impl PoweredGuidance {
         };
         let decay = self.settings.upright_decay_per_s;
         let flown = self.flown.as_ref().filter(|_| self.report.level != ControlLevel::Stabiliser);
-        if let Some(aim) =
-            flown.and_then(|plan| self.planned_aim(plan, time_s, state, |astray_m_s| level_m_s2(-decay * astray_m_s)))
-        {
+        if let Some(aim) = flown.and_then(|plan| {
+            self.planned_aim(plan, time_s, state, |astray_m_s| level_m_s2(-decay * astray_m_s))
+        }) {
             return aim;
         }
         // Upright, with a lean against the sideways velocity.
@@ -363,11 +363,7 @@ fn initial(state: &RigidState, feet_below_cg_m: f64) -> State {
 }
 
 /// The landing of a tick, except what follows from its final time.
-fn posed(
-    situation: &PoweredSituation<'_>,
-    settings: &PoweredSettings,
-    state: &RigidState,
-) -> Problem {
+fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &RigidState) -> Problem {
     let per_m = 0.5 * situation.air_density_kg_m3;
     let end = &settings.final_box;
     let initial = initial(state, situation.feet_below_cg_m);
@@ -421,7 +417,8 @@ fn stretch(
     problem.pushes.clear();
     problem.pushes.extend((0..intervals).map(|k| {
         let (from_s, to_s) = (k as f64 * step_s, (k + 1) as f64 * step_s);
-        let (thrust_n, mass_kg) = (situation.mean_thrust_n(from_s, to_s), situation.mean_mass_kg(from_s, to_s));
+        let (thrust_n, mass_kg) =
+            (situation.mean_thrust_n(from_s, to_s), situation.mean_mass_kg(from_s, to_s));
         Push {
             thrust_m_s2: thrust_n / mass_kg,
             turning_rad_s2: thrust_n * situation.arm_m / situation.inertia_kg_m2,

@@ -29,6 +29,9 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("vlr-f16", include_str!("../../../vehicles/missions/vlr-f16.toml")),
 ];
 
+/// The built-in mission that is flown if no other is asked for: the vehicle that a club should build.
+pub const DEFAULT: &str = "mk3";
+
 /// Why a mission cannot be flown.
 #[derive(Debug, thiserror::Error)]
 pub enum MissionError {

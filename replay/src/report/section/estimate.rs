@@ -1,0 +1,126 @@
+//! The estimate: what its sensors said, and how far it was from the truth; vibration.
+
+use flight::estimation::estimator::AidStatus;
+use flight::rules::phase::Phase;
+use flight_log::frame::phase_of;
+use flight_log::logged::state_from_log;
+use nalgebra::Vector3;
+use protocol::log::computer_v1::ComputerFrame;
+
+use super::rms_and_max;
+use crate::report::chart::{Chart, Line};
+use crate::report::html::{paragraph, table};
+use crate::report::track::{Flight, Part, Thought, named_aids};
+
+pub(super) fn aids(flight: &Flight) -> Option<String> {
+    let row =
+        |(name, aid): (&str, AidStatus)| vec![name.to_owned(), aid.used.to_string(), aid.refused.to_string()];
+    Some(table(&["measurement", "#used", "#refused"], &named_aids(flight.pilot.as_ref()?).map(row)))
+}
+
+/// The rows of the errors.
+const ERRORS: [&str; 9] = [
+    "position north, m",
+    "position east, m",
+    "position up, m",
+    "position, distance, m",
+    "velocity north, m/s",
+    "velocity east, m/s",
+    "velocity up, m/s",
+    "velocity, size, m/s",
+    "direction of the nose, deg",
+];
+
+pub(super) fn errors(flight: &Flight) -> Option<String> {
+    let errors: Vec<[f64; 9]> = flight.thoughts.iter().filter_map(|thought| error(flight, thought)).collect();
+    errors.first()?;
+    let row = |(place, name): (usize, &&str)| {
+        let (rms, max) = rms_and_max(errors.iter().map(|error| error[place]))?;
+        Some(vec![(*name).to_owned(), format!("{rms:.4}"), format!("{max:.4}")])
+    };
+    let rows: Vec<Vec<String>> = ERRORS.iter().enumerate().filter_map(row).collect();
+    let words = paragraph(&format!("At {} planning frames from the release to contact.", errors.len()));
+    Some(table(&["estimate less truth", "#root mean square", "#largest"], &rows) + &words)
+}
+
+/// Estimate less truth, as in [`ERRORS`]; `None` without a record of the world then.
+fn error(flight: &Flight, thought: &Thought) -> Option<[f64; 9]> {
+    let estimate = thought.estimate.filter(|_| flight.has(Part::Air, thought.time_s))?.state;
+    let truth = state_from_log(&flight.world_at(thought.time_s)?.state);
+    // East is against y.
+    let ground = |vector: Vector3<f64>| [vector.x, -vector.y, vector.z, libm::sqrt(vector.norm_squared())];
+    let [north, east, up, distance] = ground(estimate.position_m - truth.position_m);
+    let [north_m_s, east_m_s, up_m_s, size] = ground(estimate.velocity_m_s - truth.velocity_m_s);
+    let cosine = estimate.nose_in_world().dot(&truth.nose_in_world());
+    let nose_deg = libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees();
+    Some([north, east, up, distance, north_m_s, east_m_s, up_m_s, size, nose_deg])
+}
+
+/// Samples of one spectrum, 1.28 s at 200 Hz.
+const SEGMENT: usize = 256;
+
+/// What the inertial unit felt along the nose, over frequency.
+pub(super) fn vibration(flight: &Flight) -> Chart {
+    let line = |name, class, belongs: fn(Phase) -> bool| {
+        let frames = flight.recording.frames.iter();
+        let frames = frames.filter(|frame| phase_of(&frame.output).is_some_and(belongs));
+        let felt = |frame: &ComputerFrame| Some(frame.input.measured.imu.specific_force_m_s2.x);
+        Line { name, class, points: spectrum(&frames.filter_map(felt).collect::<Vec<f64>>()) }
+    };
+    Chart {
+        title: "Specific force along the nose, m/s^2 per sqrt(Hz)".to_owned(),
+        x_label: "Hz",
+        lines: vec![line("descent", "a", Phase::in_descent), line("burn", "b", Phase::in_landing_burn)],
+        own_x: true,
+        ..Chart::default()
+    }
+}
+
+/// Amplitude spectral density by Welch's method: half overlapping segments under a Hann window, without their means. Hz, and
+/// the samples' unit over sqrt(Hz). Short: a direct transform is fast enough for a flight.
+fn spectrum(samples: &[f64]) -> Vec<(f64, f64)> {
+    let rate_hz = 1.0 / flight::computer::FRAME_S;
+    let window: Vec<f64> = (0..SEGMENT)
+        .map(|k| 0.5 - 0.5 * libm::cos(core::f64::consts::TAU * k as f64 / SEGMENT as f64))
+        .collect();
+    let power: f64 = window.iter().map(|weight| weight * weight).sum();
+    let segments: Vec<&[f64]> = samples.windows(SEGMENT).step_by(SEGMENT / 2).collect();
+    if segments.is_empty() {
+        return Vec::new();
+    }
+    let density = |bin: usize| {
+        let squared = segments.iter().map(|segment| {
+            let mean = segment.iter().sum::<f64>() / SEGMENT as f64;
+            let (mut real, mut imaginary) = (0.0, 0.0);
+            for (k, (sample, weight)) in segment.iter().zip(&window).enumerate() {
+                let (sin, cos) =
+                    libm::sincos(core::f64::consts::TAU * (bin * k % SEGMENT) as f64 / SEGMENT as f64);
+                real += weight * (sample - mean) * cos;
+                imaginary -= weight * (sample - mean) * sin;
+            }
+            real * real + imaginary * imaginary
+        });
+        libm::sqrt(2.0 * squared.sum::<f64>() / (segments.len() as f64 * rate_hz * power))
+    };
+    (1..SEGMENT / 2).map(|bin| (bin as f64 * rate_hz / SEGMENT as f64, density(bin))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The density of white noise is its deviation over the square root of half the rate; a tone stands at its frequency.
+    #[test]
+    fn a_tone_stands_at_its_frequency_and_the_variance_is_kept() {
+        let tone =
+            |k: usize| 3.0 * libm::sin(core::f64::consts::TAU * 25.0 * k as f64 * flight::computer::FRAME_S);
+        let samples: Vec<f64> = (0..2048).map(tone).collect();
+        let spectrum = spectrum(&samples);
+        let (peak_hz, _) = spectrum.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert!((peak_hz - 25.0).abs() < 0.4, "{peak_hz}");
+        let step_hz = spectrum[1].0 - spectrum[0].0;
+        let variance: f64 = spectrum.iter().map(|(_, density)| density * density * step_hz).sum();
+        assert!((variance - 4.5).abs() < 0.05, "{variance}");
+        assert_eq!(super::spectrum(&samples[..10]), []);
+    }
+}
