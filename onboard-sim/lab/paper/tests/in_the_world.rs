@@ -1,5 +1,4 @@
 //! The planar equations are the motion of the simulated world in its x-z plane.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use core::f64::consts::FRAC_PI_2;
 

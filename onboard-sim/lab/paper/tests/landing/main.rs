@@ -1,5 +1,4 @@
 //! The guarantees of the solver, on the landing paper's problem and on the same with an end that can be flown.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod robust;
 
