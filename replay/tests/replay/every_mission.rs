@@ -51,14 +51,13 @@ const TOLD: Answer = (0, &[" sent by the vehicle"]);
 const HEARD: Answer = (0, &["told.mcap: ", " frames, 0 of them not understood"]);
 const HEARD_ONLY: Answer = (2, &["nothing was compared: it has no frames of a flight computer"]);
 const EXISTS: Answer = (2, &["whole.mcap: cannot be written: it exists already"]);
-const KEPT: Answer = (0, &["its mission {mission}\n"]);
 const WHOLE: Answer = (0, &["the log was whole: nothing is lost", "!warning"]);
 const SAME_MISSION: Answer = (0, &["{mission} is the same mission as {mission}"]);
 
 const REPLAY: &str = env!("CARGO_BIN_EXE_replay");
 
 /// Rows are asked in this order: some read what a row before them wrote.
-const TABLE: [Row; 26] = [
+const TABLE: [Row; 25] = [
     row(
         "info {log}",
         (
@@ -160,7 +159,6 @@ const TABLE: [Row; 26] = [
     row("verify {dir}/cut.mcap", (0, &["{frames} of {frames} frames identical"]), NO_FILE, NO_FILE),
     row("recover {log} {dir}/whole.mcap", WHOLE, WHOLE, WHOLE),
     row("verify {dir}/whole.mcap", IDENTICAL, IDENTICAL, UNFLOWN),
-    row("info {dir}/whole.mcap", KEPT, KEPT, KEPT),
     row("recover {log} {dir}/whole.mcap", EXISTS, EXISTS, EXISTS),
 ];
 
@@ -305,7 +303,7 @@ const DO_NOT_ACT: [(&str, f64, &str); 7] = [
         3.0,
         "a nose that leans by less than what a foot may touch with is held as it is",
     ),
-    ("powered.homing.near_m", 0.1, "what lands farther out comes as near as its reach allows"),
+    ("powered.homing.near_m", 100.0, "what lands farther out comes as near as its reach allows"),
     (
         "powered.landing_miss",
         1e-9,
