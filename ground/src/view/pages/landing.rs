@@ -80,7 +80,9 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         theme.label(format!("  {again} shows it again, {report} writes the report"))
     });
     let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));
-    sentence.extend(again);
+    // A small screen has no room behind a long sentence.
+    let room_for = usize::from(area.width.saturating_sub(sentence.width() as u16));
+    sentence.extend(again.filter(|again| again.width() <= room_for));
     let area = if headline::verdict_beside(model, now, frame.area().width).is_some() {
         let [line, below] = stacked(area, [Length(1), Fill(1)]);
         draw_line(frame, line, sentence);
