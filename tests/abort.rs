@@ -76,7 +76,7 @@ fn an_abort_under_thrust_lands_on_the_ground_below_and_reports_that_no_cut_off_e
     assert_eq!(flight.ground.command(ABORT, 1.0), ACCEPTED);
     flight.ground.wait_for_phase(TdPhase::TD_PHASE_TOUCHDOWN);
     // It is judged at rest.
-    flight.vehicle.wait_for_line("it stands, undamaged");
+    flight.vehicle.wait_for_line("STANDS UNDAMAGED");
     let ended = ended(flight);
     assert_eq!(ended.code, Some(4), "{}", ended.output);
     assert!(ended.output.contains("no cut-off exists"), "{}", ended.output);

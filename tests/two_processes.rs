@@ -110,7 +110,7 @@ fn both_report_a_flight_that_misses_its_limits() {
     assert_eq!(station.code, Some(3), "{}", station.output);
     assert_eq!(flight.code, Some(3), "{}", flight.output);
     assert!(
-        flight.output.contains("NOT LANDED") && station.output.contains("HARD LANDING: outside "),
+        flight.output.contains("NOT LANDED") && station.output.contains("HARD LANDING: not upright"),
         "{}",
         station.output
     );

@@ -118,7 +118,7 @@ impl Field {
             }
         }
         // One in a hundred hits the ground: the station has to live through that, too.
-        let how = vehicle.wait_for_line("the legs");
+        let how = vehicle.wait_for_line("its legs");
         vehicle.wait_for_line("disarmed");
         self.proxy.impair(IDEAL);
         for terminal in [&*screen, &*watching, &*distant] {

@@ -17,7 +17,7 @@ fn logs_that_are_removed_in_the_countdown_are_an_alarm_and_lose_nothing() {
         std::fs::remove_file(pad.folder.path().join(file)).unwrap();
     }
     screen.wait_for("STATION LOG was REMOVED");
-    pad.vehicle.wait_for_line("the legs");
+    pad.vehicle.wait_for_line("its legs");
     daemon.signal(Signal::SIGTERM);
     let output = daemon.wait().output;
     assert!(output.contains("somebody has removed the log"), "{output}");

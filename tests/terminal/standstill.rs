@@ -15,7 +15,7 @@ fn what_waited_while_the_station_stood_still_is_in_the_log_and_not_on_the_screen
     screen.type_until(b"SSTART\r", "START  commanded");
     daemon.wait_for_line("-> BOOST");
     daemon.signal(Signal::SIGSTOP);
-    pad.vehicle.wait_for_line("the legs");
+    pad.vehicle.wait_for_line("its legs");
     daemon.signal(Signal::SIGCONT);
     daemon.wait_for_line("what waited is in the log only");
     screen.wait_until("a vehicle that is down", |window| {

@@ -164,10 +164,11 @@ fn mk3_flies_with_the_numbers_of_mk2() {
     let estimator = EstimatorConfig { gnss_age_jitter_s: 0.0, ..mk3.estimator };
     // Only mk2 hangs below a drone, and mk3's legs bear more.
     let (drop, leg_limits) = (mk2.drop, mk2.leg_limits);
-    let caution_sigmas = mk2.caution_sigmas;
+    // mk2's legs bear less: it keeps more in hand for a weak motor.
+    let (caution_sigmas, ignition) = (mk2.caution_sigmas, mk2.ignition);
     // Only mk3 knows that two motors bear the name of its own.
     let (other_motors, other_curves) = (mk2.other_motors.clone(), mk2.other_curves.clone());
-    // mk2's legs bear less: it lands where it is nearest, and sinks faster into it.
+    // It lands where it is nearest, and sinks faster into it.
     let PoweredSettings { weights, homing, final_box, .. } = mk2.powered;
     let powered = PoweredSettings { weights, homing, final_box, ..mk3.powered };
     assert_eq!(
@@ -181,6 +182,7 @@ fn mk3_flies_with_the_numbers_of_mk2() {
             other_curves,
             leg_limits,
             caution_sigmas,
+            ignition,
             powered,
             ..mk3
         },
