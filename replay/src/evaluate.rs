@@ -122,6 +122,15 @@ pub struct EvaluateReport {
     pub frames: Vec<EvaluatedFrame>,
 }
 
+impl EvaluateReport {
+    /// Whether a frame has another command than recorded: to the gimbal, to the fins, or by its phase to igniter or parachute.
+    fn a_command_differs(&self) -> bool {
+        self.frames.iter().any(|EvaluatedFrame { recorded: a, evaluated: b, .. }| {
+            (&a.gimbal_rad, &a.fins_rad, a.phase) != (&b.gimbal_rad, &b.fins_rad, b.phase)
+        })
+    }
+}
+
 /// Every frame, and how many of them this build decides differently with nothing changed.
 type Evaluated = (Vec<EvaluatedFrame>, usize);
 
@@ -296,6 +305,10 @@ pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::R
     }
     let differing: Vec<&EvaluatedFrame> =
         report.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
+    if !report.settings.is_empty() && !report.a_command_differs() {
+        let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
+        writeln!(output, "no command differs: {} {what} in this flight", shown(&report.settings.join(" ")))?;
+    }
     if differing.is_empty() {
         return Ok(());
     }

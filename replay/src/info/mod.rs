@@ -513,7 +513,7 @@ fn print_findings(info: &Info, output: &mut impl Write) -> io::Result<()> {
         return row(
             output,
             "findings",
-            "not looked for: this build does not make the recorded decisions again",
+            "not looked for: no frame in flight, or this build decides otherwise",
         );
     };
     if findings.is_empty() {
@@ -539,7 +539,7 @@ fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> 
         row(output, "", &format!("{repeated} repeated"))?;
     }
     let text = solve_time.as_ref().map_or_else(
-        || "not recorded: simulated without a clock".to_owned(),
+        || "not recorded: no plan was timed".to_owned(),
         |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
     );
     row(output, "solve time", &text)

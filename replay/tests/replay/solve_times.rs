@@ -52,7 +52,7 @@ fn solve_times_are_printed_only_if_they_were_measured() {
     assert!(!page.contains("without a clock"));
 
     let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
-    assert!(stdout.contains("solve time  not recorded: simulated without a clock"), "{stdout}");
+    assert!(stdout.contains("solve time  not recorded: no plan was timed"), "{stdout}");
     assert!(report(&LANDED.log).unwrap().html.contains("without a clock"));
     assert_eq!(Recording::open(&LANDED.log).unwrap().timings, []);
 }
