@@ -16,6 +16,7 @@ mod damage;
 mod damage_told;
 mod day;
 mod divergence;
+mod every_mission;
 mod fit;
 mod flown;
 mod foreign;

@@ -7,7 +7,9 @@ use std::sync::LazyLock;
 use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;
+use sim::recipe::Recipe;
 use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
+use simulated_vehicle::vehicle::RocketFlight;
 use tempfile::TempDir;
 use tokio::sync::watch;
 
@@ -31,9 +33,13 @@ pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frame
 
 /// A landing with telemetry to no receiver.
 pub(crate) fn with_frames(profile: &str) -> Simulated {
+    to_nobody(|link| simulate(profile, 1, &[link]))
+}
+
+/// A flight with telemetry to no receiver.
+pub(crate) fn to_nobody(fly: impl FnOnce(LinkAddress) -> Simulated) -> Simulated {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
-    let link = format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap();
-    simulate(profile, 1, &[link])
+    fly(format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap())
 }
 
 impl Simulated {
@@ -49,10 +55,16 @@ impl Simulated {
 
 /// Flies a profile to the ground and writes its log.
 pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simulated {
+    let RocketFlight { mut recipe, .. } = load_flight(profile).unwrap();
+    recipe.seed = seed;
+    simulate_recipe(recipe, links)
+}
+
+/// Flies a recipe until its vehicle is safe, or its start refused, and writes its log.
+pub(crate) fn simulate_recipe(recipe: Recipe, links: &[LinkAddress]) -> Simulated {
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("flight.mcap");
-    let mut flight = load_flight(profile).unwrap();
-    flight.recipe.seed = seed;
+    let flight = RocketFlight { recipe, number: 0 };
     let recorder = Recorder::create(&log, &flight.log_header("onboard-sim", START_UNIX_NS)).unwrap();
     let options = FlyOptions {
         system_id: 1,
