@@ -6,6 +6,7 @@ mod board;
 mod crew;
 mod demo;
 mod download;
+mod every_mission;
 mod first_flight;
 mod ground_log;
 mod hold;

@@ -1,0 +1,35 @@
+//! The ground station shows a recorded flight of every mission.
+
+use std::path::Path;
+
+use e2e::{Program, Running, program};
+use flight::vehicles::mission::BUILTIN;
+
+/// Flies a mission by itself, with telemetry that nobody receives, and shows its log.
+fn shown(folder: &Path, mission: &str) {
+    let log = format!("{mission}.mcap");
+    let mut fly = program(Program::OnboardSim);
+    fly.args(["fly", "--profile", mission, "--auto", "--speed", "max", "--mavlink", "udpout:127.0.0.1:9"]);
+    let flown = Running::to_end(fly.args(["--log", &log]).current_dir(folder));
+    assert_eq!(flown.code, Some(0), "{mission}: {}", flown.output);
+    let mut ground = program(Program::Ground);
+    let shown = Running::to_end(ground.args(["--replay", &log, "--headless"]).current_dir(folder));
+    assert_eq!(shown.code, Some(0), "{mission}: {}", shown.output);
+    let moments =
+        ["countdown started", "landing motor commanded to light", "ground contact", "STANDS UNDAMAGED"];
+    let places: Vec<_> = moments.iter().map(|moment| shown.output.find(moment)).collect();
+    assert!(places.is_sorted() && places[0].is_some(), "{mission}: {}", shown.output);
+    for never in ["NaN", "plane", "ABORT", "panicked"] {
+        assert!(!shown.output.contains(never), "{mission}: {never}: {}", shown.output);
+    }
+}
+
+#[test]
+fn the_ground_station_shows_a_flight_of_every_mission() {
+    let folder = tempfile::tempdir().unwrap();
+    std::thread::scope(|scope| {
+        for (mission, _) in BUILTIN {
+            scope.spawn(|| shown(folder.path(), mission));
+        }
+    });
+}
