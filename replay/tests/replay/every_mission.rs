@@ -315,7 +315,7 @@ const DO_NOT_ACT: [(&str, f64, &str); 7] = [
     ("aim.disturbance_max_rad_s2", 0.1, "nothing turns the vehicle as hard"),
 ];
 
-/// Every number of these sections, half as much again; lists of scales half as far from 1.
+/// The numbers of a section times a factor. Of the scales in a list it is their distance from 1 that is multiplied.
 fn changed(prefix: &str, value: &toml::Value, factor: f64) -> Vec<Setting> {
     let scaled = |number: f64| number * factor;
     let value = match value {
