@@ -47,7 +47,11 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
     close(fit, "ignition_delay", truth.ignition_delay_s, 0.005);
     close(fit, "gimbal_delay", 0.020, 0.005);
     close(fit, "gimbal_gain", 1.0, 0.02);
-    close(fit, "gimbal_play", 0.5, 0.1);
+    // A plan that leans around turns the gimbal steadily: the play may not show.
+    match fit.not_found.iter().find(|lack| lack.name == "gimbal_play") {
+        Some(lack) => assert_eq!(lack.reason, "its commands changed too little"),
+        None => close(fit, "gimbal_play", 0.5, 0.1),
+    }
     let (sin, cos) = libm::sincos(truth.wind_towards_rad);
     close(fit, "wind_x", truth.wind_m_s * cos, 1.0);
     close(fit, "wind_y", truth.wind_m_s * sin, 1.0);

@@ -53,7 +53,7 @@ fn verdict(info: &Info) -> String {
         let VerdictLimit { name, value, unit, .. } = worst;
         let value = value.abs();
         html += &paragraph(&format!(
-            "Worst of the limits: {name} {value:.2} {unit}, {far}; {broken} of {all} broken."
+            "Worst of the legs' limits: {name} {value:.2} {unit}, {far}; {broken} of {all} broken."
         ));
     }
     html + &paragraph(&format!("Touchdown at {}.", info.clocks.words(verdict.contact())))
