@@ -80,8 +80,10 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             drop(update(model, Msg::Tick, now));
         }
     }
-    const STANDS: TdLanding = TdLanding::TD_LANDING_STANDS;
     let landed = vehicle.judged().is_some_and(|judged| judged.landing.stands);
-    let told = model.vehicle.verdict().is_some_and(|verdict| verdict.value.landing.contains(STANDS));
+    let told = model
+        .vehicle
+        .verdict()
+        .is_some_and(|verdict| verdict.value.landing.contains(TdLanding::TD_LANDING_STANDS));
     Ok(landed && told)
 }

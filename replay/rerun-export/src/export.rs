@@ -172,7 +172,7 @@ impl Survey {
         pad.push(vec![[-length_m, 0.0, 0.0], [length_m, 0.0, 0.0]]);
         pad.push(vec![[0.0, -length_m, 0.0], [0.0, length_m, 0.0]]);
         recording.log_static(at("pad"), &lines(pad, PAD))?;
-        if let Some(mission) = &self.mission {
+        if self.mission.is_some() {
             let limit = circle(TABLE_2.distance_m as f32);
             recording.log_static(at("pad/limit"), &lines(vec![limit], LIMIT))?;
         }

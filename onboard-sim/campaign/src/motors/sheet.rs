@@ -284,7 +284,7 @@ impl Card {
                 format!("nine of ten land at {least_kg:.2} to {most_kg:.2} kg in the least wind")
             }
             (None, own) => {
-                let landed = own.map_or_else(String::new, |own| own.to_string());
+                let landed = own.map_or_else(String::new, ToString::to_string);
                 format!("fewer than nine of ten stand undamaged in the least wind: {landed}")
             }
         }

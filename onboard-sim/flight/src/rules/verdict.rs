@@ -277,7 +277,9 @@ mod tests {
         let [ground, axis] = [Touchdown::over_ground, Touchdown::along_axis].map(|of| of(&state, 0.0));
         let near = |found: f64, expected: f64| (found - expected).abs() < 1e-12;
         assert!(near(axis.vertical_m_s, -1.0) && near(axis.lateral_m_s, 0.0), "{axis:?}");
-        assert!(near(ground.vertical_m_s, -tilt_rad.cos()) && near(ground.lateral_m_s, tilt_rad.sin()));
+        assert!(
+            near(ground.vertical_m_s, -libm::cos(tilt_rad)) && near(ground.lateral_m_s, libm::sin(tilt_rad))
+        );
         assert!(near(axis.rate_rad_s, 0.1) && near(ground.rate_rad_s, 0.1_f64.hypot(0.3)), "{ground:?}");
         assert!(near(ground.distance_m, 3.0) && near(ground.tilt_rad, tilt_rad), "{ground:?}");
     }
