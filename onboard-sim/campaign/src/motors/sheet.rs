@@ -284,7 +284,7 @@ impl Card {
                 format!("nine of ten land at {least_kg:.2} to {most_kg:.2} kg in the least wind")
             }
             (None, own) => {
-                let landed = own.map_or_else(String::new, |own| own.to_string());
+                let landed = own.map_or_else(String::new, ToString::to_string);
                 format!("fewer than nine of ten stand undamaged in the least wind: {landed}")
             }
         }
@@ -357,7 +357,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
                 way.name()
             )
         })),
-        told(wind.landed.map(|landed| landed.to_string())),
+        told(wind.landed.as_ref().map(ToString::to_string)),
     ]
 }
 
