@@ -357,7 +357,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
                 way.name()
             )
         })),
-        told(wind.landed.map(|landed| landed.to_string())),
+        told(wind.landed.as_ref().map(ToString::to_string)),
     ]
 }
 
