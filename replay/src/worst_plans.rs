@@ -2,13 +2,11 @@
 
 use flight::guidance::powered::LandingSolved;
 use judge::Score;
+use nmpc::LANDING_MISS;
 use serde::Serialize;
 
 /// Most plans that are named.
 const NAMED: usize = 3;
-
-/// A plan that misses nothing by more than this lands (m, m/s, rad or rad/s), as for the flight computer.
-const LANDING_MISS: f64 = 1e-3;
 
 /// A plan that breaks a condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]

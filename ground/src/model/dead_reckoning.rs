@@ -153,8 +153,8 @@ fn swerve_m(burning_s: f64) -> f64 {
     SWERVE_M_S2 * swerving_s * (burning_s - 0.5 * swerving_s)
 }
 
-/// Under thrust, the present position on the plan. Its points are evenly spaced in time. The motion across the plane
-/// of the plan is assumed to stop when the plan ends.
+/// Under thrust, the present position on the plan. Its points are evenly spaced in time, and say how far north and how high it
+/// is. The motion to the east is assumed to stop when the plan ends.
 fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrapolated> {
     let (path, prediction) = (vehicle.path.as_ref()?, vehicle.prediction?);
     let motion = vehicle.best_motion()?;

@@ -205,8 +205,8 @@ fn a_board_that_senses_the_same_commands_the_same() {
     assert_eq!(computer.digest(), frames.last().unwrap().state_digest);
 }
 
-/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame. mk2 plans
-/// in a plane; mk3 and vlr in space, and vlr wants more intervals in flight than on the ground.
+/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame. vlr wants
+/// more intervals in flight than on the ground.
 #[test]
 fn in_flight_only_news_allocate() {
     for mission in ["mk2", "mk3", "vlr"] {

@@ -47,7 +47,7 @@ pub const INPUTS: usize = 3;
 pub type State = [f64; STATES];
 
 /// Largest miss of a condition by a path that lands, m, m/s, rad or rad/s.
-const LANDING_MISS: f64 = 1e-3;
+pub const LANDING_MISS: f64 = 1e-3;
 
 /// Barrier of a cold solve's first iteration.
 const FIRST_BARRIER: f64 = 1e3;

@@ -25,11 +25,6 @@ const END_TIMES: usize = 4;
 /// Gain of the fin opening: fraction of the fins' travel per fraction of the band.
 const FIN_GAIN: f64 = 1.5;
 
-/// Fin opening, 0 to 1, that moves a vehicle from its place in the band to the wanted place.
-pub fn share_for(wanted_place: f64, place: f64) -> f64 {
-    (0.5 + FIN_GAIN * (wanted_place - place)).clamp(0.0, 1.0)
-}
-
 /// The braking of the vehicle: its tilt and its fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Braking {
@@ -147,7 +142,7 @@ impl Column {
         let strong = strong.unwrap_or(weak);
         let (low_m, high_m) = (weak.low_m.max(strong.low_m), strong.high_m.min(weak.high_m));
         let width_m = (high_m - low_m).max(-NARROW_S * vertical_m_s).max(1e-3);
-        share_for(place, (height_m - low_m) / width_m)
+        (0.5 + FIN_GAIN * (place - (height_m - low_m) / width_m)).clamp(0.0, 1.0)
     }
 
     /// Whether a vehicle without a band falls more slowly than a landing needs: even the softest braking stops it before

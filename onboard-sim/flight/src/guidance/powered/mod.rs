@@ -124,7 +124,7 @@ impl PoweredGuidance {
     /// Forgets its plans, and keeps their room: no plan has more intervals than the last.
     fn forget(&mut self) {
         if let Some(flown) = self.flown.take() {
-            self.room = Some(flown.inputs().len());
+            self.room = Some(flown.intervals());
             self.trial = flown.clone();
             self.unused = flown;
         }
@@ -268,7 +268,7 @@ impl PoweredGuidance {
         let mut again = self.clone();
         let outcome = again.search(time_s, state, situation)?;
         let (mut problem, plan) = (again.problem?, again.found);
-        stretch(&mut problem, situation, &self.settings, plan.length_s(), plan.inputs().len());
+        stretch(&mut problem, situation, &self.settings, plan.length_s(), plan.intervals());
         Some(LandingSolved { problem, outcome, plan })
     }
 
