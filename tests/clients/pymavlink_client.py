@@ -168,7 +168,7 @@ def parameters(ground):
         return ground.message("PARAM_VALUE", lambda m: m.param_id == name).param_value
 
     check("a rate is set", set_to("RATE_FINS", 1) == 1)
-    check("a weight is not, and answered", set_to("NMPC_W_U", 1) == 0)
+    check("a weight is not, and answered", set_to("NMPC_W_Q", 1) == 0)
     check("an INT32 is not, and answered", set_to("RATE_FINS", 2, mav.MAV_PARAM_TYPE_INT32) == 1)
     check("back again", set_to("RATE_FINS", 2) == 2)
 

@@ -84,7 +84,7 @@ fn a_parameter_is_read_by_name_or_index_and_a_missing_one_is_reported() {
     wire.tell(&read(name("NMPC_W_THETA"), -1));
     wire.tell(&read(name("ignored"), 0));
     let found: Vec<f32> = values(&wire.run(0.5)).iter().map(|value| value.param_value).collect();
-    assert_eq!(found, [100.0, 1.0]);
+    assert_eq!(found, [200.0, 1.0]);
     wire.tell(&read(name("NO_SUCH"), -1));
     wire.tell(&read(name(""), 999));
     let errors = wire.run(0.5).into_iter().filter(|frame| {
@@ -107,7 +107,7 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
         // The fins take its room.
         ("RATE_POSITION", f32::INFINITY, 7.0, "must be"),
         ("RATE_HEARTBEAT", 0.0, 1.0, "vital messages"),
-        ("NMPC_W_U", 51.0, 0.0, "from the mission"),
+        ("NMPC_W_Q", 51.0, 0.0, "from the mission"),
     ] {
         // Texts have a share of each second.
         wire.run(1.0);

@@ -1,17 +1,21 @@
 //! The rocket from its rail, and from below a drone.
 
-use super::space::flight_of;
+use super::space::{flight_of, mission_of};
 use super::*;
 use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::outputs::{Line, Outputs};
 use flight::rules::phase::HoldCause;
 use flight::vehicle::mission::StartPoint;
+use flight::vehicles::mission::DEFAULT;
 use sim::outside::{Outside, Unwatched};
 use sim::sortie::Sortie;
 use sim::world::RestOutcome;
 
 fn from(start: StartPoint, dispersion: &str, faults: &[&str]) -> Told {
-    let mut flight = flight_of(dispersion, faults);
+    begun(flight_of(dispersion, faults), start)
+}
+
+fn begun(mut flight: RocketFlight, start: StartPoint) -> Told {
     flight.recipe = flight.recipe.starting_at(start).unwrap();
     Told::of(Vehicle::on_the_pad(&flight).unwrap())
 }
@@ -415,7 +419,8 @@ fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
 #[test]
 fn a_reset_in_every_phase_of_the_flight_is_flown_through() {
     for phase in ["boost+0.3", "coast+2", "descent+2", "armed", "ignition", "powered+1", "touchdown+0.2"] {
-        let (rocket, events) = flown(from(StartPoint::Pad, "field", &[&format!("reboot:0.1@{phase}")]));
+        let flight = mission_of(DEFAULT, "field", &[&format!("reboot:0.1@{phase}")]);
+        let (rocket, events) = flown(begun(flight, StartPoint::Pad));
         let seen = phases(&events);
         assert_eq!(
             seen[seen.len() - 7..],

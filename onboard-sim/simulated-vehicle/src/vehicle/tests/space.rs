@@ -12,7 +12,11 @@ use super::*;
 use crate::fly::load_flight;
 
 pub(super) fn flight_of(dispersion: &str, faults: &[&str]) -> RocketFlight {
-    let mut flight = load_flight("mk2").unwrap();
+    mission_of("mk2", dispersion, faults)
+}
+
+pub(super) fn mission_of(mission: &str, dispersion: &str, faults: &[&str]) -> RocketFlight {
+    let mut flight = load_flight(mission).unwrap();
     flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
     flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     flight
