@@ -44,7 +44,7 @@ fn truth(recipe: &Recipe, flight: &Sortie, body_share: f64) -> anyhow::Result<BT
     let sensors = &recipe.dispersion.sensor_params;
     let errors = *Sensors::new(sensors, drawn.flight_seed, 1.0)?.errors();
     let airframe = &recipe.mission.airframe;
-    let arm_m = airframe.mass.loaded_cg_station_m;
+    let arm_m = airframe.thrust_arm_m(airframe.mass.loaded_cg_station_m);
     let [pitch_rad, yaw_rad] = truth.thrust_misalignment_rad;
     let [x_m, y_m, z_m] = truth.cg_offset_m;
     let [oy_m, oz_m] = truth.thrust_offset_m;

@@ -299,8 +299,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
         let air = along.solution.values[FINS]
             * air_moment_n_m(airframe, mass.cg_station_m, density, &through_air, &rate, &fins_rad);
         let inertia = mass.pitch_inertia_kg_m2;
-        let arm_m = mass.cg_station_m;
-        let damping = thrust_n * flow_kg_n_s * (arm_m * arm_m + mass.pitch_inertia_slope_m2) / inertia;
+        let exit_m = mass.cg_station_m;
+        let damping = thrust_n * flow_kg_n_s * (exit_m * exit_m + mass.pitch_inertia_slope_m2) / inertia;
         let coupling = (inertia - mass.roll_inertia_kg_m2) / inertia * rate.x;
         Sample {
             felt_rad_s: [frame.measured.imu.gyro_rad_s.y, frame.measured.imu.gyro_rad_s.z],
@@ -308,7 +308,7 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
                 air.y / inertia + coupling * rate.z - damping * rate.y,
                 air.z / inertia - coupling * rate.y - damping * rate.z,
             ],
-            by_gimbal_rad_s2: thrust_n * arm_m / inertia,
+            by_gimbal_rad_s2: thrust_n * airframe.thrust_arm_m(mass.cg_station_m) / inertia,
             burning,
             begins: place == 0,
         }

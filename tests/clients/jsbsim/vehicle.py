@@ -265,7 +265,7 @@ def write(folder, airframe_toml, motor_eng, truth):
 <ground_reactions>{"".join(feet + hull)}</ground_reactions>
 <propulsion>
  <engine file="motor"><feed>0</feed>
-  <thruster file="nozzle"><location unit="M"><x>0</x><y>0</y><z>0</z></location>
+  <thruster file="nozzle"><location unit="M"><x>{-airframe["gimbal"]["pivot_station_m"]!r}</x><y>0</y><z>0</z></location>
   <orient unit="DEG"><roll>0</roll><pitch>0</pitch><yaw>0</yaw></orient></thruster></engine>
  <tank type="FUEL" number="0"><location unit="M"><x>{-mass["propellant_station_m"]!r}</x><y>0</y><z>0</z></location>
   <capacity unit="KG">{propellant_kg * scale!r}</capacity><contents unit="KG">{propellant_kg * scale!r}</contents></tank>

@@ -1,13 +1,14 @@
 //! The vehicle as data: masses, shape, fins, gimbal, legs and parachute.
 //!
-//! Stations are heights above the nozzle exit of the upright vehicle, positive towards the nose. So the arm of the
-//! thrust is the station of the centre of gravity. The controller's model and the simulated truth use the same data.
+//! Stations are heights above the nozzle exit of the upright vehicle, positive towards the nose. The thrust goes through
+//! the gimbal's pivot. The controller's model and the simulated truth use the same data.
 
 use alloc::string::String;
 use serde::Deserialize;
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::fins::FinModel;
+use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// A vehicle.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -78,6 +79,20 @@ impl Airframe {
         each_m2 * openings_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
     }
 
+    /// Arm of the thrust about a centre of gravity at a station, m: the motor swings about its pivot.
+    pub fn thrust_arm_m(&self, cg_station_m: f64) -> f64 {
+        cg_station_m - self.gimbal.pivot_station_m
+    }
+
+    /// Angle at which the swinging motor touches the inside of the tube, rad: one of its rims, the one farther from the
+    /// pivot, has `max(p, L - p) sin a + r cos a` to the side.
+    pub fn gimbal_clearance_rad(&self, motor: &ThrustCurve) -> f64 {
+        let above_m = motor.length_m() - self.gimbal.pivot_station_m;
+        let (along_m, across_m) = (self.gimbal.pivot_station_m.max(above_m), 0.5 * motor.diameter_m());
+        let reach_m = libm::hypot(along_m, across_m);
+        libm::asin((0.5 * self.gimbal.inside_diameter_m / reach_m).min(1.0)) - libm::atan2(across_m, along_m)
+    }
+
     /// Height of a station above the feet when upright, m.
     pub fn above_feet_m(&self, station_m: f64) -> f64 {
         station_m - self.legs.foot_station_m
@@ -90,7 +105,7 @@ impl Airframe {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MassProperties {
     pub mass_kg: f64,
-    /// Centre of gravity, m above the nozzle: also the arm of the thrust.
+    /// Centre of gravity, m above the nozzle.
     pub cg_station_m: f64,
     /// Moment of inertia about the pitch or yaw axis through the centre of gravity, kg m^2.
     pub pitch_inertia_kg_m2: f64,
@@ -256,6 +271,10 @@ impl FinData {
 pub struct Gimbal {
     /// Mechanical stop on either side, degrees.
     pub limit_deg: f64,
+    /// Where its two axes cross, m above the nozzle of the centred motor.
+    pub pivot_station_m: f64,
+    /// Inside diameter of the tube in which the motor swings, m.
+    pub inside_diameter_m: f64,
     /// The servo of each axis.
     pub servo: Servo,
 }
@@ -425,6 +444,18 @@ fn actuators(airframe: &Airframe) -> Check {
         "gimbal.limit_deg",
         gimbal.limit_deg,
         "above 0 and below 90",
+    )?;
+    require(
+        (0.0..airframe.mass.loaded_cg_station_m).contains(&gimbal.pivot_station_m),
+        "gimbal.pivot_station_m",
+        gimbal.pivot_station_m,
+        "0 or more and below mass.loaded_cg_station_m",
+    )?;
+    require(
+        gimbal.inside_diameter_m > 0.0 && gimbal.inside_diameter_m < airframe.body.diameter_m,
+        "gimbal.inside_diameter_m",
+        gimbal.inside_diameter_m,
+        "above 0 and below body.diameter_m",
     )?;
     servo(&fins.servo, ["fins.servo.rate_deg_s", "fins.servo.delay_s", "fins.servo.slop_deg"])?;
     servo(&gimbal.servo, ["gimbal.servo.rate_deg_s", "gimbal.servo.delay_s", "gimbal.servo.slop_deg"])

@@ -524,7 +524,8 @@ impl Pilot {
     fn turned_towards(&mut self, aim: &Aim, estimate: &Estimate, situation: &Burning) -> [f64; 2] {
         let thrust_n = self.model.burn().thrust_n(situation.burning_s);
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
-            thrust_n * situation.mass.cg_station_m / situation.mass.pitch_inertia_kg_m2
+            thrust_n * self.model.airframe().thrust_arm_m(situation.mass.cg_station_m)
+                / situation.mass.pitch_inertia_kg_m2
         } else {
             0.0
         };

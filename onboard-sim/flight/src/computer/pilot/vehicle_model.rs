@@ -153,7 +153,7 @@ impl VehicleModel {
             burning_s: situation.burning_s,
             mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
             inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
-            arm_m: situation.mass.cg_station_m,
+            arm_m: self.airframe().thrust_arm_m(situation.mass.cg_station_m),
             feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
             foot_radius_m: self.airframe().legs.foot_radius_m,
             gravity_m_s2: self.mission.gravity_m_s2,

@@ -83,6 +83,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         weights.map_err(|bad| FileError::bad_value(origin, bad.into()))?;
     }
     mission.expect(curve);
+    validate::room_to_swing(&mission).map_err(|bad| FileError::bad_value(origin, bad))?;
     for other in &mission.other_motors {
         let other = motors::named(other)?;
         mission.other_curves.extend([mission.motor_curve.towards(&other, 0.5), other]);

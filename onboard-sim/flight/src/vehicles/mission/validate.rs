@@ -61,6 +61,16 @@ pub(super) fn validate(mission: &Mission) -> Check {
     legs(&mission.leg_limits)
 }
 
+/// The motor does not touch the tube before the gimbal meets its stop.
+pub(super) fn room_to_swing(mission: &Mission) -> Check {
+    let gimbal = &mission.airframe.gimbal;
+    let free_rad = mission.airframe.gimbal_clearance_rad(&mission.motor_curve);
+    let motor = mission.motor_curve.name();
+    let found = format!("{}, and {motor} touches the tube at {:.1}", gimbal.limit_deg, free_rad.to_degrees());
+    let required = "an angle that gimbal.pivot_station_m and gimbal.inside_diameter_m leave free";
+    require(gimbal.limit_rad() <= free_rad, "gimbal.limit_deg", found, required)
+}
+
 fn hedges(mission: &Mission) -> Check {
     not_negative("caution_sigmas", mission.caution_sigmas)?;
     positive("caution_fades_s", mission.caution_fades_s)?;

@@ -77,6 +77,7 @@ impl World {
             });
         }
         let limit_rad = airframe.gimbal.limit_rad();
+        let (length_m, diameter_m) = (motor.length_m(), motor.diameter_m());
         let gimbal = || Servo::new(&airframe.gimbal.servo, (-limit_rad, limit_rad), 0.0);
         let mut world = Self {
             shape: Shape::new(airframe, truth),
@@ -88,6 +89,9 @@ impl World {
                 Linkage::new(truth.gimbal_gain, 0.0, truth.gimbal_slop_rad, (-far_rad, far_rad), 0.0)
             }),
             fin_links: fin_links_at(airframe, truth, airframe.fins.closed_rad()),
+            gimbal_rates_rad_s: [[0.0; 2]; 2],
+            // A cylinder: L^2/12 + r^2/4.
+            swinging: (motor.total_mass_kg(), length_m * length_m / 12.0 + diameter_m * diameter_m / 16.0),
             parachute: Parachute::new(&airframe.parachute),
             air: AirHere::at(initial.position_m.z),
             wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)

@@ -75,6 +75,10 @@ pub struct World {
     gimbal: [Servo; 2],
     fins: [Servo; 4],
     gimbal_links: [Linkage; 2],
+    /// Rates of the gimbal over the step before and the last one, rad/s.
+    gimbal_rates_rad_s: [[f64; 2]; 2],
+    /// Mass of the full landing motor, kg, and the square of its radius of gyration, m^2.
+    swinging: (f64, f64),
     fin_links: [Linkage; 4],
     parachute: Parachute,
     wind: Wind,
@@ -182,6 +186,7 @@ impl World {
             self.ride(*stack, time_s);
             return;
         }
+        self.turn_back();
         let cg_m = self.cg_m();
         if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
             self.move_near_ground(time_s);
@@ -226,12 +231,16 @@ impl World {
     }
 
     fn command(&mut self, actuators: &Actuators, time_s: f64) {
+        let before_rad = self.gimbal_rad();
         for ((servo, link), command_rad) in
             self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(actuators.gimbal_rad)
         {
             servo.step(command_rad);
             link.step(servo.load_rad());
         }
+        let now_rad = self.gimbal_rad();
+        let rates_rad_s = [0, 1].map(|axis: usize| (now_rad[axis] - before_rad[axis]) / STEP_S);
+        self.gimbal_rates_rad_s = [self.gimbal_rates_rad_s[1], rates_rad_s];
         for ((servo, link), command_rad) in
             self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad)
         {
@@ -247,9 +256,34 @@ impl World {
         }
     }
 
-    /// Centre of gravity: x its station, y and z its distance from the axis, m.
+    /// Centre of gravity: x its station, y and z its distance from the axis, m. A swinging motor takes it to the side.
     fn cg_m(&self) -> Vector3<f64> {
-        Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + Vector3::from(self.truth.cg_offset_m)
+        let aside_m = self.motor_below_pivot_m() * self.motor_kg() / self.mass.mass_kg;
+        let [pitch_rad, yaw_rad] = self.gimbal_rad();
+        let aside = Vector3::new(0.0, -aside_m * libm::sin(yaw_rad), aside_m * libm::sin(pitch_rad));
+        Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + aside + Vector3::from(self.truth.cg_offset_m)
+    }
+
+    /// How far the middle of the motor hangs below the gimbal's pivot, m.
+    fn motor_below_pivot_m(&self) -> f64 {
+        self.airframe.gimbal.pivot_station_m - self.airframe.mass.propellant_station_m
+    }
+
+    /// Mass of the landing motor now, kg.
+    fn motor_kg(&self) -> f64 {
+        self.swinging.0 - self.motor.burnt_kg(self.time_s())
+    }
+
+    /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept. The
+    /// motor has `m (k^2 + l a)` of it for each rad/s, with the distances `l` from its middle up to the pivot and `a` up to
+    /// the centre of gravity of all.
+    fn turn_back(&mut self) {
+        let arm_m = self.mass.cg_station_m - self.airframe.mass.propellant_station_m;
+        let swinging_kg_m2 = self.motor_kg() * (self.swinging.1 + self.motor_below_pivot_m() * arm_m);
+        let share = swinging_kg_m2 / (self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale);
+        let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
+        self.state.rate_rad_s.y -= share * (now_rad_s[0] - before_rad_s[0]);
+        self.state.rate_rad_s.z -= share * (now_rad_s[1] - before_rad_s[1]);
     }
 
     /// The exhaust's effect on the drag.
@@ -263,7 +297,6 @@ impl World {
         let [pitch_rad, yaw_rad] = [0, 1]
             .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
-        let arm_m = cg_m.x;
         let thrust_n = [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s));
         let acting = Acting {
             shape: &self.shape,
@@ -278,9 +311,13 @@ impl World {
             air: self.air,
             thrust_n,
             thrust_direction: Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw),
-            thrust_place_m: Vector3::new(0.0, self.truth.thrust_offset_m[0], self.truth.thrust_offset_m[1])
-                - cg_m,
-            jet_damping_m_s: self.motor.flow_kg_n_s() * (arm_m * arm_m + self.mass.pitch_inertia_slope_m2),
+            thrust_place_m: Vector3::new(
+                self.airframe.gimbal.pivot_station_m,
+                self.truth.thrust_offset_m[0],
+                self.truth.thrust_offset_m[1],
+            ) - cg_m,
+            // The gas leaves at the nozzle, wherever the pivot is.
+            jet_damping_m_s: self.motor.flow_kg_n_s() * (cg_m.x * cg_m.x + self.mass.pitch_inertia_slope_m2),
             ground: near_ground.then_some(&self.ground),
         };
         let inertia = Inertia {
