@@ -12,7 +12,7 @@
 use flight::computer::FRAME_S;
 use flight::vehicle::airframe::{Airframe, MassModel};
 use flight::vehicle::atmosphere::Air;
-use flight::vehicle::fins::{self, COS_30, ROLL, SIN_30};
+use flight::vehicle::fins::ROLL;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::along::{Along, BLOCK, FINS, IMPULSE, falling, follows, white_variance};
@@ -342,7 +342,7 @@ pub(super) fn air_moment_n_m(
     }
     for fin in 0..4 {
         let sine = libm::sin(fins_rad[fin]);
-        let outward = Vector3::new(0.0, -fins::YAW[fin] * COS_30, fins::PITCH[fin] * SIN_30);
+        let outward = Vector3::from([0.0, fins.outward(fin)[0], fins.outward(fin)[1]]);
         let mut place_m = outward * fins.radius_m(sine);
         place_m.x += airframe.fins.station_m - cg_station_m;
         let local = through_air_m_s + rate_rad_s.cross(&place_m);
@@ -370,7 +370,7 @@ mod tests {
         let moment = air_moment_n_m(&airframe, 0.4, 1.2, &velocity, &Vector3::zeros(), &open);
         let side_n = -4.0 * 1.55 * 0.0043 * 0.6 * libm::sqrt(901.0);
         let body_n = -0.6 * 0.062_16;
-        let lifts_n_m = 1.28 * 0.0043 * 0.6 * libm::sqrt(901.0) * 4.0 * SIN_30 * COS_30 * 0.087;
+        let lifts_n_m = 1.28 * 0.0043 * 0.6 * libm::sqrt(901.0) * libm::sqrt(3.0) * 0.087;
         assert!((moment.z - (0.23 * side_n - 0.05 * body_n + lifts_n_m)).abs() < 1e-6, "{moment}");
     }
 }

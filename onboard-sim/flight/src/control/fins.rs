@@ -3,19 +3,19 @@
 //! The sines of the openings are written as a mean and one amplitude for each of the patterns pitch, yaw and roll,
 //! which are orthogonal. The effect of the patterns follows Eq. 13-17, with one effect that the paper leaves out: the
 //! lifts cause more than roll. With unequal openings the four alternating lifts leave a side force, which acts at the
-//! fins' station, a distance `a` ahead of the centre of gravity. With `g = r(s) s`, `s = sin kappa`, divided by dynamic
-//! pressure and area:
+//! fins' station, a distance `a` ahead of the centre of gravity. With `h` the angle from y to an open fin, `g = r(s) s`,
+//! `s = sin kappa`, divided by dynamic pressure and area:
 //!
 //! ```text
 //! roll  = sum ROLL[i]  C_l g(s_i)
-//! pitch = sum PITCH[i] (C_d sin 30 g(s_i) - a C_l cos 30 s_i)
-//! yaw   = sum YAW[i]   (C_d cos 30 g(s_i) + a C_l sin 30 s_i)
+//! pitch = sum PITCH[i] (C_d sin h g(s_i) - a C_l cos h s_i)
+//! yaw   = sum YAW[i]   (C_d cos h g(s_i) + a C_l sin h s_i)
 //! ```
 //!
 //! If a command does not fit between the stops, first drag is given up, then roll, then pitch and yaw together, so that
 //! a wanted tilt keeps its direction.
 
-use crate::vehicle::fins::{COS_30, FinModel, Moments, PITCH, ROLL, SIN_30, YAW};
+use crate::vehicle::fins::{FinModel, Moments, PITCH, ROLL, YAW};
 
 /// Rounds that correct the amplitudes. The gains are quadratic in the openings; each round leaves about a tenth of the
 /// error.
@@ -148,26 +148,28 @@ impl Allocation {
     /// Moments over dynamic pressure, m^3.
     fn moment_areas(&self, sines: &[f64; 4]) -> Moments {
         let (drag_m2, lift_m2) = (self.fin_drag_area_m2(), self.fin_lift_area_m2());
+        let (sin, cos) = self.model.from_y;
         let mut sum = Moments::default();
         for i in 0..4 {
             let s = sines[i];
             let g_m = self.model.radius_m(s) * s;
             sum.roll_n_m += ROLL[i] * lift_m2 * g_m;
-            sum.pitch_n_m += PITCH[i] * (drag_m2 * SIN_30 * g_m - self.arm_m * lift_m2 * COS_30 * s);
-            sum.yaw_n_m += YAW[i] * (drag_m2 * COS_30 * g_m + self.arm_m * lift_m2 * SIN_30 * s);
+            sum.pitch_n_m += PITCH[i] * (drag_m2 * sin * g_m - self.arm_m * lift_m2 * cos * s);
+            sum.yaw_n_m += YAW[i] * (drag_m2 * cos * g_m + self.arm_m * lift_m2 * sin * s);
         }
         sum
     }
 
     /// Moment over dynamic pressure for each unit of a pattern's amplitude at a mean opening, m^3.
     fn slopes(&self, mean: f64) -> Moments {
+        let (sin, cos) = self.model.from_y;
         let at = |s: f64| {
             let (drag_m2, lift_m2) = (self.fin_drag_area_m2(), self.fin_lift_area_m2());
             let g_slope_m = 0.5 * self.model.body_diameter_m + self.model.length_m * s;
             Moments {
                 roll_n_m: 4.0 * lift_m2 * g_slope_m,
-                pitch_n_m: 4.0 * (drag_m2 * SIN_30 * g_slope_m - self.arm_m * lift_m2 * COS_30),
-                yaw_n_m: 4.0 * (drag_m2 * COS_30 * g_slope_m + self.arm_m * lift_m2 * SIN_30),
+                pitch_n_m: 4.0 * (drag_m2 * sin * g_slope_m - self.arm_m * lift_m2 * cos),
+                yaw_n_m: 4.0 * (drag_m2 * cos * g_slope_m + self.arm_m * lift_m2 * sin),
             }
         };
         let (here, half) = (at(mean), at(0.5));

@@ -7,7 +7,7 @@ use alloc::string::String;
 use serde::Deserialize;
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
-use crate::vehicle::fins::FinModel;
+use crate::vehicle::fins::{FinModel, sin_cos_deg};
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// A vehicle.
@@ -58,6 +58,7 @@ impl Airframe {
             lift_coefficient: self.fins.lift_coefficient,
             length_m: self.fins.length_m,
             body_diameter_m: self.body.diameter_m,
+            from_y: sin_cos_deg(self.fins.from_y_deg - self.fins.hinge_off_deg),
         }
     }
 
@@ -234,6 +235,12 @@ pub struct FinData {
     pub station_m: f64,
     /// Length of a fin, m (the paper's L_f).
     pub length_m: f64,
+    /// Width of a fin along the body's skin, m.
+    pub width_m: f64,
+    /// Angle from the y axis to the middle of a closed fin, degrees: 45 is a quarter of the skin for each.
+    pub from_y_deg: f64,
+    /// Angle from a fin's middle to its hinge, towards the y axis, degrees: where an open fin stands, and why it has a lift.
+    pub hinge_off_deg: f64,
     /// Drag coefficient of an open fin on the body's reference area (Eq. 2).
     pub drag_coefficient: f64,
     /// Lift coefficient of an open fin on the body's reference area (Eq. 2).
@@ -420,6 +427,21 @@ fn shape(airframe: &Airframe) -> Check {
         "0 (the nozzle) to body.length_m",
     )?;
     positive("fins.length_m", fins.length_m)?;
+    let from_y_deg = fins.from_y_deg;
+    require(from_y_deg > 0.0 && from_y_deg < 90.0, "fins.from_y_deg", from_y_deg, "above 0 and below 90")?;
+    require(
+        fins.hinge_off_deg > 0.0 && fins.hinge_off_deg < from_y_deg,
+        "fins.hinge_off_deg",
+        fins.hinge_off_deg,
+        "above 0 (a fin hinged at its middle has no lift, and the roll no control) and below fins.from_y_deg",
+    )?;
+    let apart_rad = (2.0 * from_y_deg).min(180.0 - 2.0 * from_y_deg).to_radians();
+    require(
+        fins.width_m > 0.0 && fins.width_m <= 0.5 * body.diameter_m * apart_rad,
+        "fins.width_m",
+        fins.width_m,
+        "above 0 and at most the arc between the middles of closed neighbours (wider fins overlap)",
+    )?;
     not_negative("fins.drag_coefficient", fins.drag_coefficient)?;
     not_negative("fins.lift_coefficient", fins.lift_coefficient)
 }
@@ -552,6 +574,30 @@ mod tests {
         airframe.gimbal.limit_deg = -3.0;
         let error = airframe.validate().unwrap_err().to_string();
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
+    }
+
+    /// Quarters of the skin of a body of 74 mm are 58.1 mm wide. Turned by 15 degrees, neighbours are 38.7 mm apart on one side.
+    #[test]
+    fn val_hand_closed_fins_must_not_overlap() {
+        let mk3 = crate::vehicles::airframe::builtin("mk3").unwrap();
+        for (width_m, from_y_deg, hinge_off_deg, wrong) in [
+            (0.0581, 45.0, 15.0, None),
+            (0.0582, 45.0, 15.0, Some("fins.width_m")),
+            (0.0387, 30.0, 15.0, None),
+            (0.0387, 60.0, 15.0, None),
+            (0.0388, 30.0, 15.0, Some("fins.width_m")),
+            (0.0388, 60.0, 15.0, Some("fins.width_m")),
+            (0.0, 45.0, 15.0, Some("fins.width_m")),
+            (0.058, 0.0, 15.0, Some("fins.from_y_deg")),
+            (0.058, 90.0, 15.0, Some("fins.from_y_deg")),
+            (0.058, f64::NAN, 15.0, Some("fins.from_y_deg")),
+            (0.058, 45.0, 0.0, Some("fins.hinge_off_deg")),
+            (0.058, 45.0, 45.0, Some("fins.hinge_off_deg")),
+        ] {
+            let mut airframe = mk3.clone();
+            airframe.fins = FinData { width_m, from_y_deg, hinge_off_deg, ..airframe.fins };
+            assert_eq!(airframe.validate().err().map(|bad| bad.key), wrong, "{width_m} {from_y_deg}");
+        }
     }
 
     #[test]

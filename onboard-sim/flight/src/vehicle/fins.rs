@@ -2,13 +2,19 @@
 //!
 //! Each fin is a quarter of the fuselage's skin, with its hinge near the nose; `kappa` is its opening angle, 0 closed
 //! against the body and pi/2 fully open. (Eq. 1 prints `pi - X_b . Y_f`, which is no angle.) Body axes are those of
-//! [`crate::vehicle::rigid`]: x to the nose, moments about x roll, y pitch, z yaw. Seen along the body, fin `i` is at
+//! [`crate::vehicle::rigid`]: x to the nose, moments about x roll, y pitch, z yaw. The middles of the closed fins are
+//! 45 degrees from the y axis, so that the four quarters close into a cylinder. The hinge is 15 degrees off the fin's
+//! middle, towards the y axis ("the fins' links are rotated at an angle of 15 degrees", section 2.1): an open fin
+//! stands at its hinge, 30 degrees from y, and its skin reaches further to one side of it. From that comes its lift: a
+//! fin hinged at its middle has none. Seen along the body, an open fin `i` is at
 //!
 //! ```text
-//! (y, z) = r (-YAW[i] cos 30 deg, PITCH[i] sin 30 deg),   r = (D + L_f sin kappa) / 2
+//! (y, z) = r (-YAW[i] cos h, PITCH[i] sin h),   r = (D + L_f sin kappa) / 2,   h = 30 deg
 //! ```
 //!
-//! At this place a drag towards the nose has the moments of Eq. 16 and 17.
+//! At this place a drag towards the nose has the moments of Eq. 16 and 17. `h` is the angle of Eq. 9-12, too, and
+//! another airframe may have another. As in the paper the force acts at the hinge's angle: that the middle of an open
+//! fin is `D/2 sin 15 deg`, 10 mm, beside it, is left out.
 //!
 //! Errors of the printed equations, and their corrections:
 //! * Eq. 3 and Eq. 13-14 each have a sine of kappa; it is one and the same, and the force goes as `sin kappa`.
@@ -17,8 +23,6 @@
 //!   symmetries" need neighbours that mirror each other, so the signs alternate ([`ROLL`]). The patterns of roll,
 //!   pitch, yaw and drag are then orthogonal, which is the decoupling that section 2.1 claims.
 
-use core::f64::consts::FRAC_PI_6;
-
 /// Signs of the fins' roll moments. The hinges are on the side where the side force of the lift acts with the drag in
 /// yaw, and against it, but more strongly, in pitch. With hinges on the other side the two would almost cancel in yaw.
 pub const ROLL: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
@@ -26,11 +30,6 @@ pub const ROLL: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 pub const PITCH: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
 /// Signs of the fins' yaw moments (Eq. 17).
 pub const YAW: [f64; 4] = [1.0, 1.0, -1.0, -1.0];
-
-/// sin(pi/6).
-pub const SIN_30: f64 = 0.5;
-/// cos(pi/6).
-pub const COS_30: f64 = 0.866_025_403_784_438_6;
 
 /// Coefficients and size of the fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +44,8 @@ pub struct FinModel {
     pub length_m: f64,
     /// Diameter of the body (D), m.
     pub body_diameter_m: f64,
+    /// Sine and cosine of the angle between the y axis and an open fin.
+    pub from_y: (f64, f64),
 }
 
 /// Moments about the body axes, N m.
@@ -58,64 +59,22 @@ pub struct Moments {
     pub yaw_n_m: f64,
 }
 
-/// The air's state at the fins: dynamic pressure, angle of attack and sideslip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flow {
-    /// `1/2 rho V^2`, Pa.
-    pub dynamic_pressure_pa: f64,
-    /// Angle of attack, rad.
-    pub alpha_rad: f64,
-    /// Sideslip, rad.
-    pub beta_rad: f64,
-}
-
-/// Angle of attack and sideslip seen by each fin, rad: Eq. 9-12.
-pub fn fin_incidence_rad(alpha_rad: f64, beta_rad: f64) -> [(f64, f64); 4] {
-    let (sin, cos) = libm::sincos(FRAC_PI_6);
-    [
-        (cos * alpha_rad - sin * beta_rad, sin * alpha_rad + cos * beta_rad),
-        (cos * alpha_rad + sin * beta_rad, -sin * alpha_rad + cos * beta_rad),
-        (-cos * alpha_rad + sin * beta_rad, -sin * alpha_rad - cos * beta_rad),
-        (-cos * alpha_rad - sin * beta_rad, sin * alpha_rad - cos * beta_rad),
-    ]
+/// Sine and cosine of an angle in degrees; those of the paper's 30 degrees exactly, of which no `f64` in radians has the sine.
+pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
+    const COS_30: f64 = 0.866_025_403_784_438_6;
+    if (angle_deg - 30.0).abs() < 1e-9 { (0.5, COS_30) } else { libm::sincos(angle_deg.to_radians()) }
 }
 
 impl FinModel {
-    /// Drag of each fin, N: Eq. 13.
-    pub fn drag_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
-        self.force_n(self.drag_coefficient, flow, kappa_rad)
-    }
-
-    /// Magnitude of the lift of each fin, N: Eq. 14.
-    pub fn lift_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
-        self.force_n(self.lift_coefficient, flow, kappa_rad)
-    }
-
-    fn force_n(&self, coefficient: f64, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
-        let incidence = fin_incidence_rad(flow.alpha_rad, flow.beta_rad);
-        let open_n = flow.dynamic_pressure_pa * self.reference_area_m2 * coefficient;
-        core::array::from_fn(|i| {
-            let (alpha, beta) = incidence[i];
-            open_n * libm::sin(kappa_rad[i]) * libm::cos(alpha) * libm::cos(beta)
-        })
+    /// Direction from the axis to an open fin, body y and z.
+    pub fn outward(&self, fin: usize) -> [f64; 2] {
+        let (sin, cos) = self.from_y;
+        [-YAW[fin] * cos, PITCH[fin] * sin]
     }
 
     /// Distance of a fin's force from the axis, m, from the sine of its opening angle.
     pub fn radius_m(&self, sin_kappa: f64) -> f64 {
         0.5 * (self.body_diameter_m + self.length_m * sin_kappa)
-    }
-
-    /// Moments of the drags and lifts about the axis: Eq. 15 with alternating signs, Eq. 16 and 17 fin by fin.
-    pub fn moments(&self, flow: &Flow, kappa_rad: [f64; 4]) -> Moments {
-        let (drag_n, lift_n) = (self.drag_n(flow, kappa_rad), self.lift_n(flow, kappa_rad));
-        let mut moments = Moments::default();
-        for i in 0..4 {
-            let radius_m = self.radius_m(libm::sin(kappa_rad[i]));
-            moments.roll_n_m += ROLL[i] * radius_m * lift_n[i];
-            moments.pitch_n_m += PITCH[i] * radius_m * SIN_30 * drag_n[i];
-            moments.yaw_n_m += YAW[i] * radius_m * COS_30 * drag_n[i];
-        }
-        moments
     }
 }
 
@@ -123,10 +82,70 @@ impl FinModel {
 mod tests {
     use core::f64::consts::FRAC_PI_2;
 
+    use nalgebra::{Vector2, Vector3};
     use proptest::prelude::*;
 
     use super::*;
     use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+
+    /// Sine and cosine of the paper's 30 degrees.
+    const PLACE: (f64, f64) = (0.5, 0.866_025_403_784_438_6);
+
+    /// The air's state at the fins: dynamic pressure, angle of attack and sideslip.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    struct Flow {
+        /// `1/2 rho V^2`, Pa.
+        dynamic_pressure_pa: f64,
+        /// Angle of attack, rad.
+        alpha_rad: f64,
+        /// Sideslip, rad.
+        beta_rad: f64,
+    }
+
+    /// Angle of attack and sideslip seen by each fin, rad: Eq. 9-12.
+    fn fin_incidence_rad(alpha_rad: f64, beta_rad: f64) -> [(f64, f64); 4] {
+        let (sin, cos) = PLACE;
+        [
+            (cos * alpha_rad - sin * beta_rad, sin * alpha_rad + cos * beta_rad),
+            (cos * alpha_rad + sin * beta_rad, -sin * alpha_rad + cos * beta_rad),
+            (-cos * alpha_rad + sin * beta_rad, -sin * alpha_rad - cos * beta_rad),
+            (-cos * alpha_rad - sin * beta_rad, sin * alpha_rad - cos * beta_rad),
+        ]
+    }
+
+    impl FinModel {
+        /// Drag of each fin, N: Eq. 13.
+        fn drag_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+            self.force_n(self.drag_coefficient, flow, kappa_rad)
+        }
+
+        /// Magnitude of the lift of each fin, N: Eq. 14.
+        fn lift_n(&self, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+            self.force_n(self.lift_coefficient, flow, kappa_rad)
+        }
+
+        fn force_n(&self, coefficient: f64, flow: &Flow, kappa_rad: [f64; 4]) -> [f64; 4] {
+            let incidence = fin_incidence_rad(flow.alpha_rad, flow.beta_rad);
+            let open_n = flow.dynamic_pressure_pa * self.reference_area_m2 * coefficient;
+            core::array::from_fn(|i| {
+                let (alpha, beta) = incidence[i];
+                open_n * libm::sin(kappa_rad[i]) * libm::cos(alpha) * libm::cos(beta)
+            })
+        }
+
+        /// Moments of the drags and lifts about the axis: Eq. 15 with alternating signs, Eq. 16 and 17 fin by fin.
+        fn moments(&self, flow: &Flow, kappa_rad: [f64; 4]) -> Moments {
+            let (drag_n, lift_n) = (self.drag_n(flow, kappa_rad), self.lift_n(flow, kappa_rad));
+            let mut moments = Moments::default();
+            for i in 0..4 {
+                let radius_m = self.radius_m(libm::sin(kappa_rad[i]));
+                moments.roll_n_m += ROLL[i] * radius_m * lift_n[i];
+                moments.pitch_n_m += PITCH[i] * radius_m * PLACE.0 * drag_n[i];
+                moments.yaw_n_m += YAW[i] * radius_m * PLACE.1 * drag_n[i];
+            }
+            moments
+        }
+    }
 
     /// The paper's fins: section 2.1 and Eq. 2.
     fn model() -> FinModel {
@@ -136,6 +155,7 @@ mod tests {
             lift_coefficient: 1.28,
             length_m: 0.10,
             body_diameter_m: 0.074,
+            from_y: PLACE,
         }
     }
 
@@ -186,8 +206,8 @@ mod tests {
             close(found, expected, "lift");
         }
         // cos(60 deg) of incidence on fin 1 halves it: alpha cos 30 - beta sin 30 = pi/3, and the other is zero.
-        let alpha_rad = core::f64::consts::FRAC_PI_3 * COS_30;
-        let beta_rad = -core::f64::consts::FRAC_PI_3 * SIN_30;
+        let alpha_rad = core::f64::consts::FRAC_PI_3 * PLACE.1;
+        let beta_rad = -core::f64::consts::FRAC_PI_3 * PLACE.0;
         let oblique = Flow { alpha_rad, beta_rad, dynamic_pressure_pa: 1000.0 };
         close(model().drag_n(&oblique, kappa_rad)[0], 3.3325, "oblique drag");
     }
@@ -238,6 +258,30 @@ mod tests {
         close(found.roll_n_m, printed.roll_n_m, "roll");
         close(found.pitch_n_m, printed.pitch_n_m, "pitch");
         close(found.yaw_n_m, printed.yaw_n_m, "yaw");
+    }
+
+    /// Wherever the fins stand: drag along the axis and lift across it and the fin's direction, at their places, turn the vehicle
+    /// by what the allocation counts on.
+    #[test]
+    fn at_any_place_the_allocation_has_the_moments_of_the_forces() {
+        for open_deg in [20.0, 30.0, 45.0, 60.0] {
+            let model = FinModel { from_y: sin_cos_deg(open_deg), ..model() };
+            let allocation = Allocation { model, ..allocation() };
+            let kappa_rad = [0.5, 0.9, 1.3, 0.7];
+            let mut sum = Vector3::zeros();
+            for (fin, kappa_rad) in kappa_rad.into_iter().enumerate() {
+                let (sine, outward) =
+                    (libm::sin(kappa_rad), Vector2::from(model.outward(fin)).insert_row(0, 0.0));
+                assert!((libm::atan2(outward.z.abs(), outward.y.abs()).to_degrees() - open_deg).abs() < 1e-9);
+                let force_n = Vector3::x() * (800.0 * 0.0043 * 1.55 * sine)
+                    + Vector3::x().cross(&outward) * (800.0 * 0.0043 * 1.28 * sine * ROLL[fin]);
+                sum += (Vector3::x() * 0.23 + outward * model.radius_m(sine)).cross(&force_n);
+            }
+            let found = allocation.moments(800.0, kappa_rad);
+            close(found.roll_n_m, sum.x, "roll");
+            close(found.pitch_n_m, sum.y, "pitch");
+            close(found.yaw_n_m, sum.z, "yaw");
+        }
     }
 
     #[test]

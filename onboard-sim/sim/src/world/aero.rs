@@ -7,7 +7,7 @@
 //! drag along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the tail away from it.
 
 use flight::vehicle::airframe::{Airframe, Parachute as ParachuteData};
-use flight::vehicle::fins::{COS_30, FinModel, PITCH, ROLL, SIN_30, YAW};
+use flight::vehicle::fins::{FinModel, ROLL};
 use nalgebra::Vector3;
 
 use crate::world::STEP_S;
@@ -101,7 +101,7 @@ impl Load {
 impl Shape {
     /// The shape of an airframe, its forces scaled as the truth says.
     pub(crate) fn new(airframe: &Airframe, truth: &Truth) -> Self {
-        let body = &airframe.body;
+        let (body, fins) = (&airframe.body, airframe.fin_model());
         let strip_m = body.length_m / STRIPS as f64;
         Self {
             axial_area_m2: body.reference_area_m2 * body.axial_drag_coefficient * truth.body_drag_scale,
@@ -110,9 +110,11 @@ impl Shape {
                 * strip_m
                 * truth.crossflow_scale,
             strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
-            fins: airframe.fin_model(),
+            fins,
             fin_station_m: airframe.fins.station_m,
-            fin_directions: core::array::from_fn(|i| Vector3::new(0.0, -YAW[i] * COS_30, PITCH[i] * SIN_30)),
+            fin_directions: core::array::from_fn(|i| {
+                Vector3::from([0.0, fins.outward(i)[0], fins.outward(i)[1]])
+            }),
             nose_station_m: body.length_m,
             leg_drag_m2: airframe.legs.drag_area_m2 + truth.leg_drag_m2,
             legs_m: [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(y, z)| {

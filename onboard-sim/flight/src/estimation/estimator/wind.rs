@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::Estimator;
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
 use crate::vehicle::airframe::{Airframe, MassProperties};
-use crate::vehicle::fins::{COS_30, PITCH, ROLL, SIN_30, YAW};
+use crate::vehicle::fins::ROLL;
 use crate::vehicle::mission::Exhaust;
 
 /// Frames whose sideways force is averaged for one update: 20 ms, in which a gust hardly changes.
@@ -187,10 +187,9 @@ impl VehicleNow {
         let body = &airframe.body;
         let sines = fins_rad.map(libm::sin);
         let lift_area_m2 = body.reference_area_m2 * airframe.fins.lift_coefficient;
-        let mut fin_lift_area_m2 = Vector2::zeros();
+        let (fins, mut fin_lift_area_m2) = (airframe.fin_model(), Vector2::zeros());
         for fin in 0..4 {
-            let outward = Vector2::new(-YAW[fin] * COS_30, PITCH[fin] * SIN_30);
-            fin_lift_area_m2 += outward * (lift_area_m2 * sines[fin] * ROLL[fin]);
+            fin_lift_area_m2 += Vector2::from(fins.outward(fin)) * (lift_area_m2 * sines[fin] * ROLL[fin]);
         }
         Self {
             mass_kg: mass.mass_kg,
