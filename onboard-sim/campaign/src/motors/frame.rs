@@ -121,7 +121,14 @@ impl Frame {
             roll_inertia_kg_m2: self.loaded.mass.roll_inertia_kg_m2,
             propellant_station_m: motor_cg_m,
         };
-        Airframe { mass, ..self.loaded.clone() }.validate()?;
+        let mut airframe = Airframe { mass, ..self.loaded.clone() };
+        // The ring is moved with the motor's middle.
+        airframe.gimbal.pivot_station_m += motor_cg_m - self.loaded.mass.propellant_station_m;
+        airframe.validate()?;
+        if airframe.gimbal.limit_rad() > airframe.gimbal_clearance_rad(motor) {
+            let required = "less, or the motor touches the tube: a shorter or thinner motor";
+            return Err(BadValue { key: "gimbal.limit_deg", found: airframe.gimbal.limit_deg, required });
+        }
         let propellant_kg = motor.propellant_mass_kg();
         let burnt_out = MassModel::new(&mass, propellant_kg).at(propellant_kg);
         if burnt_out.pitch_inertia_kg_m2 <= 0.0 || burnt_out.mass_kg <= 0.0 {
@@ -207,7 +214,12 @@ pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, Miss
         ("propellant_station_m", propellant_station_m),
     ];
     let mass: Table = mass.into_iter().map(|(key, value)| (key.to_owned(), Value::Float(value))).collect();
-    airframe.insert("mass".to_owned(), Value::Table(mass));
+    let old = airframe.insert("mass".to_owned(), Value::Table(mass));
+    let middle_m = |mass: &Value| mass.get("propellant_station_m").and_then(Value::as_float);
+    let gimbal = airframe.get_mut("gimbal").and_then(|gimbal| gimbal.get_mut("pivot_station_m"));
+    if let (Some(Value::Float(pivot_m)), Some(was_m)) = (gimbal, old.as_ref().and_then(middle_m)) {
+        *pivot_m += propellant_station_m - was_m;
+    }
     airframe.insert("motor".to_owned(), Value::String(changes.motor.to_owned()));
     mission.insert("airframe".to_owned(), Value::Table(airframe));
     mission.insert("name".to_owned(), Value::String(changes.name.to_owned()));

@@ -137,7 +137,12 @@ impl Card {
         let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
         let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
         let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
-        let motor = |curve: &ThrustCurve| format!("{}, {:.0} N s", curve.name(), curve.total_impulse_n_s());
+        let motor = |curve: &ThrustCurve| {
+            let gone =
+                flight::vehicles::motors::status(curve.name()).filter(|(in_production, _)| !in_production);
+            let gone = gone.map_or_else(String::new, |(_, dated)| format!(", OUT OF PRODUCTION ({dated})"));
+            format!("{}, {:.0} N s{gone}", curve.name(), curve.total_impulse_n_s())
+        };
         let burns = mission.lot.as_ref().filter(|lot| lot.burns > 0);
         let upwind_s = launch.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0);
         let highest_m = |impact: &Impact| Some(impact.course.highest_m);

@@ -76,7 +76,7 @@ pub fn built_in() -> Vec<Found> {
             origin: "built in".to_owned(),
             motor: name.to_owned(),
             curve,
-            in_production: None,
+            in_production: flight::vehicles::motors::status(name).map(|(in_production, _)| in_production),
         }),
         Err(error) => {
             Err(Unusable { name: name.to_owned(), origin: "built in".to_owned(), reason: error.to_string() })

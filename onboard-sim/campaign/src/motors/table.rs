@@ -42,6 +42,7 @@ fn write_text(ranking: &[Ranked], all: bool, out: &mut String) -> fmt::Result {
             format!("{:.3} to {:.3}", window.impulse_scales[0], window.impulse_scales[1]),
             window.scatter,
             landing.flown.as_deref().map_or_else(|| "not flown".to_owned(), rate)
+                + if landing.candidate.in_production == Some(false) { "; OUT OF PRODUCTION" } else { "" }
         )?;
     }
     let others = ranking.len() - landings.len();

@@ -50,6 +50,14 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     BUILTIN.iter().map(|(name, _)| *name)
 }
 
+/// Whether a built-in motor is produced, and the day on which that was so (YYYY-MM-DD): its file says it.
+pub fn status(name: &str) -> Option<(bool, &'static str)> {
+    let (_, text) = BUILTIN.iter().find(|(known, _)| *known == name)?;
+    let line = text.lines().find_map(|line| line.strip_prefix("; status: "))?;
+    let (state, dated) = line.split_once(" production on ")?;
+    Some((state == "in", dated.get(..10)?))
+}
+
 /// The built-in motor of that name.
 ///
 /// # Errors

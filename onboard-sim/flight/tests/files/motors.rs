@@ -1,4 +1,4 @@
-use flight::vehicles::motors::{BUILTIN, builtin, named, names};
+use flight::vehicles::motors::{BUILTIN, builtin, named, names, status};
 
 /// Impulse (N s) of each motor as its maker or certifier states it, and the accepted relative error of the file's
 /// curve.
@@ -26,6 +26,9 @@ fn every_builtin_motor_parses_and_states_its_origin() {
         let motor = builtin(name).unwrap();
         assert!(name.starts_with(motor.name().trim_end_matches('W')), "{name}: {}", motor.name());
         assert!(text.starts_with("; origin:") || text.starts_with("; DERIVED"), "{name}");
+        // thrustcurve.org, as the npm package thrustcurve-db 3.0.4 has it.
+        let (in_production, dated) = status(name).expect("a file says whether its motor is produced");
+        assert!(in_production == (*name != "H45W") && dated.starts_with("20"), "{name}");
     }
     assert!(names().is_sorted());
 }
