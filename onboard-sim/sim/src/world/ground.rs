@@ -1,9 +1,10 @@
 //! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
 //! vehicle is broken if any other part touches the ground.
 //!
-//! A leg may have a block that crushes in series with its spring and damper. Its foot then moves along the body's axis and
-//! stays where it was pushed. The force that crushes it is taken along the ground's normal: at 10 degrees it is 1.5 % more along
-//! the axis. A foot has no mass of its own: the body carries it, and the block stops a little more than it has to.
+//! A leg may have a block that crushes in series with its spring and damper. Its foot then slides in a guide along the body's
+//! axis and stays where it was pushed. The block gives way when the force along the axis exceeds its own and what the guide adds:
+//! a share of the force across, which friction on the ground and a tilt bring about. A foot has no mass of its own: the body
+//! carries it, and the block stops a little more than it has to.
 
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
@@ -56,7 +57,7 @@ pub struct Rest {
 pub struct Strain {
     /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
     pub stroke_used: f64,
-    /// Largest force at a foot over the leg's strength.
+    /// Largest force at a foot over the leg's strength in that direction.
     pub strength_used: f64,
     /// Smallest distance of nozzle and body from the ground, m; 0 where they struck it.
     pub clearance_m: f64,
@@ -174,21 +175,22 @@ impl Ground {
         cg_m: &Vector3<f64>,
     ) {
         for foot in 0..self.feet_m.len() {
-            if let Some((_, force_n)) = self.on_foot(foot, state, world_from_body, cg_m) {
+            if let Some((_, force_n, _)) = self.on_foot(foot, state, world_from_body, cg_m) {
                 let place_m = self.feet_m[foot] - cg_m;
                 load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
             }
         }
     }
 
-    /// How far the ground has pushed a foot in, m, and the force on it in the world, N; `None` in the air.
+    /// How far the ground has pushed a foot in, m, the force on it in the world, N, and along the normal the force at which its leg
+    /// gives way, N; `None` in the air.
     fn on_foot(
         &self,
         foot: usize,
         state: &RigidState,
         world_from_body: &Rotation3<f64>,
         cg_m: &Vector3<f64>,
-    ) -> Option<(f64, Vector3<f64>)> {
+    ) -> Option<(f64, Vector3<f64>, f64)> {
         let normal = &self.normal;
         let place_m = self.feet_m[foot] - cg_m;
         let depth_m = -(state.position_m + world_from_body * place_m).dot(normal);
@@ -197,13 +199,22 @@ impl Ground {
         }
         let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
         let rising_m_s = sliding.dot(normal);
-        let mut normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
-        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
-            normal_n = normal_n.min(crush.force_n);
-        }
         sliding -= normal * rising_m_s;
         let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
-        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n))
+        let mut yields_n = f64::INFINITY;
+        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
+            // Per newton along the normal; what the guide holds with all of it jams.
+            let nose = world_from_body * Vector3::x();
+            let push = normal - sliding * (self.friction / fading);
+            let along = push.dot(&nose);
+            let gives = along - crush.guide_share * (push - nose * along).norm();
+            if gives > 0.0 {
+                yields_n = crush.force_n / gives;
+            }
+        }
+        let sprung_n = self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s;
+        let normal_n = sprung_n.max(0.0).min(yields_n);
+        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n, yields_n))
     }
 
     /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at the force that crushes them
@@ -212,18 +223,25 @@ impl Ground {
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;
         for foot in 0..self.feet_m.len() {
-            let Some((depth_m, force_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
+            let Some((depth_m, force_n, yields_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
                 continue;
             };
             self.pressed_n += force_n.norm();
             let Some(crush) = self.crush else { continue };
-            let beyond_m = depth_m - crush.force_n / self.stiffness_n_m;
+            let beyond_m = (depth_m - yields_n / self.stiffness_n_m) / state.nose_in_world().dot(&self.normal);
             let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
             self.given_m[foot] += gives_m;
-            self.feet_m[foot].x += gives_m;
+            let place_m = &mut self.feet_m[foot];
+            place_m.x += gives_m;
+            // Across the plane of leg and axis, and in it.
+            let sideways = Vector3::x().cross(place_m).normalize();
+            let force_n = world_from_body.inverse_transform_vector(&force_n);
+            let across_n = force_n.dot(&sideways);
+            let used = (across_n.abs() / crush.strength_across_n)
+                .max((force_n - sideways * across_n).norm() / crush.strength_n);
             let strain = &mut self.strain;
             strain.stroke_used = strain.stroke_used.max(self.given_m[foot] / crush.stroke_m);
-            strain.strength_used = strain.strength_used.max(force_n.norm() / crush.strength_n);
+            strain.strength_used = strain.strength_used.max(used);
         }
         if self.crush.is_none() {
             return;

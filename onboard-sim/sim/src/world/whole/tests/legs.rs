@@ -5,7 +5,8 @@ use flight::vehicle::airframe::Crush;
 use super::*;
 use crate::world::ground::{RestOutcome, Strain};
 
-const CRUSH: Crush = Crush { force_n: 40.0, stroke_m: 0.05, strength_n: 150.0 };
+const CRUSH: Crush =
+    Crush { force_n: 40.0, guide_share: 0.3, stroke_m: 0.05, strength_n: 150.0, strength_across_n: 80.0 };
 
 /// mk2 with blocks in its legs, stiff springs without damping, and 110 mm below the nozzle.
 fn on_blocks(crush: Crush) -> Airframe {
