@@ -341,16 +341,22 @@ pub struct Legs {
     pub crush: Option<Crush>,
 }
 
-/// A block in each leg that crushes at a nearly constant force, as honeycomb and foam do, and does not come back.
+/// A block above each foot that crushes at a nearly constant force, as foam does, and does not come back. The foot slides along
+/// the body's axis in a guide, which a force across jams a little: the foot gives way when the force along the axis exceeds
+/// `force_n` and `guide_share` times the force across.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crush {
-    /// Vertical force at the foot at which the leg gives way, N.
+    /// Force along the body's axis that crushes the block, N.
     pub force_n: f64,
+    /// Friction along the axis that the guide adds, over the force across it.
+    pub guide_share: f64,
     /// How far the foot can give way, m.
     pub stroke_m: f64,
-    /// Largest force at the foot, in any direction, that the leg bears, N.
+    /// Largest force at the foot that the leg bears in the plane of leg and axis, N.
     pub strength_n: f64,
+    /// Largest force at the foot that it bears across that plane, N.
+    pub strength_across_n: f64,
 }
 
 /// The recovery parachute, attached at the nose.
@@ -518,6 +524,12 @@ fn recovery(airframe: &Airframe) -> Check {
             "a finite number above half the loaded weight (the vehicle may stand on two feet)",
         )?;
         require(
+            crush.guide_share >= 0.0 && crush.guide_share * legs.friction_coefficient < 1.0,
+            "legs.crush.guide_share",
+            crush.guide_share,
+            "0 or more and below 1 / legs.friction_coefficient (a foot that slides does not jam)",
+        )?;
+        require(
             crush.stroke_m > 0.0 && crush.stroke_m < -legs.foot_station_m,
             "legs.crush.stroke_m",
             crush.stroke_m,
@@ -529,6 +541,7 @@ fn recovery(airframe: &Airframe) -> Check {
             crush.strength_n,
             "a finite number above legs.crush.force_n (the block gives way before the leg breaks)",
         )?;
+        positive("legs.crush.strength_across_n", crush.strength_across_n)?;
     }
     positive("parachute.area_m2", parachute.area_m2)?;
     positive("parachute.drag_coefficient", parachute.drag_coefficient)?;

@@ -1,9 +1,10 @@
 //! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
 //! vehicle is broken if any other part touches the ground.
 //!
-//! A leg may have a block that crushes in series with its spring and damper. Its foot then moves along the body's axis and
-//! stays where it was pushed. The force that crushes it is taken along the ground's normal: at 10 degrees it is 1.5 % more along
-//! the axis. A foot has no mass of its own: the body carries it, and the block stops a little more than it has to.
+//! A leg may have a block that crushes in series with its spring and damper. Its foot then slides in a guide along the body's
+//! axis and stays where it was pushed. The block gives way when the force along the axis exceeds its own and what the guide adds:
+//! a share of the force across, which friction on the ground and a tilt bring about. A foot has no mass of its own: the body
+//! carries it, and the block stops a little more than it has to.
 
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
@@ -56,7 +57,7 @@ pub struct Rest {
 pub struct Strain {
     /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
     pub stroke_used: f64,
-    /// Largest force at a foot over the leg's strength.
+    /// Largest force at a foot over the leg's strength in that direction.
     pub strength_used: f64,
     /// Smallest distance of nozzle and body from the ground, m; 0 where they struck it.
     pub clearance_m: f64,
@@ -90,7 +91,7 @@ pub(crate) struct Ground {
     /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher foot.
     feet_m: [Vector3<f64>; 4],
     /// How far each leg has given way, m.
-    given_m: [f64; 4],
+    pub(crate) given_m: [f64; 4],
     strain: Strain,
     /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
     hull_m: [Vector3<f64>; 8],
@@ -174,21 +175,22 @@ impl Ground {
         cg_m: &Vector3<f64>,
     ) {
         for foot in 0..self.feet_m.len() {
-            if let Some((_, force_n)) = self.on_foot(foot, state, world_from_body, cg_m) {
+            if let Some((_, force_n, _)) = self.on_foot(foot, state, world_from_body, cg_m) {
                 let place_m = self.feet_m[foot] - cg_m;
                 load.add_at(&place_m, &world_from_body.inverse_transform_vector(&force_n));
             }
         }
     }
 
-    /// How far the ground has pushed a foot in, m, and the force on it in the world, N; `None` in the air.
+    /// How far the ground has pushed a foot in, m, the force on it in the world, N, and along the normal the force at which its leg
+    /// gives way, N; `None` in the air.
     fn on_foot(
         &self,
         foot: usize,
         state: &RigidState,
         world_from_body: &Rotation3<f64>,
         cg_m: &Vector3<f64>,
-    ) -> Option<(f64, Vector3<f64>)> {
+    ) -> Option<(f64, Vector3<f64>, f64)> {
         let normal = &self.normal;
         let place_m = self.feet_m[foot] - cg_m;
         let depth_m = -(state.position_m + world_from_body * place_m).dot(normal);
@@ -197,13 +199,22 @@ impl Ground {
         }
         let mut sliding = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&place_m);
         let rising_m_s = sliding.dot(normal);
-        let mut normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s).max(0.0);
-        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
-            normal_n = normal_n.min(crush.force_n);
-        }
         sliding -= normal * rising_m_s;
         let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
-        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n))
+        let mut yields_n = f64::INFINITY;
+        if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
+            // Per newton along the normal; what the guide holds with all of it jams.
+            let nose = world_from_body * Vector3::x();
+            let push = normal - sliding * (self.friction / fading);
+            let along = push.dot(&nose);
+            let gives = along - crush.guide_share * (push - nose * along).norm();
+            if gives > 0.0 {
+                yields_n = crush.force_n / gives;
+            }
+        }
+        let sprung_n = self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s;
+        let normal_n = sprung_n.max(0.0).min(yields_n);
+        Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n, yields_n))
     }
 
     /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at the force that crushes them
@@ -212,18 +223,25 @@ impl Ground {
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;
         for foot in 0..self.feet_m.len() {
-            let Some((depth_m, force_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
+            let Some((depth_m, force_n, yields_n)) = self.on_foot(foot, state, &world_from_body, cg_m) else {
                 continue;
             };
             self.pressed_n += force_n.norm();
             let Some(crush) = self.crush else { continue };
-            let beyond_m = depth_m - crush.force_n / self.stiffness_n_m;
+            let beyond_m = (depth_m - yields_n / self.stiffness_n_m) / state.nose_in_world().dot(&self.normal);
             let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
             self.given_m[foot] += gives_m;
-            self.feet_m[foot].x += gives_m;
+            let place_m = &mut self.feet_m[foot];
+            place_m.x += gives_m;
+            // Across the plane of leg and axis, and in it.
+            let sideways = Vector3::x().cross(place_m).normalize();
+            let force_n = world_from_body.inverse_transform_vector(&force_n);
+            let across_n = force_n.dot(&sideways);
+            let used = (across_n.abs() / crush.strength_across_n)
+                .max((force_n - sideways * across_n).norm() / crush.strength_n);
             let strain = &mut self.strain;
             strain.stroke_used = strain.stroke_used.max(self.given_m[foot] / crush.stroke_m);
-            strain.strength_used = strain.strength_used.max(force_n.norm() / crush.strength_n);
+            strain.strength_used = strain.strength_used.max(used);
         }
         if self.crush.is_none() {
             return;
@@ -270,5 +288,133 @@ impl Ground {
             && thrust_over_weight < 0.5;
         self.still_s = if still { self.still_s + passed_s } else { 0.0 };
         (self.still_s >= STILL_S).then_some(RestOutcome::Upright)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::world::body::{Inertia, Loads, rk4_step};
+
+    fn mk3() -> Airframe {
+        flight::vehicles::airframe::builtin("mk3").unwrap()
+    }
+
+    fn at_cg(airframe: &Airframe) -> Vector3<f64> {
+        Vector3::x() * airframe.mass.loaded_cg_station_m
+    }
+
+    /// An upright mk3 with all feet 3 cm or more in the ground slides up a slope: the force along the normal at each foot, N.
+    fn crushing_n(slope_deg: f64, uphill_m_s: f64) -> f64 {
+        let airframe = mk3();
+        let (sin, cos) = libm::sincos(slope_deg.to_radians());
+        let ground = Ground::new(&airframe, [sin / cos, 0.0]);
+        let lifted_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
+        let mut state = RigidState::upright(lifted_m - 0.04 - airframe.legs.foot_radius_m * sin / cos);
+        state.velocity_m_s = Vector3::new(cos, 0.0, sin) * uphill_m_s;
+        let (mut load, world_from_body) = (Load::none(), state.world_from_body.to_rotation_matrix());
+        ground.add_load(&mut load, &state, &world_from_body, &at_cg(&airframe));
+        0.25 * (world_from_body * load.force_n).dot(&ground.normal)
+    }
+
+    /// A block of 90 N, a friction of 0.6, a guide that adds 0.4 of the force across. By hand, per newton along the normal of a
+    /// slope of 10 degrees: sin 0.17365, cos 0.98481; uphill friction is 0.6 (cos, sin).
+    #[test]
+    fn val_hand_a_foot_gives_way_at_the_blocks_force_and_what_the_guide_adds() {
+        for (slope_deg, uphill_m_s, yields_n) in [
+            (0.0, 0.0, 90.0),
+            // 90 / (1 - 0.4 x 0.6)
+            (0.0, 3.0, 118.42),
+            (0.0, -3.0, 118.42),
+            // 90 / (0.98481 - 0.4 x 0.17365)
+            (10.0, 0.0, 98.32),
+            // Downhill: 90 / (0.98481 + 0.10419 - 0.4 x (0.59088 - 0.17365))
+            (10.0, -3.0, 97.60),
+            // Uphill: 90 / (0.98481 - 0.10419 - 0.4 x (0.59088 + 0.17365))
+            (10.0, 3.0, 156.57),
+        ] {
+            let found_n = crushing_n(slope_deg, uphill_m_s);
+            assert!((found_n - yields_n).abs() < 1e-3 * yields_n, "{slope_deg}, {uphill_m_s}: {found_n} N");
+        }
+    }
+
+    struct OnGround<'a>(&'a Ground, Vector3<f64>);
+
+    impl Loads for OnGround<'_> {
+        fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, _: f64) -> Load {
+            let mut load = Load::none();
+            self.0.add_load(&mut load, state, world_from_body, &self.1);
+            load
+        }
+    }
+
+    /// What a landing loses in energy went into the blocks, their guides, friction and bent legs.
+    #[test]
+    fn val_hand_blocks_guides_friction_and_springs_take_the_energy_of_a_landing() {
+        const STEP_S: f64 = 2e-5;
+        for number in 0..12 {
+            let mut airframe = mk3();
+            airframe.legs.friction_coefficient = [0.3, 0.6, 0.9][number % 3];
+            airframe.legs.damping_n_s_m = 0.0;
+            let (mass, crush, cg_m) = (airframe.mass, airframe.legs.crush.unwrap(), at_cg(&airframe));
+            let towards = |turns: f64| {
+                let (sin, cos) = libm::sincos(core::f64::consts::TAU * turns * number as f64);
+                Vector3::new(cos, sin, 0.0)
+            };
+            let rise = towards(0.31) * 0.05;
+            let mut ground = Ground::new(&airframe, [rise.x, rise.y]);
+            let mut state = RigidState::upright(1.0);
+            state.world_from_body =
+                UnitQuaternion::from_scaled_axis(towards(0.17) * 0.1) * state.world_from_body;
+            state.velocity_m_s = towards(0.43) * 0.7 - Vector3::z() * 1.5;
+            state.rate_rad_s = Vector3::new(0.3, 0.5, -0.4);
+            state.position_m.z -= ground.clearance_m(&state, &cg_m) - 1e-5;
+            let inertia = Inertia {
+                mass_kg: mass.loaded_kg,
+                across_kg_m2: [mass.loaded_pitch_inertia_kg_m2; 2],
+                roll_kg_m2: mass.roll_inertia_kg_m2,
+                principal_rad: [0.0; 2],
+            };
+            let energy_j = |state: &RigidState| {
+                let rate = &state.rate_rad_s;
+                let turning_j = inertia.roll_kg_m2 * rate.x * rate.x
+                    + inertia.across_kg_m2[0] * (rate.y * rate.y + rate.z * rate.z);
+                let moving_j = inertia.mass_kg * state.velocity_m_s.norm_squared();
+                0.5 * (turning_j + moving_j) + inertia.mass_kg * STANDARD_GRAVITY_M_S2 * state.position_m.z
+            };
+            let before_j = energy_j(&state);
+            let (mut blocks_j, mut guides_j, mut friction_j) = (0.0, 0.0, 0.0);
+            for _ in 0..10_000 {
+                let loads = OnGround(&ground, cg_m);
+                state = rk4_step(&state, &inertia, &loads, STANDARD_GRAVITY_M_S2, STEP_S).0;
+                let (world_from_body, given_m) = (state.world_from_body.to_rotation_matrix(), ground.given_m);
+                let felt = [0, 1, 2, 3].map(|foot| ground.on_foot(foot, &state, &world_from_body, &cg_m));
+                let at_m = ground.feet_m.map(|foot| foot - cg_m);
+                ground.give_way(&state, &cg_m);
+                for (foot, felt) in felt.into_iter().enumerate() {
+                    let Some((_, force_n, _)) = felt else { continue };
+                    let gave_m = ground.given_m[foot] - given_m[foot];
+                    let nose = state.nose_in_world();
+                    let across_n = (force_n - nose * force_n.dot(&nose)).norm();
+                    blocks_j += crush.force_n * gave_m;
+                    guides_j += crush.guide_share * across_n * gave_m;
+                    let moves_m_s = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&at_m[foot]);
+                    let along_ground_n = force_n - ground.normal * force_n.dot(&ground.normal);
+                    friction_j -= along_ground_n.dot(&(moves_m_s * STEP_S + nose * gave_m));
+                }
+            }
+            let world_from_body = state.world_from_body.to_rotation_matrix();
+            let depths_m = (0..4).filter_map(|foot| ground.on_foot(foot, &state, &world_from_body, &cg_m));
+            let springs_j: f64 =
+                depths_m.map(|(depth_m, ..)| 0.5 * ground.stiffness_n_m * depth_m * depth_m).sum();
+            let (lost_j, taken_j) =
+                (before_j - energy_j(&state), blocks_j + guides_j + friction_j + springs_j);
+            let told = format!("{number}: {lost_j} J lost; {blocks_j} {guides_j} {friction_j} {springs_j}");
+            assert!((lost_j - taken_j).abs() < 0.01 * lost_j, "{told}");
+            assert!(blocks_j > 0.2 * lost_j && guides_j > 0.0 && friction_j > 0.0, "{told}");
+        }
     }
 }
