@@ -96,9 +96,9 @@ fn val_hand_a_lot_moves_the_curve_and_narrows_what_is_expected() {
 fn other_motors_and_the_curves_half_way_to_them_are_looked_up() {
     let mk3 = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
     let names: Vec<&str> = mk3.other_curves.iter().map(ThrustCurve::name).collect();
-    assert_eq!(names, ["H45W towards HP-H45W", "HP-H45W"]);
+    assert_eq!(names, ["HP-H45W towards H45W", "H45W"]);
     let (_, text) = BUILTIN.iter().find(|(name, _)| *name == "mk3").unwrap();
-    let wrong = from_toml(&text.replace("\"HP-H45W\"", "\"HP-H46W\""), "mk3").unwrap_err().to_string();
+    let wrong = from_toml(&text.replace("[\"H45W\"]", "[\"HP-H46W\"]"), "mk3").unwrap_err().to_string();
     assert!(wrong.starts_with("no motor is named 'HP-H46W'; these are built in: F10"), "{wrong}");
 }
 
@@ -121,11 +121,11 @@ fn a_lot_without_burns_confirms_nothing_and_flies_the_certified_curve() {
 #[test]
 fn a_measured_curve_and_the_weights_of_the_day_are_flown() {
     let measured = mk3_with(
-        "name = \"2609\"\nburns = 1\nweighed = { motor_kg = 0.300, vehicle_kg = 3.32 }\ncurve = \"\"\"\nH45W 38 194 P 0.1557 0.2953 AT\n1 50\n5 40\n7 0\n\"\"\"",
+        "name = \"2609\"\nburns = 1\nweighed = { motor_kg = 0.370, vehicle_kg = 3.72 }\ncurve = \"\"\"\nHP-H45W 38 203 P 0.180 0.365 AT\n1 50\n5 40\n7 0\n\"\"\"",
     );
     assert!((measured.motor_curve.total_impulse_n_s() - 245.0).abs() < 1e-9);
-    assert_eq!((measured.motor_curve.total_mass_kg(), measured.airframe.mass.loaded_kg), (0.3, 3.32));
-    assert_eq!(measured.airframe.motor, "H45W", "what is certified stays");
+    assert_eq!((measured.motor_curve.total_mass_kg(), measured.airframe.mass.loaded_kg), (0.37, 3.72));
+    assert_eq!(measured.airframe.motor, "HP-H45W", "what is certified stays");
 }
 
 #[test]
@@ -166,11 +166,12 @@ fn mk3_flies_with_the_numbers_of_mk2() {
     let (drop, leg_limits) = (mk2.drop, mk2.leg_limits);
     // mk2's legs bear less: it keeps more in hand for a weak motor.
     let (caution_sigmas, ignition) = (mk2.caution_sigmas, mk2.ignition);
-    // Only mk3 knows that two motors bear the name of its own.
+    // mk3's motor is one that is sold, from the height that its booster reaches, and may be an old one.
+    let (motor_curve, start) = (mk2.motor_curve.clone(), mk2.start);
     let (other_motors, other_curves) = (mk2.other_motors.clone(), mk2.other_curves.clone());
-    // It lands where it is nearest, and sinks faster into it.
-    let PoweredSettings { weights, homing, final_box, .. } = mk2.powered;
-    let powered = PoweredSettings { weights, homing, final_box, ..mk3.powered };
+    // It lands where it is nearest, sinks faster into it, and its gimbal has more room.
+    let PoweredSettings { weights, homing, final_box, gimbal_deg, .. } = mk2.powered;
+    let powered = PoweredSettings { weights, homing, final_box, gimbal_deg, ..mk3.powered };
     assert_eq!(
         Mission {
             name,
@@ -178,6 +179,8 @@ fn mk3_flies_with_the_numbers_of_mk2() {
             airframe,
             estimator,
             drop,
+            start,
+            motor_curve,
             other_motors,
             other_curves,
             leg_limits,
