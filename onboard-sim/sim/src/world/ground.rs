@@ -228,7 +228,8 @@ impl Ground {
             };
             self.pressed_n += force_n.norm();
             let Some(crush) = self.crush else { continue };
-            let beyond_m = (depth_m - yields_n / self.stiffness_n_m) / state.nose_in_world().dot(&self.normal);
+            let beyond_m =
+                (depth_m - yields_n / self.stiffness_n_m) / state.nose_in_world().dot(&self.normal);
             let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
             self.given_m[foot] += gives_m;
             let place_m = &mut self.feet_m[foot];
@@ -401,7 +402,8 @@ mod tests {
                     let across_n = (force_n - nose * force_n.dot(&nose)).norm();
                     blocks_j += crush.force_n * gave_m;
                     guides_j += crush.guide_share * across_n * gave_m;
-                    let moves_m_s = state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&at_m[foot]);
+                    let moves_m_s =
+                        state.velocity_m_s + world_from_body * state.rate_rad_s.cross(&at_m[foot]);
                     let along_ground_n = force_n - ground.normal * force_n.dot(&ground.normal);
                     friction_j -= along_ground_n.dot(&(moves_m_s * STEP_S + nose * gave_m));
                 }

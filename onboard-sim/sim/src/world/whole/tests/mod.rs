@@ -53,7 +53,7 @@ fn val_rocketpy_drop_times() {
         // Legs and hull are out of the way, so the centre of gravity itself falls to sea level.
         airframe.legs.foot_station_m = -1e-9;
         airframe.mass.loaded_cg_station_m = 1e-6;
-        airframe.mass.propellant_station_m = 0.0;
+        (airframe.mass.propellant_station_m, airframe.gimbal.pivot_station_m) = (0.0, 0.0);
         let (found_s, found_m_s) = drop(&airframe, 0.0);
         assert!((found_s - time_s).abs() < 0.02, "{drag_area_m2} m^2: {found_s} s, expected {time_s}");
         assert!((found_m_s - speed_m_s).abs() < 0.02, "{drag_area_m2} m^2: {found_m_s} m/s, {speed_m_s}");
@@ -66,7 +66,7 @@ fn val_rocketpy_drop_time_with_open_fins() {
     let mut airframe = flight::vehicles::airframe::builtin("mk2-h53").unwrap();
     airframe.legs.foot_station_m = -1e-9;
     airframe.mass.loaded_cg_station_m = 1e-6;
-    airframe.mass.propellant_station_m = 0.0;
+    (airframe.mass.propellant_station_m, airframe.gimbal.pivot_station_m) = (0.0, 0.0);
     let (found_s, found_m_s) = drop(&airframe, FRAC_PI_2);
     assert!((found_s - 10.338).abs() < 0.02 && (found_m_s - 39.05).abs() < 0.02, "{found_s} {found_m_s}");
 }
@@ -156,7 +156,9 @@ fn val_gimbal_signs_and_arm() {
         let mut actuators = Actuators { ignite: true, ..Actuators::default() };
         actuators.gimbal_rad[axis] = 0.1;
         world.advance(&actuators, 500);
-        let expected = -world.thrust_n() * libm::sin(world.gimbal_rad()[axis]) * world.mass().cg_station_m
+        // mk2's ring is 0.097 m above the nozzle.
+        let arm_m = world.mass().cg_station_m - 0.097;
+        let expected = -world.thrust_n() * libm::sin(world.gimbal_rad()[axis]) * arm_m
             / world.mass().pitch_inertia_kg_m2;
         let rate = world.state().rate_rad_s;
         // The most that jet damping takes.
@@ -164,6 +166,33 @@ fn val_gimbal_signs_and_arm() {
         let found = world.angular_acceleration_rad_s2()[axis + 1];
         assert!((found - expected).abs() < 0.01 * expected.abs() + slack, "axis {axis}: {found} {expected}");
         assert!(world.angular_acceleration_rad_s2()[2 - axis].abs() < 1e-9);
+    }
+}
+
+/// Free of forces, a motor that swings turns the body back: `w = -m (L^2/12 + r^2/4 + l a) / I` of the gimbal's rate, with
+/// mk2's full motor (0.294784 kg, 194 x 38 mm), a ring 0.05 m above its middle, and 0.303 m from there to the centre of gravity.
+/// The centre of gravity goes `m l / M` of the angle to the side.
+#[test]
+fn val_hand_a_swinging_motor_turns_the_body_back() {
+    let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    airframe.gimbal.pivot_station_m = 0.147;
+    let motor = motors::builtin(&airframe.motor).unwrap();
+    let truth = Truth { drag_scale: 0.0, gust_scale: 0.0, ..Truth::default() };
+    for axis in 0..2 {
+        let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(1000.0), 1).unwrap();
+        let mut actuators = Actuators::default();
+        actuators.gimbal_rad[axis] = 1.0;
+        world.advance(&actuators, 30);
+        let inertia_kg_m2 = 0.294784 * (0.194 * 0.194 / 12.0 + 0.038 * 0.038 / 16.0 + 0.05 * 0.303);
+        let expected_rad_s = -inertia_kg_m2 / 0.12 * airframe.gimbal.servo.rate_rad_s();
+        let found_rad_s = world.state().rate_rad_s[axis + 1];
+        assert!((found_rad_s / expected_rad_s - 1.0).abs() < 1e-6, "{axis}: {found_rad_s} {expected_rad_s}");
+        let aside_m = 0.294784 * 0.05 / 3.1 * libm::sin(world.gimbal_rad()[axis]);
+        let expected_m = [Vector3::new(0.4, 0.0, aside_m), Vector3::new(0.4, -aside_m, 0.0)][axis];
+        assert!((world.cg_m() - expected_m).norm() < 1e-9, "{axis}: {}", world.cg_m());
+        // It has reached its stop, and nothing is left.
+        world.advance(&actuators, 200);
+        assert!(world.state().rate_rad_s.norm() < 1e-12, "{axis}: {}", world.state().rate_rad_s);
     }
 }
 
