@@ -536,6 +536,25 @@ mod tests {
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
     }
 
+    /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks first.
+    #[test]
+    fn a_foot_that_cannot_give_way_is_named_in_the_error() {
+        let mk3 = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let wrong: [(&str, fn(&mut Crush)); 6] = [
+            ("legs.crush.force_n", |crush| crush.force_n = 16.0),
+            ("legs.crush.guide_share", |crush| crush.guide_share = 1.7),
+            ("legs.crush.guide_share", |crush| crush.guide_share = -0.1),
+            ("legs.crush.stroke_m", |crush| crush.stroke_m = 0.1),
+            ("legs.crush.strength_n", |crush| crush.strength_n = 90.0),
+            ("legs.crush.strength_across_n", |crush| crush.strength_across_n = 0.0),
+        ];
+        for (key, change) in wrong {
+            let mut airframe = mk3.clone();
+            airframe.legs.crush.iter_mut().for_each(change);
+            assert_eq!(airframe.validate().unwrap_err().key, key);
+        }
+    }
+
     #[test]
     fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
         let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();

@@ -240,8 +240,7 @@ fn regress_mk3s_legs_on_ground_that_grips() {
 /// A drop of a dummy: how far its lowest and its highest foot have risen, and how far it bounced, mm.
 fn dropped(airframe: &Airframe, height_m: f64, lean_rad: f64) -> [f64; 3] {
     let mut state = RigidState::upright(1.0);
-    state.world_from_body =
-        UnitQuaternion::from_scaled_axis(Vector3::y() * lean_rad) * state.world_from_body;
+    state.world_from_body = UnitQuaternion::from_scaled_axis(Vector3::y() * lean_rad) * state.world_from_body;
     let above = placed(airframe, &Truth::default(), &state);
     state.position_m.z -= above.ground.clearance_m(&state, &above.cg_m()) - height_m;
     let mut world = placed(airframe, &Truth::default(), &state);
