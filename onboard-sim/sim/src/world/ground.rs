@@ -18,7 +18,7 @@ use crate::world::aero::Load;
 const SLIDING_M_S: f64 = 0.05;
 /// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth order is stable to 2.78.
 const STIFFEST: f64 = 1.5;
-/// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 35,000 times per second.
+/// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 34,000 times per second.
 const MOST_PARTS: usize = 16;
 /// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
 const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
