@@ -613,6 +613,24 @@ mod tests {
         }
     }
 
+    /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks first.
+    #[test]
+    fn a_foot_that_cannot_give_way_is_named_in_the_error() {
+        let mut airframe = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let sound = airframe.legs.crush.unwrap();
+        for (key, crush) in [
+            ("legs.crush.force_n", Crush { force_n: 16.0, ..sound }),
+            ("legs.crush.guide_share", Crush { guide_share: 1.7, ..sound }),
+            ("legs.crush.guide_share", Crush { guide_share: -0.1, ..sound }),
+            ("legs.crush.stroke_m", Crush { stroke_m: 0.1, ..sound }),
+            ("legs.crush.strength_n", Crush { strength_n: 90.0, ..sound }),
+            ("legs.crush.strength_across_n", Crush { strength_across_n: 0.0, ..sound }),
+        ] {
+            airframe.legs.crush = Some(crush);
+            assert_eq!(airframe.validate().unwrap_err().key, key);
+        }
+    }
+
     #[test]
     fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
         let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();

@@ -4,7 +4,8 @@
 //! A leg may have a block that crushes in series with its spring and damper. Its foot then slides in a guide along the body's
 //! axis and stays where it was pushed. The block gives way when the force along the axis exceeds its own and what the guide adds:
 //! a share of the force across, which friction on the ground and a tilt bring about. A foot has no mass of its own: the body
-//! carries it, and the block stops a little more than it has to.
+//! carries it, and the block stops a little more than it has to. Its friction on the ground is that of a foot which moves with the
+//! body, also while it slides in its guide. Legs do not bend across.
 
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
@@ -17,7 +18,7 @@ use crate::world::aero::Load;
 const SLIDING_M_S: f64 = 0.05;
 /// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth order is stable to 2.78.
 const STIFFEST: f64 = 1.5;
-/// Most parts of a step. Legs that crush press mk3's feet with 360 N, and turn its slim body 42,000 times per second.
+/// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 34,000 times per second.
 const MOST_PARTS: usize = 16;
 /// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
 const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
@@ -65,11 +66,6 @@ pub struct Strain {
     pub tilt_rad: f64,
 }
 
-impl Strain {
-    const NONE: Self =
-        Self { stroke_used: 0.0, strength_used: 0.0, clearance_m: f64::INFINITY, tilt_rad: 0.0 };
-}
-
 /// How a vehicle comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestOutcome {
@@ -111,12 +107,6 @@ pub(crate) struct Contact {
     pub(crate) hull: bool,
 }
 
-impl Contact {
-    pub(crate) fn any(self) -> bool {
-        self.feet > 0 || self.hull
-    }
-}
-
 impl Ground {
     pub(crate) fn new(airframe: &Airframe, rise: [f64; 2]) -> Self {
         let (legs, body) = (&airframe.legs, &airframe.body);
@@ -133,7 +123,12 @@ impl Ground {
             crush: legs.crush,
             feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
             given_m: [0.0; 4],
-            strain: Strain::NONE,
+            strain: Strain {
+                stroke_used: 0.0,
+                strength_used: 0.0,
+                clearance_m: f64::INFINITY,
+                tilt_rad: 0.0,
+            },
             hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
             upwards,
             normal: upwards / upwards.norm(),
@@ -203,14 +198,12 @@ impl Ground {
         let fading = (sliding.norm_squared() + SLIDING_M_S * SLIDING_M_S).sqrt();
         let mut yields_n = f64::INFINITY;
         if let Some(crush) = self.crush.filter(|crush| self.given_m[foot] < crush.stroke_m) {
-            // Per newton along the normal; what the guide holds with all of it jams.
+            // Per newton along the normal; a guide that holds all of it jams.
             let nose = world_from_body * Vector3::x();
             let push = normal - sliding * (self.friction / fading);
             let along = push.dot(&nose);
             let gives = along - crush.guide_share * (push - nose * along).norm();
-            if gives > 0.0 {
-                yields_n = crush.force_n / gives;
-            }
+            yields_n = crush.force_n / gives.max(0.0);
         }
         let sprung_n = self.stiffness_n_m * depth_m - self.damping_n_s_m * rising_m_s;
         let normal_n = sprung_n.max(0.0).min(yields_n);
@@ -230,7 +223,7 @@ impl Ground {
             let Some(crush) = self.crush else { continue };
             let beyond_m =
                 (depth_m - yields_n / self.stiffness_n_m) / state.nose_in_world().dot(&self.normal);
-            let gives_m = beyond_m.clamp(0.0, crush.stroke_m - self.given_m[foot]);
+            let gives_m = beyond_m.min(crush.stroke_m - self.given_m[foot]).max(0.0);
             self.given_m[foot] += gives_m;
             let place_m = &mut self.feet_m[foot];
             place_m.x += gives_m;

@@ -349,7 +349,7 @@ impl World {
             specific_force += self.specific_force_m_s2;
             angular_acceleration += self.angular_acceleration_rad_s2;
             let contact = self.ground.contact(&self.state, &self.cg_m());
-            if self.touchdown.is_none() && contact.any() {
+            if self.touchdown.is_none() && (contact.feet > 0 || contact.hull) {
                 // The last state before contact: within this part the feet have already pushed.
                 self.touchdown = Some(self.touchdown_at(time_s, &before));
             }

@@ -263,6 +263,10 @@ fn the_drop_test_on_the_page_has_the_worlds_bounds() {
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
     let [soft_n, hard_n] = BLOCKS_N;
     assert!(words.contains(&format!("between {soft_n} and {hard_n} N")), "of the scale");
+    let mk3 = flight::vehicles::airframe::builtin("mk3").unwrap();
+    let Crush { force_n, guide_share, .. } = mk3.legs.crush.unwrap();
+    let most_n = force_n / (1.0 - guide_share * mk3.legs.friction_coefficient);
+    assert!(page.contains(&format!("| foot gives way at | {force_n} to {most_n:.0} N |")), "{most_n}");
     let lean_rad = libm::asin(0.16 / 0.9);
     for (drop, height_m, lean_rad) in [
         ("level, from 0.12 m", 0.12, 0.0),
