@@ -10,8 +10,8 @@ use ratatui::widgets::{Block, Clear};
 
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
-    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
-    role_name, why_not_here, why_not_quit, why_untested,
+    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TextEntry,
+    palette_entries, role_name, why_not_here, why_not_quit, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -94,12 +94,17 @@ pub fn dialog_lines(
         }
         Prompt::Check { moves } => {
             let begins = if moves {
-                format!("Gimbal and fins MOVE for 8 s: hands off. Enter {left}.")
+                format!("Gimbal and fins MOVE for 8 s, or 30 s to be seen: hands off. Enter {left}.")
             } else {
                 format!("Nothing moves. Enter {left} begins.")
             };
             let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
             ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
+        }
+        Prompt::Seen => {
+            let saw = SURFACES.map(|(_, _, words)| plain(words.to_owned()));
+            let below = "One person's word; it takes two. What moved otherwise is mended first.".to_owned();
+            ("SEEN, in this order and nothing else?", saw.to_vec(), vec![plain(below)])
         }
         Prompt::Sign { step: number, void } => {
             let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));

@@ -56,6 +56,9 @@ pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 const AT_REST_S: f64 = 1.0;
 
+/// From this sine of its opening on a fin is out of the way of what leaves the hatch: mk3's end then stands 8 cm off the skin.
+const HATCH_FREE_SINE: f64 = 0.7;
+
 /// When the vehicle was released.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Release {
@@ -139,6 +142,7 @@ impl Computer {
             flying: flown.is_some(),
             lifted_off: self.pilot.has_lifted_off(),
             separation_due: self.pilot.separates(),
+            hatch_free: self.hatch_is_free(input),
         };
         self.commands.outputs = Outputs::decided(self.table.mode(), progress);
         Output {
@@ -148,6 +152,17 @@ impl Computer {
             news: self.table.take_news(),
             planned,
         }
+    }
+
+    /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their servos since they were told
+    /// to. One that is stuck keeps no parachute in.
+    fn hatch_is_free(&self, input: &Input<'_>) -> bool {
+        let airframe = &self.pilot.mission().airframe;
+        let fins = &airframe.fins;
+        let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
+        let stand_open = input.fins_rad.iter().all(|fin_rad| libm::sin(*fin_rad) >= HATCH_FREE_SINE);
+        airframe.servos_tell && stand_open
+            || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
     }
 
     /// One frame. Also returns the landing that the pilot plans in it, solved separately; `None` if it plans none.

@@ -84,9 +84,13 @@ impl VehicleEndpoint {
 /// Whether it may move or light something, or lets somebody go on who does.
 fn can_move(asked: Asked) -> bool {
     match asked {
-        Asked::Arm | Asked::Start | Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill => {
-            true
-        }
+        Asked::Arm
+        | Asked::Start
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::Seen => true,
         Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck => false,
     }
 }

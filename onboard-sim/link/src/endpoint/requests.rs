@@ -197,9 +197,13 @@ impl VehicleEndpoint {
 /// Whether a request can make something move or light.
 fn may_move(asked: Asked) -> bool {
     match asked {
-        Asked::Arm | Asked::Start | Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill => {
-            true
-        }
+        Asked::Arm
+        | Asked::Start
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::Seen => true,
         Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck => false,
     }
 }

@@ -88,6 +88,7 @@ impl World {
                 Linkage::new(truth.gimbal_gain, 0.0, truth.gimbal_slop_rad, (-far_rad, far_rad), 0.0)
             }),
             fin_links: fin_links_at(airframe, truth, airframe.fins.closed_rad()),
+            wires: core::array::from_fn(|surface| (surface, false)),
             parachute: Parachute::new(&airframe.parachute),
             air: AirHere::at(initial.position_m.z),
             wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)
@@ -292,6 +293,7 @@ impl World {
                 self.gimbal_links[axis].changed(&other.gimbal_links[axis])
             }),
             fin_links: core::array::from_fn(|fin| self.fin_links[fin].changed(&other.fin_links[fin])),
+            wires: self.wires,
             parachute: self.parachute.clone(),
             wind: self.wind.changed(&other.wind),
             air: self.air,
