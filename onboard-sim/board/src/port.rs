@@ -10,7 +10,7 @@ pub trait Board {
     type Error;
 
     /// Waits for the end of the frame, 5 ms after the last one, and reads everything: gyro and accelerometer in every frame,
-    /// barometer, satellites and lidar if they have something new; gimbal and fins as commanded if their servos do not say
+    /// barometer, satellites and lidar if they have something new; gimbal and fins, which nobody reads if the airframe says that their servos do not tell
     /// where they are. [`Input`] says what each value is; its number and its time are set by the loop. `None`: the
     /// flight is over.
     ///

@@ -38,6 +38,7 @@ use self::pad_check::PadCheck;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
+use crate::control::silent::SilentServo;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
@@ -96,6 +97,8 @@ pub struct Computer {
     crew: CrewMemory,
     fins_answering: [bool; 4],
     pad_check: PadCheck,
+    /// Gimbal (pitch, yaw) and fins of a vehicle whose servos tell nothing.
+    silent: [SilentServo; 6],
     release: Option<Release>,
     level: ControlLevel,
 }
@@ -104,6 +107,7 @@ impl Computer {
     /// One frame. In the air: estimate, predict, answer the crew, decide, plan, point. On the pad: answer the crew, and wait.
     /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
+        let input = &self.with_silent_servos(input);
         self.table.begin(input.time_s);
         self.report_changes(input);
         self.input = input.kept();
@@ -152,6 +156,21 @@ impl Computer {
             news: self.table.take_news(),
             planned,
         }
+    }
+
+    /// The input with the positions that servos should have which tell none.
+    fn with_silent_servos<'a>(&mut self, input: &Input<'a>) -> Input<'a> {
+        let airframe = &self.pilot.mission().airframe;
+        if airframe.servos_tell {
+            return *input;
+        }
+        let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], .. } = self.commands;
+        let told_rad = [pitch, yaw, one, two, three, four];
+        let [pitch, yaw, one, two, three, four] = core::array::from_fn(|surface| {
+            let servo = if surface < 2 { &airframe.gimbal.servo } else { &airframe.fins.servo };
+            self.silent[surface].step(told_rad[surface], servo)
+        });
+        Input { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..*input }
     }
 
     /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their servos since they were told
