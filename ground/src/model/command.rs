@@ -141,9 +141,7 @@ impl CommandKind {
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
             // The answer is all there is to see.
-            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck | Self::Seen => {
-                false
-            }
+            _ => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
@@ -182,9 +180,7 @@ impl CommandKind {
             Self::Disarm => "HEARTBEAT says disarmed",
             Self::Start | Self::ConfirmStart => "countdown runs",
             Self::Hold => "no countdown",
-            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck | Self::Seen => {
-                "accepted"
-            }
+            _ => "accepted",
             Self::Abort => "abort latched",
         }
     }

@@ -55,7 +55,7 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
     says("pitch inertia", [ten_s(0.0), ten_s(-share), ten_s(share)], 1);
     // A rod of 0.5 m in the motor's place.
     let (rod_mm, limit_deg) = (500.0, mk3.gimbal.limit_deg);
-    let tip_mm = |deg: f64| rod_mm * deg.to_radians().tan();
+    let tip_mm = |deg: f64| rod_mm * libm::tan(deg.to_radians());
     says("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
     says("thrust line, place", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
     let gain = SIGMAS * wrong.gimbal_gain_share;
