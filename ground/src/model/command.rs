@@ -140,14 +140,14 @@ impl CommandKind {
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
-            // The answer is all there is to see.
-            _ => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
                     || status.is_some_and(|status| status.value.interlocks.contains(latched))
             }
+            // The answer is all there is to see.
+            _ => false,
         }
     }
 
@@ -180,8 +180,8 @@ impl CommandKind {
             Self::Disarm => "HEARTBEAT says disarmed",
             Self::Start | Self::ConfirmStart => "countdown runs",
             Self::Hold => "no countdown",
-            _ => "accepted",
             Self::Abort => "abort latched",
+            _ => "accepted",
         }
     }
 }

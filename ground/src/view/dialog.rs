@@ -16,6 +16,16 @@ use crate::model::{
 
 const BOX_COLUMNS: u16 = 68;
 
+/// What a person says who has seen a check: title, lines above and below.
+fn seen(theme: Theme) -> (&'static str, Vec<Line<'static>>, Vec<Line<'static>>) {
+    let saw = SURFACES.map(|(_, _, words)| theme.line(words, TextRole::Plain));
+    (
+        "SEEN, in this order and nothing else?",
+        saw.to_vec(),
+        vec![theme.line("It takes two people.", TextRole::Plain)],
+    )
+}
+
 /// Title and lines of the open dialog; `None` if none is open.
 pub fn dialog_lines(
     model: &Model,
@@ -101,11 +111,7 @@ pub fn dialog_lines(
             let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
             ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
         }
-        Prompt::Seen => {
-            let saw = SURFACES.map(|(_, _, words)| plain(words.to_owned()));
-            let below = "One person's word; it takes two. What moved otherwise is mended first.".to_owned();
-            ("SEEN, in this order and nothing else?", saw.to_vec(), vec![plain(below)])
-        }
+        Prompt::Seen => seen(theme),
         Prompt::Sign { step: number, void } => {
             let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
             let words = step.map(|step| step.words.clone()).unwrap_or_default();
