@@ -12,7 +12,7 @@ use serde::Deserialize;
 use super::{
     Model, Page, Role, Vehicle,
     quantity::{self, Quantity},
-    why_not_arm, why_not_check, why_not_here, why_not_start, why_not_take, words,
+    why_not_arm, why_not_check, why_not_here, why_not_seen, why_not_start, why_not_take, words,
 };
 use crate::key::Key;
 
@@ -34,6 +34,8 @@ pub enum Act {
     Check,
     /// The same for a check without motion.
     CheckStill,
+    /// Open the dialog that says that every surface moved as it should.
+    Seen,
     /// Begin the radio range test.
     RangeTest,
     Acknowledge,
@@ -75,7 +77,7 @@ const fn define(act: Act, name: &'static str, usual: char, words: &'static str) 
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 40] = [
+pub const DEFINITIONS: [Definition; 41] = [
     define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -84,6 +86,7 @@ pub const DEFINITIONS: [Definition; 40] = [
     define(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
     define(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
     define(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
+    define(Act::Seen, "moved-right", 'Y', "I saw every surface move as the page x says: then SEEN and Enter"),
     define(Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
     define(Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
     define(Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
@@ -151,6 +154,7 @@ impl Act {
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
             Self::RangeTest => commands && why_not_check(model, now).is_none(),
+            Self::Seen => acts && why_not_seen(model, now).is_none(),
             Self::Check | Self::CheckStill => acts && why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
@@ -201,6 +205,7 @@ impl Act {
                 | Self::TakeCommand
                 | Self::Check
                 | Self::CheckStill
+                | Self::Seen
                 | Self::RangeTest
                 | Self::SignStep
                 | Self::VoidStep

@@ -8,7 +8,7 @@ use protocol::identity::Address;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Ask, GONE_AFTER, LinkState, Model, Prompt, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words,
+    Ask, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little over two
@@ -37,10 +37,12 @@ pub enum CommandKind {
     CheckStill,
     /// End the running check.
     EndCheck,
+    /// One person has seen every surface of the last check move as its page says.
+    Seen,
 }
 
 impl CommandKind {
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Arm,
         Self::Disarm,
         Self::Start,
@@ -53,6 +55,7 @@ impl CommandKind {
         Self::Check,
         Self::CheckStill,
         Self::EndCheck,
+        Self::Seen,
     ];
 
     /// The name on screens and in the log.
@@ -70,6 +73,7 @@ impl CommandKind {
             Self::Check => "CHECK",
             Self::CheckStill => "CHECK WITHOUT MOTION",
             Self::EndCheck => "END OF CHECK",
+            Self::Seen => "SEEN",
         }
     }
 
@@ -85,6 +89,7 @@ impl CommandKind {
             Self::EndCheck => (MavCmd::MAV_CMD_TD_PAD_CHECK, 0.0),
             Self::Check => (MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0),
             Self::CheckStill => (MavCmd::MAV_CMD_TD_PAD_CHECK, 2.0),
+            Self::Seen => (MavCmd::MAV_CMD_TD_PAD_CHECK, 3.0),
             Self::Abort => (MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0),
         }
     }
@@ -100,7 +105,8 @@ impl CommandKind {
             | Self::Tap
             | Self::TakeCommand
             | Self::Check
-            | Self::CheckStill => true,
+            | Self::CheckStill
+            | Self::Seen => true,
             Self::Disarm | Self::Hold | Self::Abort | Self::EndCheck => false,
         }
     }
@@ -115,7 +121,7 @@ impl CommandKind {
     /// just laid hands on.
     pub fn resend(self) -> Resend {
         match self {
-            Self::Tap | Self::Check | Self::CheckStill => Resend::Never,
+            Self::Tap | Self::Check | Self::CheckStill | Self::Seen => Resend::Never,
             Self::Arm | Self::ConfirmArm | Self::Start | Self::ConfirmStart => Resend::Times(4),
             Self::Disarm | Self::Hold | Self::TakeCommand | Self::EndCheck => Resend::Times(3),
             Self::Abort => Resend::UntilWithdrawn,
@@ -134,14 +140,14 @@ impl CommandKind {
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
-            // The answer is all there is to see.
-            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck => false,
             // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
                     || status.is_some_and(|status| status.value.interlocks.contains(latched))
             }
+            // The answer is all there is to see.
+            _ => false,
         }
     }
 
@@ -161,7 +167,10 @@ impl CommandKind {
 
     /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
     pub fn shows_nothing(self) -> bool {
-        matches!(self, Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck)
+        matches!(
+            self,
+            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck | Self::Seen
+        )
     }
 
     /// What shows the effect, for the event "observed".
@@ -171,8 +180,8 @@ impl CommandKind {
             Self::Disarm => "HEARTBEAT says disarmed",
             Self::Start | Self::ConfirmStart => "countdown runs",
             Self::Hold => "no countdown",
-            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck => "accepted",
             Self::Abort => "abort latched",
+            _ => "accepted",
         }
     }
 }
@@ -409,6 +418,13 @@ pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.vehicle.is_armed().then(|| "armed: disarm first".to_owned()))
         .or_else(|| why_no_key(model))
         .or_else(|| why_not_in(model, is_on_pad))
+}
+
+/// Why nobody can say here that every surface moved as it should.
+pub fn why_not_seen(model: &Model, now: Duration) -> Option<String> {
+    let seen = model.vehicle.pad_check.as_ref().is_some_and(PadCheck::awaits_eyes);
+    why_not_check(model, now)
+        .or_else(|| (!seen).then(|| "no check of servos that tell nothing has passed".into()))
 }
 
 /// Why the ground does not take command.

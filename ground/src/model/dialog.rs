@@ -44,6 +44,8 @@ pub enum Prompt {
     Check {
         moves: bool,
     },
+    /// Say that every surface moved as it should.
+    Seen,
     /// Sign a step of the checklist, counted from zero, or take its signature back.
     Sign {
         step: usize,
@@ -82,6 +84,7 @@ impl Prompt {
             Self::Disarm => "disarm",
             Self::Hold => "hold",
             Self::Check { .. } => "check",
+            Self::Seen => "seen motion",
             Self::Sign { void: false, .. } => "signature",
             Self::Sign { void: true, .. } => "voiding",
             Self::Quit => "quit",
@@ -94,6 +97,7 @@ impl Prompt {
             Self::Disarm | Self::Hold | Self::Check { .. } | Self::Sign { .. } => None,
             Self::Arm => Some("ARM"),
             Self::Start => Some("START"),
+            Self::Seen => Some("SEEN"),
             Self::Confirm(_) => Some(CONFIRM_WORD),
             Self::WithoutLog => Some("NOLOG"),
             Self::Untested => Some("UNTESTED"),

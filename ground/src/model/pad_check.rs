@@ -10,12 +10,23 @@ use protocol::link_stats::FrameCounts;
 
 use super::{Acknowledgement, CommandKind, Model, Seat};
 
-/// A check with motion takes 13 s. If neither answer nor end of one that was asked for is heard, it may run for so long.
-const LONGEST: Duration = Duration::from_secs(20);
+/// A check with motion takes 13 s, and 40 s if people watch the surfaces. If neither answer nor end of one that was asked for is heard, it may run for so long.
+const LONGEST: Duration = Duration::from_secs(50);
 /// What the vehicle reported before it had a command may arrive so much later than the command was given.
 const LATE: Duration = Duration::from_secs(3);
 /// Whoever presses the key again to end a check that has just ended does not want another one.
 const JUST_ENDED: Duration = Duration::from_secs(3);
+
+/// The surfaces in the order in which a check moves them, the number of the first item of each, and what people see. Fins
+/// have their numbers painted on: seen from the nose they count counter-clockwise (MK3.md, Axes and signs).
+pub const SURFACES: [(&str, u32, &str); 6] = [
+    ("gimbal pitch", 0, "nozzle swings towards fins 1 and 4, then towards 2 and 3"),
+    ("gimbal yaw", 3, "nozzle swings towards fins 1 and 2, then towards 3 and 4"),
+    ("fin 1", 6, "fin 1 alone opens fully, then closes"),
+    ("fin 2", 9, "fin 2 alone opens fully, then closes"),
+    ("fin 3", 12, "fin 3 alone opens fully, then closes"),
+    ("fin 4", 15, "fin 4 alone opens fully, then closes"),
+];
 
 /// How a check stands, as far as this station can know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,6 +96,14 @@ impl PadCheck {
 
     pub fn is_running(&self) -> bool {
         self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
+    }
+
+    /// Whether it moved surfaces that tell nothing, and nothing else was wrong: people say what they saw.
+    pub fn awaits_eyes(&self) -> bool {
+        let told = |item: TdPadCheckItem| self.of(item).map(|value| value.verdict);
+        self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED
+            && told(TdPadCheckItem::TD_PAD_CHECK_ITEM_FIN_1_RANGE)
+                == Some(TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED)
     }
 
     /// Whether it is over, and every value that it found has arrived.

@@ -362,6 +362,7 @@ fn event(frame: Frame, sides: &mut Sides) -> Option<RecordedEvent> {
         MavCmd::MAV_CMD_MISSION_START if command.param3 >= 1.0 => CommandKind::ConfirmStart,
         MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => CommandKind::Hold,
         MavCmd::MAV_CMD_TD_TAKE_COMMAND => CommandKind::TakeCommand,
+        MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 2.5 => CommandKind::Seen,
         MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 1.5 => CommandKind::CheckStill,
         MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 0.5 => CommandKind::Check,
         MavCmd::MAV_CMD_TD_PAD_CHECK => CommandKind::EndCheck,

@@ -17,7 +17,7 @@ use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, Does, FINGERS_APART, KeyOrigin, LogStanding,
     Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by, palette_entries,
     quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
-    why_not_seat, why_not_start, why_not_take, why_nothing_moves, why_untested,
+    why_not_seat, why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 use crate::update;
 
@@ -206,6 +206,7 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
         Prompt::Disarm => ask(model, CommandKind::Disarm, now),
         Prompt::AbortForeign => ask(model, CommandKind::Abort, now),
         Prompt::Check { moves: true } => ask(model, CommandKind::Check, now),
+        Prompt::Seen => ask(model, CommandKind::Seen, now),
         Prompt::Check { moves: false } => ask(model, CommandKind::CheckStill, now),
         Prompt::Sign { step, void } => pad::ask_to_sign(model, (step, void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
@@ -321,6 +322,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::TakeCommand => {
             climb(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
         }
+        Act::Seen => climb(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
             Standing::JustEnded => {
@@ -528,6 +530,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
             let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
             why_nothing_moves(model, now).or_else(none)
         }
+        CommandKind::Seen => why_not_seen(model, now),
         CommandKind::Check | CommandKind::CheckStill => {
             already_sent(model, kind, now).or_else(|| why_not_check(model, now))
         }

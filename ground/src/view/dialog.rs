@@ -10,11 +10,21 @@ use ratatui::widgets::{Block, Clear};
 
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
-    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, TextEntry, palette_entries,
-    role_name, why_not_here, why_not_quit, why_untested,
+    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TextEntry,
+    palette_entries, role_name, why_not_here, why_not_quit, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
+
+/// What a person says who has seen a check: title, lines above and below.
+fn seen(theme: Theme) -> (&'static str, Vec<Line<'static>>, Vec<Line<'static>>) {
+    let saw = SURFACES.map(|(_, _, words)| theme.line(words, TextRole::Plain));
+    (
+        "SEEN, in this order and nothing else?",
+        saw.to_vec(),
+        vec![theme.line("It takes two people.", TextRole::Plain)],
+    )
+}
 
 /// Title and lines of the open dialog; `None` if none is open.
 pub fn dialog_lines(
@@ -94,13 +104,14 @@ pub fn dialog_lines(
         }
         Prompt::Check { moves } => {
             let begins = if moves {
-                format!("Gimbal and fins MOVE for 8 s: hands off. Enter {left}.")
+                format!("Gimbal and fins MOVE for 8 s, or 30 s to be seen: hands off. Enter {left}.")
             } else {
                 format!("Nothing moves. Enter {left} begins.")
             };
             let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
             ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
         }
+        Prompt::Seen => seen(theme),
         Prompt::Sign { step: number, void } => {
             let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
             let words = step.map(|step| step.words.clone()).unwrap_or_default();

@@ -21,7 +21,9 @@ fn checks(rig: &mut Rig) -> Vec<f32> {
 }
 
 /// Values of a check: gimbal pitch, one fin that is stuck, battery, pin.
-fn values() -> [(Item, f32, f32, f32, Verdict); 9] {
+type Value = (Item, f32, f32, f32, Verdict);
+
+fn values() -> [Value; 9] {
     const NONE: f32 = f32::NAN;
     let (ok, no) = (Verdict::TD_PAD_CHECK_VERDICT_OK, Verdict::TD_PAD_CHECK_VERDICT_NOT_OK);
     [
@@ -39,7 +41,11 @@ fn values() -> [(Item, f32, f32, f32, Verdict); 9] {
 
 /// The vehicle tells the first values of a check.
 fn tell(rig: &mut Rig, run: u16, state: State, found: usize) {
-    for (place, (item, value, least, most, verdict)) in values().into_iter().take(found).enumerate() {
+    tell_values(rig, run, state, &values()[..found]);
+}
+
+fn tell_values(rig: &mut Rig, run: u16, state: State, values: &[Value]) {
+    for (place, (item, value, least, most, verdict)) in values.iter().copied().enumerate() {
         rig.hear(&MavMessage::TD_PAD_CHECK(TD_PAD_CHECK_DATA {
             time_boot_ms: rig.boot_ms(),
             value,
@@ -51,7 +57,7 @@ fn tell(rig: &mut Rig, run: u16, state: State, found: usize) {
             state,
             progress: if state == State::TD_PAD_CHECK_STATE_RUNNING { 40 } else { 100 },
             place: place as u8,
-            found: found as u8,
+            found: values.len() as u8,
             asked_by: 0,
         }));
     }
@@ -108,6 +114,36 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     rig.keys(&[Key::Char('E'), Key::Enter]);
     assert_eq!(checks(&mut rig), [2.0], "without motion");
     assert!(alarms(&rig.model).is_empty(), "{:?}", rig.model.alarms.list());
+}
+
+/// Servos that tell nothing: while they move and afterwards the page says what people see, and one person's word takes a word.
+#[test]
+fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
+    let shown = Verdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED;
+    let silent = [
+        (Item::TD_PAD_CHECK_ITEM_GIMBAL_PITCH_RANGE, f32::NAN, f32::NAN, f32::NAN, shown),
+        (Item::TD_PAD_CHECK_ITEM_FIN_1_RANGE, f32::NAN, f32::NAN, f32::NAN, shown),
+    ];
+    let mut rig = Rig::crewed();
+    rig.key(Key::Char('x'));
+    rig.keys(&[Key::Char('Y')]);
+    assert!(rig.events().contains("no check of servos that tell nothing has passed"), "{}", rig.events());
+    rig.run(3.0);
+    tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
+    let words = "gimbal pitch  nozzle swings towards fins 1 and 4, then towards 2 and 3";
+    assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
+    tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_PASSED, &silent);
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("CHECK 1 PASSED but for what only people see"), "{screen}");
+    assert!(screen.contains("fin 4         fin 4 alone opens fully, then closes"), "{screen}");
+    assert!(checks(&mut rig).is_empty());
+    rig.key(Key::Char('Y'));
+    let screen = rig.screen(80, 24);
+    assert!(screen.contains("SEEN, in this order and nothing else?"), "{screen}");
+    rig.keys(&[Key::Char('S'), Key::Char('E'), Key::Char('E'), Key::Char('N'), Key::Enter]);
+    assert_eq!(checks(&mut rig), [3.0]);
+    rig.run(3.0);
+    assert!(checks(&mut rig).is_empty(), "one word is one person's");
 }
 
 #[test]

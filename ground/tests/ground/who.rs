@@ -580,7 +580,7 @@ impl Random {
 #[test]
 fn no_screen_acts_with_the_key_of_another_person() {
     const PEOPLE: [&str; 6] = ["Ann", "Bob", "Cyd", "", "ann", "Ann on pts/3"];
-    const KINDS: [CommandKind; 12] = CommandKind::ALL;
+    const KINDS: [CommandKind; 13] = CommandKind::ALL;
     let mut random = Random(1);
     let mut stations =
         [(1, "Ann"), (2, "Bob")].map(|(number, name)| station_of(number, name, Role::Station, name));

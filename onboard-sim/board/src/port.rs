@@ -10,9 +10,9 @@ pub trait Board {
     type Error;
 
     /// Waits for the end of the frame, 5 ms after the last one, and reads everything: gyro and accelerometer in every frame,
-    /// barometer, satellites and lidar if they have something new; gimbal and fins as commanded if their servos do not say
-    /// where they are. [`Input`] says what each value is; its number and its time are set by the loop. `None`: the
-    /// flight is over.
+    /// barometer, satellites and lidar if they have something new; gimbal and fins, which are not read if the airframe says
+    /// that their servos do not tell where they are. [`Input`] says what each value is; its number and its time are set by the
+    /// loop. `None`: the flight is over.
     ///
     /// # Errors
     /// A device without which nothing can be decided has failed: the loop ends.

@@ -81,6 +81,7 @@ pub mod control {
 
     pub mod aim;
     pub mod fins;
+    pub(crate) mod silent;
 }
 
 pub mod rules {

@@ -84,13 +84,13 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     } else if request.is(MavCmd::MAV_CMD_TD_TAKE_COMMAND) {
         Ok(Command::Vehicle(Asked::TakeCommand))
     } else if request.is(MavCmd::MAV_CMD_TD_PAD_CHECK) {
-        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill];
+        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill, Asked::Seen];
         let asked = (0_u8..).zip(kinds).find(|(number, _)| f32::from(*number).to_bits() == param1.to_bits());
         match asked {
             Some((_, asked)) => Ok(Command::Vehicle(asked)),
             None => unfit(
                 MavResult::MAV_RESULT_DENIED,
-                format!("check: param1 = {param1}, must be 0 (end), 1 (all) or 2 (without motion)"),
+                format!("check: param1 = {param1}, must be 0 (end), 1 (all), 2 (without motion) or 3 (seen)"),
             ),
         }
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
@@ -188,10 +188,11 @@ mod tests {
 
     #[test]
     fn a_check_is_begun_and_ended_by_exact_numbers() {
-        for (param1, asked) in [(0.0, Asked::EndCheck), (1.0, Asked::Check), (2.0, Asked::CheckStill)] {
+        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill, Asked::Seen];
+        for (param1, asked) in [0.0, 1.0, 2.0, 3.0].into_iter().zip(kinds) {
             assert_eq!(parse(&command(54002, param1, f32::NAN)), Ok(Command::Vehicle(asked)));
         }
-        for param1 in [0.5, 3.0, -1.0, f32::NAN, f32::INFINITY] {
+        for param1 in [0.5, 4.0, -1.0, f32::NAN, f32::INFINITY] {
             assert_eq!(result_of(&command(54002, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
     }

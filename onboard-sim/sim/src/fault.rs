@@ -71,6 +71,14 @@ const NAMES: &[(&str, &str, Build)] = &[
             value.filter(|fin| (0.0..=3.0).contains(fin) && libm::trunc(*fin).to_bits() == fin.to_bits())?;
         Some(Breakage::Vehicle(Fault::FinStuck { fin: fin as usize }))
     }),
+    ("reversed", "1 or 2, the gimbal's axes, 3 to 6, the fins", |value| {
+        let surface = value.and_then(surface)?;
+        Some(Breakage::Vehicle(Fault::Reversed { surface }))
+    }),
+    ("swapped", "two of these digits, as 36", |value| {
+        let surfaces = [surface(libm::trunc(value? / 10.0))?, surface(value? % 10.0)?];
+        Some(Breakage::Vehicle(Fault::Swapped { surfaces }))
+    }),
     ("gimbal-stuck", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::GimbalStuck))),
     ("gimbal-jams", "deg, -90 to 90", |value| {
         let deg = value.filter(|deg| (-90.0..=90.0).contains(deg))?;
@@ -104,6 +112,13 @@ const NAMES: &[(&str, &str, Build)] = &[
     ("reboot", "s", |value| value.filter(|down_s| (0.0..=10.0).contains(down_s)).map(Breakage::Reboot)),
     ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
 ];
+
+/// A surface by its number from 1.
+fn surface(number: f64) -> Option<usize> {
+    (1..=6_u8)
+        .find(|known| f64::from(*known).to_bits() == number.to_bits())
+        .map(|known| usize::from(known) - 1)
+}
 
 /// The sensors, with their names and units in the text of a fault.
 const SENSORS: [(Sensor, &str, &str); 5] = [
@@ -301,6 +316,10 @@ impl fmt::Display for TimedFault {
             Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
             Breakage::Vehicle(Fault::GimbalJams { deg }) => write!(f, "gimbal-jams:{deg}"),
             Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
+            Breakage::Vehicle(Fault::Reversed { surface }) => write!(f, "reversed:{}", surface + 1),
+            Breakage::Vehicle(Fault::Swapped { surfaces: [one, other] }) => {
+                write!(f, "swapped:{}{}", one + 1, other + 1)
+            }
             Breakage::Vehicle(Fault::FinStuck { fin }) => write!(f, "fin-stuck:{fin}"),
         }?;
         write!(f, "@{}", self.when)

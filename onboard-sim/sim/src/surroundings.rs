@@ -86,9 +86,14 @@ impl Surroundings {
 
     /// What feedback and switches say after the frame; `released`: contact counts.
     pub(crate) fn feedback(&mut self, released: bool) -> Feedback {
+        let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
+            (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
+        } else {
+            (self.actuators.gimbal_rad, self.actuators.fins_rad)
+        };
         Feedback {
-            gimbal_rad: self.world.gimbal_feedback_rad(),
-            fins_rad: self.sensors.fins_rad(&self.world.fins_feedback_rad()),
+            gimbal_rad,
+            fins_rad,
             contact: self.sensors.contact(released && self.world.touchdown().is_some()),
             igniter_continuity: self.sensors.igniter_continuity(),
             booster_attached: self.world.booster_attached(),

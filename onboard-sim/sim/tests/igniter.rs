@@ -5,7 +5,7 @@ use sim::recipe::Recipe;
 use sim::world::truth::Truth;
 
 #[test]
-fn two_igniters_halve_the_deviation_of_the_delay_and_change_no_other_draw() {
+fn the_airframe_scales_the_deviation_of_the_delay_and_changes_no_other_draw() {
     let recipe = Recipe::built_in("mk2", "field").unwrap();
     let single = &recipe.mission;
     let mut double = single.clone();

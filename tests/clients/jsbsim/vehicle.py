@@ -15,11 +15,10 @@ KG_M3_PER_SLUG_FT3 = 515.3788183931961
 G_M_S2 = 9.80665
 LBM_PER_KG = 2.2046226218487757
 
-# Signs of the fins' roll, pitch and yaw moments, and the directions from the axis to the fins (y, z).
+# Signs of the fins' roll, pitch and yaw moments.
 ROLL, PITCH, YAW = [-1, 1, -1, 1], [1, -1, -1, 1], [1, 1, -1, -1]
 # Where the legs stand around the axis.
 RING = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
-OUTWARD = [(-yaw * math.cos(math.pi / 6), pitch * 0.5) for pitch, yaw in zip(PITCH, YAW)]
 STRIPS = 8
 
 
@@ -124,8 +123,11 @@ def aerodynamics(airframe, scale):
     # The landing paper's reference area of a fin is that of the body.
     drag = -half * body["reference_area_m2"] * fins["drag_coefficient"]
     lift = -half * body["reference_area_m2"] * fins["lift_coefficient"]
-    for i, (out_y, out_z) in enumerate(OUTWARD):
+    open_rad = math.radians(fins["from_y_deg"] - fins["hinge_off_deg"])
+    for i in range(4):
         name = f"air/fin{i}"
+        # Direction from the axis to the open fin.
+        out_y, out_z = -YAW[i] * math.cos(open_rad), PITCH[i] * math.sin(open_rad)
         sine = op("sin", prop(f"fcs/fin{i}-rad"))
         lines.append(fcs(f"{name}/sine", sine))
         radius = op(

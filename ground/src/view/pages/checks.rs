@@ -7,14 +7,11 @@ use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPa
 use ratatui::text::{Line, Span};
 
 use crate::model::{
-    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeTest, RangeTestResult, Spot, Standing,
-    dead_reckoning::may_have_left, shown, standing,
+    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeTest, RangeTestResult, SURFACES, Spot,
+    Standing, dead_reckoning::may_have_left, shown, standing,
 };
 use crate::view::{TextRole, Theme, fixed, seconds};
 
-/// The surfaces, by the number of their first item.
-const SURFACES: [(&str, u32); 6] =
-    [("gimbal pitch", 0), ("gimbal yaw", 3), ("fin 1", 6), ("fin 2", 9), ("fin 3", 12), ("fin 4", 15)];
 /// Columns of one value beside others.
 const VALUE_COLUMNS: usize = 39;
 
@@ -26,7 +23,7 @@ pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
         format!(" {:<14}{:>24}{:>20}{:>20}", "surface", "range, least", "error, most", "lag, most"),
         TextRole::Label,
     ));
-    lines.extend(SURFACES.map(|(name, first)| surface(check, name, first, theme)));
+    lines.extend(SURFACES.map(|of| surface(check, of, theme)));
     let others: Vec<&TD_PAD_CHECK_DATA> =
         check.into_iter().flat_map(PadCheck::values).filter(|value| value.item as u32 >= 18).collect();
     let beside = (columns / VALUE_COLUMNS).max(1);
@@ -61,6 +58,11 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
             format!(" CHECK {} RUNS {} %: hands off", check.told.run, check.told.progress),
             TextRole::Caution,
             format!("  {all} ends it"),
+        ),
+        S::TD_PAD_CHECK_STATE_PASSED if check.awaits_eyes() => (
+            format!(" CHECK {} PASSED but for what only people see", check.told.run),
+            TextRole::Caution,
+            format!("  {} says it", keys.name(Act::Seen)),
         ),
         S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.told.run), TextRole::Good, begin),
         S::TD_PAD_CHECK_STATE_FAILED => {
@@ -111,12 +113,20 @@ fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
     }
 }
 
-/// One surface: range, error and lag, each with its limit.
-fn surface(check: Option<&PadCheck>, name: &str, first: u32, theme: Theme) -> Line<'static> {
+/// One surface: range, error and lag, each with its limit; of one that tells nothing, what people see.
+fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), theme: Theme) -> Line<'static> {
     let values: Vec<Option<&TD_PAD_CHECK_DATA>> = (first..first + 3)
         .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
         .collect();
     let mut spans = vec![theme.plain(format!(" {name:<14}"))];
+    let tells = values
+        .iter()
+        .flatten()
+        .any(|value| value.verdict != TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED);
+    if check.is_some() && !tells {
+        spans.push(theme.plain(seen.to_owned()));
+        return Line::from(spans);
+    }
     for (value, columns) in values.into_iter().zip([24, 20, 20]) {
         let Some(value) = value else {
             spans.push(theme.label(format!("{:>columns$}", "--")));

@@ -36,6 +36,8 @@ pub enum Asked {
     CheckStill,
     /// End the running check.
     EndCheck,
+    /// One person has seen every surface of the last check move as the crew's page says.
+    Seen,
 }
 
 impl Asked {
@@ -51,6 +53,7 @@ impl Asked {
             Self::TakeCommand => "take-over",
             Self::Check | Self::CheckStill => "check",
             Self::EndCheck => "end of the check",
+            Self::Seen => "seen motion",
         }
     }
 }
@@ -131,7 +134,8 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
         | Asked::TakeCommand
         | Asked::Check
         | Asked::CheckStill
-        | Asked::EndCheck => false,
+        | Asked::EndCheck
+        | Asked::Seen => false,
     }
 }
 
@@ -150,7 +154,12 @@ pub(super) fn event_of(
         Asked::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
-        Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill | Asked::EndCheck => return None,
+        Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck
+        | Asked::Seen => return None,
     })
 }
 
@@ -238,6 +247,7 @@ impl Computer {
                 Asked::Tap => self.tap(by),
                 Asked::TakeCommand => self.take_command(request),
                 Asked::Check | Asked::CheckStill => self.begin_check(asked, by),
+                Asked::Seen => self.see_check(asked, by),
                 _ => Answer::ACCEPTED,
             };
         };
@@ -460,7 +470,8 @@ fn act_of(asked: Asked) -> Option<Act> {
         | Asked::TakeCommand
         | Asked::Check
         | Asked::CheckStill
-        | Asked::EndCheck => None,
+        | Asked::EndCheck
+        | Asked::Seen => None,
     }
 }
 

@@ -38,6 +38,7 @@ use self::pad_check::PadCheck;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
+use crate::control::silent::SilentServo;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::powered::{ControlLevel, LandingSolved};
@@ -55,6 +56,9 @@ pub const FRAME_MS: u32 = 5;
 pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 const AT_REST_S: f64 = 1.0;
+
+/// From this sine of its opening on a fin is out of the way of what leaves the hatch: mk3's end then stands 8 cm off the skin.
+const HATCH_FREE_SINE: f64 = 0.7;
 
 /// When the vehicle was released.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -93,6 +97,8 @@ pub struct Computer {
     crew: CrewMemory,
     fins_answering: [bool; 4],
     pad_check: PadCheck,
+    /// Gimbal (pitch, yaw) and fins of a vehicle whose servos tell nothing.
+    silent: [SilentServo; 6],
     release: Option<Release>,
     level: ControlLevel,
 }
@@ -101,6 +107,7 @@ impl Computer {
     /// One frame. In the air: estimate, predict, answer the crew, decide, plan, point. On the pad: answer the crew, and wait.
     /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
+        let input = &self.with_silent_servos(input);
         self.table.begin(input.time_s);
         self.report_changes(input);
         self.input = input.kept();
@@ -139,6 +146,7 @@ impl Computer {
             flying: flown.is_some(),
             lifted_off: self.pilot.has_lifted_off(),
             separation_due: self.pilot.separates(),
+            hatch_free: self.hatch_is_free(input),
         };
         self.commands.outputs = Outputs::decided(self.table.mode(), progress);
         Output {
@@ -148,6 +156,32 @@ impl Computer {
             news: self.table.take_news(),
             planned,
         }
+    }
+
+    /// The input with the positions that servos should have which tell none.
+    fn with_silent_servos<'a>(&mut self, input: &Input<'a>) -> Input<'a> {
+        let airframe = &self.pilot.mission().airframe;
+        if airframe.servos_tell {
+            return *input;
+        }
+        let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], .. } = self.commands;
+        let told_rad = [pitch, yaw, one, two, three, four];
+        let [pitch, yaw, one, two, three, four] = core::array::from_fn(|surface| {
+            let servo = if surface < 2 { &airframe.gimbal.servo } else { &airframe.fins.servo };
+            self.silent[surface].step(told_rad[surface], servo)
+        });
+        Input { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..*input }
+    }
+
+    /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their servos since they were told
+    /// to. One that is stuck keeps no parachute in.
+    fn hatch_is_free(&self, input: &Input<'_>) -> bool {
+        let airframe = &self.pilot.mission().airframe;
+        let fins = &airframe.fins;
+        let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
+        let stand_open = input.fins_rad.iter().all(|fin_rad| libm::sin(*fin_rad) >= HATCH_FREE_SINE);
+        airframe.servos_tell && stand_open
+            || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
     }
 
     /// One frame. Also returns the landing that the pilot plans in it, solved separately; `None` if it plans none.

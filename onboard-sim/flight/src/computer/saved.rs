@@ -209,6 +209,7 @@ impl Computer {
             crew: CrewMemory::default(),
             fins_answering: [false; 4],
             pad_check: PadCheck::default(),
+            silent: Default::default(),
             release: None,
             level: ControlLevel::Idle,
         }

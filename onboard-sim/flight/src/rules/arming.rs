@@ -37,6 +37,9 @@ impl From<&LandingVerdict> for PredictedLanding {
     }
 }
 
+/// So many people must have seen the surfaces of a vehicle move whose servos tell nothing.
+pub const SEERS: usize = 2;
+
 /// The inputs of the arming checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArmingInput {
@@ -61,6 +64,8 @@ pub struct ArmingInput {
     pub estimator_converged: bool,
     /// Number of fins that reached their commanded angle.
     pub fins_answering: [bool; 4],
+    /// How many people have seen the surfaces of a vehicle move whose servos tell nothing; `None`: they tell.
+    pub seers: Option<usize>,
     /// The landing motor's igniter has continuity.
     pub igniter_continuity: bool,
     /// The log is being written.
@@ -81,7 +86,6 @@ pub struct ArmingInput {
 
 /// Every arming check with the value found, in the order an operator fixes them.
 pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
-    let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
     let mut checks = vec![
         Check::condition(
@@ -113,12 +117,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
         Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
         Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
-        Check {
-            name: "fins answering",
-            passed: answering == input.fins_answering.len(),
-            found: format!("{answering} of 4"),
-            required: "4 of 4".to_owned(),
-        },
+        fins_answering(input),
         Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
         Check::condition("log", input.log_running, "running", "not running"),
         Check {
@@ -166,6 +165,20 @@ fn uplink(uplink: Uplink) -> Check {
         found,
         required: format!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s"),
     }
+}
+
+/// A servo that tells nothing is where it was commanded, whatever it does: then people have to have seen it.
+fn fins_answering(input: &ArmingInput) -> Check {
+    let answering = input.fins_answering.iter().filter(|answers| **answers).count();
+    let (passed, found, required) = match input.seers {
+        None => (answering == input.fins_answering.len(), format!("{answering} of 4"), "4 of 4".to_owned()),
+        Some(seers) => (
+            seers >= SEERS,
+            format!("servos that tell nothing, seen by {seers}"),
+            format!("{SEERS} people who saw a check move them"),
+        ),
+    };
+    Check { name: "fins answering", passed, found, required }
 }
 
 fn battery(limits: &ArmingLimits, battery_v: Option<f64>) -> Check {
@@ -266,6 +279,7 @@ mod tests {
             hanging_m: None,
             estimator_converged: true,
             fins_answering: [true; 4],
+            seers: None,
             igniter_continuity: true,
             log_running: true,
             log_space_bytes: 1 << 30,
@@ -292,7 +306,10 @@ mod tests {
 
     #[test]
     fn each_check_alone_refuses_and_reports_its_name_and_value() {
-        let spoilings: [Spoiling; 23] = [
+        let spoilings: [Spoiling; 24] = [
+            ("fins answering: found servos that tell nothing, seen by 1, required 2 people", |input| {
+                input.seers = Some(1);
+            }),
             ("abort latch: found latched", |input| {
                 input.abort_latched = true;
             }),

@@ -28,6 +28,8 @@ pub struct FlightProgress {
     pub lifted_off: bool,
     /// Apogee is near, or was: the booster goes.
     pub separation_due: bool,
+    /// The fins, which close over the parachute's hatch, are out of its way, or had the time for it.
+    pub hatch_free: bool,
 }
 
 /// Every reason for which an output has no current now; none of them: it has.
@@ -62,7 +64,7 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
         Line::Parachute => [
             (phase != Phase::Chute).then_some("only CHUTE ejects the parachute"),
             (motor == Motor::Burning).then_some("the landing motor burns"),
-            None,
+            (!progress.hatch_free).then_some("the fins are still over its hatch"),
             None,
             None,
             None,
@@ -126,7 +128,8 @@ mod tests {
     use super::*;
     use crate::rules::phase::{Event, HoldCause, StartPoint, transition};
 
-    const SEEN: FlightProgress = FlightProgress { flying: true, lifted_off: false, separation_due: false };
+    const SEEN: FlightProgress =
+        FlightProgress { flying: true, lifted_off: false, separation_due: false, hatch_free: true };
 
     fn boosting() -> Mode {
         let mut mode = Mode { phase: Phase::Boost, ..Mode::power_up(0.0) };
@@ -158,6 +161,10 @@ mod tests {
             reasons(Line::Parachute, &burning, SEEN),
             ["only CHUTE ejects the parachute", "the landing motor burns"]
         );
+        let ejecting = Mode { phase: Phase::Chute, ..boosting() };
+        let closed = FlightProgress { hatch_free: false, ..SEEN };
+        assert_eq!(reasons(Line::Parachute, &ejecting, closed), ["the fins are still over its hatch"]);
+        assert!(Outputs::decided(&ejecting, SEEN).is_on(Line::Parachute));
         assert!(Outputs::decided(&boosting(), SEEN).is_on(Line::AscentIgniter));
         assert!(Outputs::decided(&boosting(), SEEN).lights());
         assert_eq!(Outputs::decided(&at_power_up, SEEN), Outputs::NONE);

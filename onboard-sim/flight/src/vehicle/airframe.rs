@@ -19,6 +19,8 @@ pub struct Airframe {
     /// How the landing motor is lit. A single igniter if absent.
     #[serde(default)]
     pub igniter: Igniter,
+    /// The servos report where they are. If not, people must have seen them move before the vehicle is armed.
+    pub servos_tell: bool,
     /// Masses and their positions.
     pub mass: Mass,
     /// The fuselage.
@@ -185,7 +187,8 @@ impl MassModel {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Igniter {
-    /// Scatter of the ignition delay, as a multiple of that of a single igniter. Two in parallel have about half of it.
+    /// Scatter of the ignition delay, as a multiple of that of a single igniter. The earlier of two
+    /// independent ones has sqrt(1 - 1/pi) = 0.83 of it, if their delays are normal.
     pub scatter_scale: f64,
 }
 

@@ -82,13 +82,8 @@ impl VehicleEndpoint {
 }
 
 /// Whether it may move or light something, or lets somebody go on who does.
-fn can_move(asked: Asked) -> bool {
-    match asked {
-        Asked::Arm | Asked::Start | Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill => {
-            true
-        }
-        Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck => false,
-    }
+pub(super) fn can_move(asked: Asked) -> bool {
+    !matches!(asked, Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck)
 }
 
 /// Why the station expects another mission; `None` if it expects this one or says nothing of it.

@@ -18,6 +18,7 @@ use protocol::dialect::MavResult;
 use protocol::identity::Address;
 
 use super::VehicleEndpoint;
+use super::meant::can_move;
 use crate::commands;
 use crate::vehicle::VehicleState;
 
@@ -82,7 +83,7 @@ impl VehicleEndpoint {
         vehicle: &VehicleState<'_>,
     ) {
         // What moves something is done once, whatever arrives late; what stops is done every time.
-        if may_move(asked) {
+        if can_move(asked) {
             if self
                 .waiting
                 .iter()
@@ -150,7 +151,7 @@ impl VehicleEndpoint {
                 let asked = vehicle.computer.crew().two_person.waiting(vehicle.time_s);
                 let asked = asked.filter(|_| answer.ending == Ending::Asked);
                 let answer = (result, asked.map(|ask| ask.number));
-                if may_move(request.asked) && command.number().is_some() {
+                if can_move(request.asked) && command.number().is_some() {
                     self.answered.truncate(MAX_ANSWERED - 1);
                     self.answered.push_front(Answered { command, by: request.by, answer });
                 }
@@ -191,16 +192,6 @@ impl VehicleEndpoint {
             deaf: self.stations.is_deaf(station),
         });
         (self.stations.best_uplink(time_s), commander)
-    }
-}
-
-/// Whether a request can make something move or light.
-fn may_move(asked: Asked) -> bool {
-    match asked {
-        Asked::Arm | Asked::Start | Asked::Tap | Asked::TakeCommand | Asked::Check | Asked::CheckStill => {
-            true
-        }
-        Asked::Disarm | Asked::Hold | Asked::Abort | Asked::EndCheck => false,
     }
 }
 

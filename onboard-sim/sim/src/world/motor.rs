@@ -202,6 +202,8 @@ impl Motor {
             | Fault::ParachuteFails
             | Fault::GimbalStuck
             | Fault::GimbalJams { .. }
+            | Fault::Reversed { .. }
+            | Fault::Swapped { .. }
             | Fault::GimbalSlow { .. }
             | Fault::FinStuck { .. } => {}
         }

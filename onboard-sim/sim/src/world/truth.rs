@@ -230,4 +230,8 @@ pub enum Fault {
         /// The fin, 0 to 3; another number has no effect.
         fin: usize,
     },
+    /// A surface moves the wrong way. Gimbal pitch and yaw are 0 and 1, the fins 2 to 5.
+    Reversed { surface: usize },
+    /// Two surfaces hang on each other's wires.
+    Swapped { surfaces: [usize; 2] },
 }

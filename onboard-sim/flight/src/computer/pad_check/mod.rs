@@ -17,11 +17,12 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use self::sweep::{Still, Sweep};
-use super::crew::{Answer, Asked, Ending};
+use super::crew::{Answer, Asked, Ending, People};
 use super::news::Severity;
 use super::pad::SelfTest;
 use super::{Computer, Input};
 use crate::estimation::estimator::Measurements;
+use crate::rules::arming::SEERS;
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
 use crate::vehicle::airframe::Airframe;
@@ -66,6 +67,8 @@ pub struct PadCheck {
     /// The surfaces return to rest until this frame.
     returns_until: u64,
     findings: Vec<Finding>,
+    /// Who has seen every surface move as the crew's page says.
+    seen_by: Vec<Option<Operator>>,
 }
 
 /// One frame on the pad, as the check sees it.
@@ -102,6 +105,7 @@ impl Default for PadCheck {
             swept_frames: 0,
             returns_until: 0,
             findings: Vec::new(),
+            seen_by: Vec::new(),
         }
     }
 }
@@ -160,6 +164,24 @@ impl PadCheck {
         self.state = if failed { CheckState::Failed } else { CheckState::Passed };
         self.stage = Stage::Resting;
         None
+    }
+
+    /// Somebody has seen every surface move as the crew's page says; `two`: people are told apart. An error says why it does
+    /// not count.
+    fn see(&mut self, by: Option<Operator>, two: bool) -> Result<(), &'static str> {
+        if self.state != CheckState::Passed || self.swept_frames == 0 {
+            return Err("no check with motion has passed");
+        }
+        if two && self.seen_by.contains(&by) {
+            return Err("another person has to say so, too");
+        }
+        self.seen_by.push(by);
+        Ok(())
+    }
+
+    /// How many people have seen every surface of the last check move.
+    pub fn seers(&self) -> usize {
+        self.seen_by.len()
     }
 
     pub fn is_running(&self) -> bool {
@@ -422,6 +444,19 @@ impl Computer {
         let who = by.map_or_else(String::new, |by| format!("{by}: "));
         let what = if moves { "gimbal and fins MOVE" } else { "nothing moves" };
         self.table.say(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
+        Answer::ACCEPTED
+    }
+
+    /// Takes the word of one person that every surface of the last check moved as it should.
+    pub(super) fn see_check(&mut self, asked: Asked, by: Option<Operator>) -> Answer {
+        let two = matches!(self.input.people, Some(People::Two { .. }));
+        if let Err(reason) = self.pad_check.see(by, two) {
+            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) };
+        }
+        let who = by.map_or_else(|| "one person".into(), |by| format!("{by}"));
+        let words =
+            format!("{who} saw all surfaces move as they should: {} of {SEERS}", self.pad_check.seers());
+        self.table.say(Severity::Notice, words);
         Answer::ACCEPTED
     }
 

@@ -19,6 +19,8 @@ use crate::vehicle::mission::{ArmingLimits, Mission};
 const STAYS_S: f64 = 0.4;
 /// The feedback counts as that of a surface at its end in the last part of the stay, s.
 const SETTLED_S: f64 = 0.1;
+/// A surface that tells nothing stays at an end for people to see it, s.
+const SEEN_S: f64 = 2.0;
 /// A surface may arrive this much later than its airframe says, s: one more of the delays of 20 ms that the missions
 /// were flown with, in simulation.
 const LATER_S: f64 = 0.020;
@@ -63,8 +65,9 @@ impl Reach {
         (way_rad - ANSWERING_RAD).max(0.0) / self.servo.rate_rad_s()
     }
 
-    fn stay_frames(&self, way_rad: f64) -> u32 {
-        libm::ceil((self.servo.delay_s + way_rad / self.servo.rate_rad_s() + STAYS_S) / FRAME_S) as u32
+    fn stay_frames(&self, way_rad: f64, tells: bool) -> u32 {
+        let stays_s = if tells { STAYS_S } else { SEEN_S };
+        libm::ceil((self.servo.delay_s + way_rad / self.servo.rate_rad_s() + stays_s) / FRAME_S) as u32
     }
 
     /// The latest arrival after the ideal one, s: its delay, its play, the frames, and a margin.
@@ -95,6 +98,9 @@ pub(super) struct Sweep {
     // What is skipped is a constant of the mission.
     #[serde(skip)]
     reaches: [Reach; SURFACES],
+    /// The servos report where they are.
+    #[serde(skip)]
+    tell: bool,
     surface: usize,
     /// The place of the present target among the surface's.
     target: usize,
@@ -109,6 +115,7 @@ impl Sweep {
     pub(super) fn new(airframe: &Airframe) -> Self {
         Self {
             reaches: Reach::of_each(airframe),
+            tell: airframe.servos_tell,
             surface: 0,
             target: 0,
             frames: 0,
@@ -123,7 +130,7 @@ impl Sweep {
         let all = self.reaches.iter().map(|reach| {
             let targets = reach.targets_rad();
             let ways = (0..targets.len()).map(|place| way_rad(reach, &targets, place));
-            ways.map(|way_rad| u64::from(reach.stay_frames(way_rad))).sum::<u64>()
+            ways.map(|way_rad| u64::from(reach.stay_frames(way_rad, self.tell))).sum::<u64>()
         });
         (self.frames_before + u64::from(self.frames), all.sum())
     }
@@ -136,7 +143,7 @@ impl Sweep {
         let Some(reach) = self.reaches.get(self.surface).copied() else { return (None, None) };
         let targets = reach.targets_rad();
         let (target_rad, way_rad) = (targets[self.target], way_rad(&reach, &targets, self.target));
-        let stay_frames = reach.stay_frames(way_rad);
+        let stay_frames = reach.stay_frames(way_rad, self.tell);
         if self.frames > 0 {
             self.watch(surfaces_rad[self.surface], target_rad, reach.ideal_s(way_rad), stay_frames);
         }
@@ -173,6 +180,10 @@ impl Sweep {
     }
 
     fn findings(&self, reach: &Reach) -> [Finding; 3] {
+        if !self.tell {
+            return [Item::Range, Item::Error, Item::Lag]
+                .map(|item| Finding::only_shown(item(self.surface), f64::NAN));
+        }
         let Shown { least_rad, most_rad, error_rad, lag_s } = self.shown;
         let whole_rad = reach.high_rad - reach.low_rad;
         [

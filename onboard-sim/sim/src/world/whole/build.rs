@@ -92,6 +92,7 @@ impl World {
             gimbal_rates_rad_s: [[0.0; 2]; 2],
             // A cylinder: L^2/12 + r^2/4.
             swinging: (motor.total_mass_kg(), length_m * length_m / 12.0 + diameter_m * diameter_m / 16.0),
+            wires: core::array::from_fn(|surface| (surface, false)),
             parachute: Parachute::new(&airframe.parachute),
             air: AirHere::at(initial.position_m.z),
             wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)
@@ -296,6 +297,7 @@ impl World {
                 self.gimbal_links[axis].changed(&other.gimbal_links[axis])
             }),
             fin_links: core::array::from_fn(|fin| self.fin_links[fin].changed(&other.fin_links[fin])),
+            wires: self.wires,
             parachute: self.parachute.clone(),
             wind: self.wind.changed(&other.wind),
             air: self.air,

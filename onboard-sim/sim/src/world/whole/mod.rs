@@ -80,6 +80,8 @@ pub struct World {
     /// Mass of the full landing motor, kg, and the square of its radius of gyration, m^2.
     swinging: (f64, f64),
     fin_links: [Linkage; 4],
+    /// The wire that each surface hangs on, gimbal first, and whether it moves the wrong way.
+    wires: [(usize, bool); 6],
     parachute: Parachute,
     wind: Wind,
     air: AirHere,
@@ -214,6 +216,8 @@ impl World {
                     servo.stick();
                 }
             }
+            Fault::Reversed { surface } => self.wires[surface].1 ^= true,
+            Fault::Swapped { surfaces: [one, other] } => self.wires.swap(one, other),
             Fault::AscentNoLight
             | Fault::AscentSelfLights
             | Fault::AscentWeak { .. }
@@ -230,10 +234,21 @@ impl World {
         }
     }
 
+    /// What arrives at the servos, over wires that may be wrong: gimbal (pitch, yaw), fins 1 to 4, rad.
+    fn wired_rad(&self, actuators: &Actuators) -> [f64; 6] {
+        let ([pitch, yaw], [one, two, three, four]) = (actuators.gimbal_rad, actuators.fins_rad);
+        let both_stops_rad = self.airframe.fins.closed_rad() + self.airframe.fins.open_rad();
+        core::array::from_fn(|surface| {
+            let (wire, reversed) = self.wires[surface];
+            let told_rad = [pitch, yaw, one, two, three, four][wire];
+            if reversed { if surface < 2 { -told_rad } else { both_stops_rad - told_rad } } else { told_rad }
+        })
+    }
+
     fn command(&mut self, actuators: &Actuators, time_s: f64) {
         let before_rad = self.gimbal_rad();
-        for ((servo, link), command_rad) in
-            self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(actuators.gimbal_rad)
+        let wired_rad = self.wired_rad(actuators);
+        for ((servo, link), command_rad) in self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(wired_rad)
         {
             servo.step(command_rad);
             link.step(servo.load_rad());
@@ -242,7 +257,7 @@ impl World {
         let rates_rad_s = [0, 1].map(|axis: usize| (now_rad[axis] - before_rad[axis]) / STEP_S);
         self.gimbal_rates_rad_s = [self.gimbal_rates_rad_s[1], rates_rad_s];
         for ((servo, link), command_rad) in
-            self.fins.iter_mut().zip(&mut self.fin_links).zip(actuators.fins_rad)
+            self.fins.iter_mut().zip(&mut self.fin_links).zip(wired_rad.into_iter().skip(2))
         {
             servo.step(command_rad);
             link.step(servo.load_rad());

@@ -3,6 +3,7 @@
 use flight::computer::pad_check::{CheckState, Item, Verdict};
 use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
+use sim::world::Fault;
 
 use super::space::flight_of;
 use super::*;
@@ -65,10 +66,121 @@ fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
     assert!(said(&events, "check FAILED: fin 2 range and 2 more"), "{events:?}");
 }
 
+/// Every wrong wiring of one or two surfaces: reversed ones, and swapped ones.
+fn wrong_wirings() -> Vec<Fault> {
+    let reversed = (0..6).map(|surface| Fault::Reversed { surface });
+    let swapped =
+        (0..6).flat_map(|one| (one + 1..6).map(move |other| Fault::Swapped { surfaces: [one, other] }));
+    reversed.chain(swapped).collect()
+}
+
+/// Servos that report where their surfaces are: a surface that moves otherwise than it is told is found and named.
+#[test]
+fn every_wrong_wiring_is_found_where_servos_tell() {
+    for wrong in wrong_wirings() {
+        let mut rocket = on_the_pad("none", &[]);
+        rocket.vehicle.sortie.world_mut().inject(&wrong);
+        checked(&mut rocket);
+        assert_eq!(state(&rocket), CheckState::Failed, "{wrong:?}");
+        let surfaces = match wrong {
+            Fault::Reversed { surface } => vec![surface],
+            Fault::Swapped { surfaces } => surfaces.to_vec(),
+            _ => vec![],
+        };
+        for surface in surfaces {
+            assert!(failing(&rocket).contains(&Item::Error(surface)), "{wrong:?}: {:?}", failing(&rocket));
+        }
+    }
+}
+
+/// What two people see in a check: how each surface stands whenever one is told to go somewhere. A fin is open (1) or closed
+/// (0); the nozzle swings towards the fins of one side (y, z), or hangs straight.
+fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
+    let mut seen: Vec<([f64; 2], [f64; 4])> = Vec::new();
+    rocket.request(Asked::Check);
+    rocket.run_until(|rocket| {
+        let ([pitch_rad, yaw_rad], fins_rad) =
+            (rocket.sortie.world().gimbal_rad(), rocket.sortie.world().fins_rad());
+        // The thrust is turned to (sin yaw, -sin pitch) in (y, z), and the nozzle's end goes the other way.
+        let side = |angle_rad: f64| if angle_rad.abs() < 0.1 { 0.0 } else { angle_rad.signum() };
+        let stands =
+            ([-side(yaw_rad), side(pitch_rad)], fins_rad.map(|fin_rad| f64::from(u8::from(fin_rad > 1.5))));
+        if seen.last() != Some(&stands) {
+            seen.push(stands);
+        }
+        state(rocket) != CheckState::Running
+    });
+    seen
+}
+
+/// The words of the crew's page as motions: the nozzle towards fins 1 and 4, 2 and 3, 1 and 2, 3 and 4; then each fin.
+fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
+    let fins = flight::vehicles::airframe::builtin("mk3").unwrap().fin_model();
+    let towards = |one: usize, other: usize| {
+        let middle = [0, 1].map(|axis: usize| fins.outward(one)[axis] + fins.outward(other)[axis]);
+        middle.map(|part| if part.abs() < 1e-9 { 0.0 } else { part.signum() })
+    };
+    let rest = ([0.0; 2], [0.0; 4]);
+    let mut seen = vec![rest];
+    for sides in [[[1, 4], [2, 3]], [[1, 2], [3, 4]]] {
+        for [one, other] in sides {
+            seen.extend([(towards(one - 1, other - 1), [0.0; 4]), rest]);
+        }
+    }
+    for fin in 0..4 {
+        let mut open = [0.0; 4];
+        open[fin] = 1.0;
+        seen.extend([([0.0; 2], open), rest]);
+    }
+    seen
+}
+
+fn without_feedback() -> Told {
+    let mut flight = flight_of("none", &[]);
+    flight.recipe.mission.airframe.servos_tell = false;
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+    // Every check passes but one.
+    rocket.run_until(|rocket| {
+        rocket.phase() == Phase::PadIdle && rocket.state().checks_failed().count_ones() == 1
+    });
+    rocket
+}
+
+/// Servos that tell nothing: the positions are the commands, and pass whatever moves. Without the word of two people the vehicle
+/// is not armed, and what they see is not what the page says if any wire is wrong.
+#[test]
+fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
+    let mut rocket = without_feedback();
+    let refused = |rocket: &mut Told| rocket.request(Asked::Arm).reason.unwrap_or_default();
+    assert!(refused(&mut rocket).starts_with("fins answering: found servos that tell nothing, seen by 0"));
+    assert_eq!(rocket.request(Asked::Seen).reason.unwrap(), "no check with motion has passed");
+    assert_eq!(seen_motions(&mut rocket), motions_of_the_page());
+    assert_eq!(state(&rocket), CheckState::Passed);
+    let shown = |item| {
+        rocket.computer().pad_check().findings().iter().find(|found| found.item == item).unwrap().verdict
+    };
+    assert_eq!((shown(Item::Range(0)), shown(Item::Lag(5))), (Verdict::NotJudged, Verdict::NotJudged));
+    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
+    assert!(refused(&mut rocket).contains("seen by 1, required 2 people who saw"));
+    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+    rocket.request(Asked::Disarm);
+    // Another check takes two people's words again.
+    checked(&mut rocket);
+    assert!(refused(&mut rocket).contains("seen by 0"));
+    for wrong in wrong_wirings() {
+        let mut rocket = without_feedback();
+        rocket.vehicle.sortie.world_mut().inject(&wrong);
+        assert_ne!(seen_motions(&mut rocket), motions_of_the_page(), "{wrong:?}");
+        assert_eq!(state(&rocket), CheckState::Passed, "{wrong:?}: nothing but eyes finds it");
+        assert!(refused(&mut rocket).contains("seen by 0"), "{wrong:?}");
+    }
+}
+
 #[test]
 fn a_failed_self_test_is_a_reason_to_look_closer() {
     let mut rocket = Told::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
-    rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::FinStuck { fin: 2 });
+    rocket.vehicle.sortie.world_mut().inject(&Fault::FinStuck { fin: 2 });
     let refused = rocket.request(Asked::Check);
     assert_eq!(refused.ending, Ending::NotNow);
     assert_eq!(refused.reason.unwrap(), "the self-test is not over");
@@ -127,7 +239,9 @@ fn it_is_refused_with_the_reason_unless_disarmed_on_the_pad() {
 
 #[test]
 fn every_other_request_ends_it_and_an_arming_waits_for_the_surfaces() {
-    for asked in [Asked::Arm, Asked::Start, Asked::Abort, Asked::Disarm, Asked::Hold, Asked::EndCheck] {
+    for asked in
+        [Asked::Arm, Asked::Start, Asked::Abort, Asked::Disarm, Asked::Hold, Asked::EndCheck, Asked::Seen]
+    {
         let mut rocket = on_the_pad("none", &[]);
         rocket.request(Asked::Check);
         rocket.run_until(|rocket| rocket.computer().commands().gimbal_rad[0] > 0.1);
@@ -169,6 +283,7 @@ fn requests() -> impl Strategy<Value = Vec<(Asked, u16)>> {
         4 => Just(Asked::Check),
         1 => Just(Asked::CheckStill),
         1 => Just(Asked::EndCheck),
+        1 => Just(Asked::Seen),
         2 => Just(Asked::Arm),
         1 => Just(Asked::Start),
         1 => Just(Asked::Disarm),

@@ -3,6 +3,7 @@
 use campaign::tally;
 use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
+use flight::rules::outputs::Line;
 use flight::rules::phase::MotorStatus;
 use protocol::dialect::TdChute;
 use protocol::log::record::Record;
@@ -28,6 +29,42 @@ fn rocket_of(flight: &RocketFlight) -> Told {
 
 pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Told {
     rocket_of(flight).run_to(phase)
+}
+
+/// Steered with fins nearly shut, mk3 is aborted: its charge has no current before all of them stand 45 degrees open. A fin that is
+/// stuck, and servos that tell nothing, keep it waiting for as long as a servo takes, and no longer.
+#[test]
+fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
+    for (stuck, tells) in [(false, true), (true, true), (false, false)] {
+        let mut flight = mission_of("mk3", "none", &[]);
+        flight.recipe.mission.airframe.servos_tell = tells;
+        // Who cannot be armed without two pairs of eyes is armed before its servos fall silent.
+        let mut rocket = rocket_of(&mission_of("mk3", "none", &[])).run_to(Phase::AeroDescent);
+        rocket.vehicle.sortie.reconfigure(&flight.recipe.mission);
+        let shut =
+            |rocket: &Vehicle| rocket.sortie.world().fins_rad().into_iter().fold(f64::INFINITY, f64::min);
+        rocket.run_until(|rocket| shut(rocket) < 0.3);
+        if stuck {
+            (0..4).for_each(|fin| {
+                rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::FinStuck { fin })
+            });
+        }
+        let since_s = rocket.time_s();
+        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        assert_eq!(rocket.phase(), Phase::Chute);
+        assert_eq!(
+            rocket.computer().commands().fins_rad,
+            [std::f64::consts::FRAC_PI_2; 4],
+            "in the same frame"
+        );
+        rocket.run_until(|rocket| rocket.computer().commands().outputs.is_on(Line::Parachute));
+        let waited_s = rocket.time_s() - since_s;
+        // 90 degrees at 300 degrees/s, and 20 ms.
+        assert!(waited_s > 0.1 && waited_s < 0.33, "{stuck} {tells}: {waited_s}");
+        assert_eq!(shut(&rocket) < 0.3, stuck);
+        assert!(stuck || shut(&rocket) > 0.7, "{tells}: {}", shut(&rocket));
+        assert!((waited_s > 0.31) == (stuck || !tells), "{stuck} {tells}: {waited_s}");
+    }
 }
 
 #[test]

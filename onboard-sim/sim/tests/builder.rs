@@ -1,0 +1,115 @@
+//! What MK3.md tells a builder to measure, and when to stop, follows from the airframe, its motor, the limits of the pad
+//! check, and what `real` scatters: two deviations to either side, because a part outside of them is wrong rather than unlucky.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::f64::consts::TAU;
+
+use flight::vehicles::{airframe, motors};
+use sim::dispersion::Dispersion;
+use sim::world::truth::Truth;
+
+const PAGE: &str = include_str!("../../../MK3.md");
+const SIGMAS: f64 = 2.0;
+const G_M_S2: f64 = 9.80665;
+
+/// The numbers with which cells of a row of a table in a section begin.
+fn row(section: &str, name: &str) -> Vec<f64> {
+    let section = PAGE.split(&format!("\n## {section}\n")).nth(1).unwrap().split("\n## ").next().unwrap();
+    let row = section
+        .lines()
+        .find(|line| line.starts_with(&format!("| {name}")))
+        .unwrap_or_else(|| panic!("{name}"));
+    let number = |cell: &str| {
+        let digits: String =
+            cell.trim().chars().take_while(|c| c.is_ascii_digit() || ".-".contains(*c)).collect();
+        digits.parse().ok()
+    };
+    row.split('|').skip(2).filter_map(number).collect()
+}
+
+/// What a row says: expected, stop below, stop above.
+fn says(name: &str, expected: [f64; 3], decimals: usize) {
+    let found = row("What a builder measures", name);
+    let rounded = expected.map(|value| format!("{value:.decimals$}").parse::<f64>().unwrap());
+    assert_eq!(found, rounded, "{name}");
+}
+
+/// Expected, and so many deviations below and above.
+fn about(value: f64, deviation: f64) -> [f64; 3] {
+    [value, value - SIGMAS * deviation, value + SIGMAS * deviation]
+}
+
+#[test]
+fn the_bounds_for_a_builder_follow_from_the_data() {
+    let (mk3, real) = (airframe::builtin("mk3").unwrap(), Dispersion::builtin("real").unwrap());
+    let (mass, wrong) = (&mk3.mass, &real.mismatch);
+    says("mass,", about(mass.loaded_kg, real.mass_share * mass.loaded_kg), 2);
+    says("centre of gravity,", about(1e3 * mass.loaded_cg_station_m, 1e3 * wrong.cg_along_m), 0);
+    says("centre of gravity beside", [0.0, 0.0, 1e3 * SIGMAS * real.cg_off_axis_m], 1);
+    // Two strings of 1 m, 0.4 m apart: T = 2 pi sqrt(I L / (m g b^2)), b = 0.2 m.
+    let ten_s = |share: f64| {
+        let inertia = mass.loaded_pitch_inertia_kg_m2 * (1.0 + share);
+        10.0 * TAU * (inertia / (mass.loaded_kg * G_M_S2 * 0.2 * 0.2)).sqrt()
+    };
+    let share = SIGMAS * wrong.inertia_share;
+    says("pitch inertia", [ten_s(0.0), ten_s(-share), ten_s(share)], 1);
+    // A rod of 0.5 m in the motor's place.
+    let (rod_mm, limit_deg) = (500.0, mk3.gimbal.limit_deg);
+    let tip_mm = |deg: f64| rod_mm * libm::tan(deg.to_radians());
+    says("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
+    says("thrust line, place", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
+    let gain = SIGMAS * wrong.gimbal_gain_share;
+    says("gimbal, each end", [1.0, 1.0 - gain, 1.0 + gain].map(|gain| tip_mm(gain * limit_deg)), 0);
+    says("gimbal, play", [mk3.gimbal.servo.slop_deg, 0.0, wrong.gimbal_slop_deg[1]].map(tip_mm), 1);
+    // An end of a fin moves on an arc of its length.
+    let end_mm = |deg: f64| 1e3 * mk3.fins.length_m * deg.to_radians();
+    says("fins, play", [wrong.fin_slop_deg[0], 0.0, wrong.fin_slop_deg[1]].map(end_mm), 1);
+    says("fins, open", about(mk3.fins.open_deg, wrong.fin_offset_deg), 0);
+    for (name, servo, way_deg) in [
+        ("gimbal servo", &mk3.gimbal.servo, 2.0 * limit_deg),
+        ("fin servo", &mk3.fins.servo, mk3.fins.open_deg - mk3.fins.closed_deg),
+    ] {
+        // The pad check allows 20 ms more. A servo that is faster than 1.5 times its data makes the loop another one.
+        let whole_ms = |rate: f64| 1e3 * (servo.delay_s + way_deg / (rate * servo.rate_deg_s));
+        says(name, [whole_ms(1.0), whole_ms(1.5), whole_ms(1.0) + 20.0], 0);
+    }
+    says(
+        "igniters",
+        about(1e3 * Truth::default().ignition_delay_s, {
+            1e3 * real.ignition_delay_s * mk3.igniter.scatter_scale
+        }),
+        0,
+    );
+    let motor = motors::builtin(&mk3.motor).unwrap();
+    let impulse_n_s = motor.total_impulse_n_s();
+    says("motor, impulse", about(impulse_n_s, real.impulse_share * impulse_n_s), 0);
+    let burn_s = motor.burn_time_s();
+    says("motor, burn time", about(burn_s, real.burn_time_share * burn_s), 2);
+    says("IMU, square", [0.0, 0.0, SIGMAS * real.sensor_params.imu.mounting_deg], 1);
+}
+
+/// The earlier of two independent delays of unit deviation: mean -1 / sqrt(pi), deviation sqrt(1 - 1 / pi) (order statistics of
+/// two normals).
+#[test]
+fn val_order_statistics_the_earlier_of_two_igniters() {
+    let scale = airframe::builtin("mk3").unwrap().igniter.scatter_scale;
+    assert!((scale - (1.0 - std::f64::consts::FRAC_1_PI).sqrt()).abs() < 0.005, "{scale}");
+}
+
+/// Drag of an open fin at 36 m/s at sea level, at half the fin's length; a servo that keeps half its unloaded speed needs twice
+/// that at a stall.
+#[test]
+fn val_hand_the_servo_of_a_fin() {
+    let mk3 = airframe::builtin("mk3").unwrap();
+    let fins = &mk3.fins;
+    let drag_n = 0.5 * 1.225 * 36.0 * 36.0 * mk3.body.reference_area_m2 * fins.drag_coefficient;
+    let hinge_n_m = drag_n * 0.5 * fins.length_m;
+    let says = |name: &str| row("Fins", name);
+    assert!((says("hinge torque of an open fin at 36 m/s")[0] - hinge_n_m).abs() < 0.005, "{hinge_n_m}");
+    let section = PAGE.split("\n## Fins\n").nth(1).unwrap();
+    assert!(section.contains(&format!("at least {:.2} N m", 2.0 * hinge_n_m)), "{hinge_n_m}");
+    assert!(says("servo's class")[0] >= 2.0 * hinge_n_m);
+    assert!((says("width along the skin")[0] - 1e3 * fins.width_m).abs() < 1e-9);
+    let opens_s = fins.servo.delay_s + (fins.open_deg - fins.closed_deg) / fins.servo.rate_deg_s;
+    assert!(section.contains(&format!("the {opens_s:.2} s that their servos take")), "{opens_s}");
+}
