@@ -54,7 +54,7 @@ pub struct Rest {
 }
 
 /// What legs that can give way have borne since the first contact.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Strain {
     /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
     pub stroke_used: f64,
@@ -123,12 +123,7 @@ impl Ground {
             crush: legs.crush,
             feet_m: ring(legs.foot_station_m, legs.foot_radius_m),
             given_m: [0.0; 4],
-            strain: Strain {
-                stroke_used: 0.0,
-                strength_used: 0.0,
-                clearance_m: f64::INFINITY,
-                tilt_rad: 0.0,
-            },
+            strain: Strain { clearance_m: f64::INFINITY, ..Strain::default() },
             hull_m: core::array::from_fn(|i| if i < 4 { tail[i] } else { nose[i - 4] }),
             upwards,
             normal: upwards / upwards.norm(),
