@@ -35,12 +35,13 @@ use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
+use self::pilot::planner::Planner;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::powered::{ControlLevel, LandingSolved};
+use crate::guidance::powered::ControlLevel;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
@@ -98,7 +99,7 @@ pub struct Computer {
 }
 
 impl Computer {
-    /// One frame. In the air: estimate, predict, answer the crew, decide, plan, point. On the pad: answer the crew, and wait.
+    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On the pad: answer the crew, and wait.
     /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         self.table.begin(input.time_s);
@@ -118,6 +119,7 @@ impl Computer {
             }
         }
         let flown = self.flown();
+        let planned = flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
         if let Some(flown) = &flown {
             self.pilot.estimate_state(self.table.mode().phase, flown);
             self.pilot.predict(&mut self.table, flown);
@@ -125,10 +127,9 @@ impl Computer {
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
-        let mut planned = false;
         if let Some(flown) = &flown {
             self.pilot.decide(&mut self.table, flown, &self.sensors);
-            planned = self.pilot.plan(self.table.mode(), flown);
+            self.pilot.plan(self.table.mode(), flown);
             let pointed = self.pilot.point(self.table.mode(), flown);
             self.take_over(pointed);
         } else {
@@ -150,13 +151,21 @@ impl Computer {
         }
     }
 
-    /// One frame. Also returns the landing that the pilot plans in it, solved separately; `None` if it plans none.
-    pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
-        let before = self.pilot.clone();
-        let output = self.step(input);
-        let solved =
-            self.flown().and_then(|flown| self.pilot.landing_planned(&before, self.table.mode(), &flown));
-        (output, solved)
+    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
+    pub fn solve_posed(&mut self) -> Option<u64> {
+        let planner = self.pilot.posed()?;
+        planner.solve();
+        Some(planner.frames_on_a_board())
+    }
+
+    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
+    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
+        self.pilot.take_posed()
+    }
+
+    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
+    pub fn give_back(&mut self, planner: Box<Planner>) {
+        self.pilot.give_back(planner);
     }
 
     /// Reports what the input changes: the pin, and a log that has stopped.
@@ -376,6 +385,8 @@ pub struct Input<'a> {
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
+    /// What was posed last is computed: this frame takes it over.
+    pub plan_ready: bool,
 }
 
 impl Input<'_> {
@@ -397,6 +408,7 @@ impl Input<'_> {
         people: None,
         requests: &[],
         rehearsed: None,
+        plan_ready: false,
     };
 
     /// The same input without what lives for one frame only.
@@ -418,6 +430,7 @@ impl Input<'_> {
             people,
             requests: _,
             rehearsed: _,
+            plan_ready: _,
         } = self;
         Input {
             frame,
@@ -436,6 +449,7 @@ impl Input<'_> {
             people,
             requests: &[],
             rehearsed: None,
+            plan_ready: false,
         }
     }
 
@@ -470,6 +484,6 @@ pub struct Output {
     pub answers: Vec<Answer>,
     /// Reports, in order.
     pub news: Vec<CrewMessage>,
-    /// A plan was made.
+    /// A plan of a landing was taken over.
     pub planned: bool,
 }

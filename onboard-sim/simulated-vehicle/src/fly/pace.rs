@@ -82,10 +82,6 @@ impl Pace {
         }
     }
 
-    pub(super) fn clock(&self) -> Instant {
-        self.began
-    }
-
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]
     pub(super) fn has_lingered(&mut self, linked: bool) -> bool {
         let now = Instant::now();
