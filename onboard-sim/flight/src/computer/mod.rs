@@ -119,7 +119,8 @@ impl Computer {
             }
         }
         let flown = self.flown();
-        let planned = flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
+        let planned =
+            flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
         if let Some(flown) = &flown {
             self.pilot.estimate_state(self.table.mode().phase, flown);
             self.pilot.predict(&mut self.table, flown);
@@ -156,6 +157,12 @@ impl Computer {
         let planner = self.pilot.posed()?;
         planner.solve();
         Some(planner.frames_on_a_board())
+    }
+
+    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released. It
+    /// takes some seconds on a board, and leaves no memory.
+    pub fn rehearse(&mut self) -> Option<Rehearsed> {
+        if self.release.is_some() { None } else { self.pilot.rehearse() }
     }
 
     /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
@@ -332,7 +339,7 @@ impl LogState {
     pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
-/// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
+/// Result of a rehearsal of the landing: of a [planned](Computer::rehearse) one, or of one in a simulated world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rehearsed {
     /// It found plans, and landed on its legs.

@@ -1,10 +1,10 @@
 //! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew, check on the pad,
 //! and what went wrong.
 
+use flight::computer::AbortEffect;
 use flight::computer::crew::People;
 use flight::computer::findings::Findings;
 use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
-use flight::computer::AbortEffect;
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Latch, Mode, MotorStatus, Phase};

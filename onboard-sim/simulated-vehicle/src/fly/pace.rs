@@ -19,7 +19,6 @@ pub(super) enum Waiting {
 pub(super) struct Pace {
     speed: Speed,
     frame: Duration,
-    began: Instant,
     due: Instant,
     over_since: Option<Instant>,
     lateness: Lateness,
@@ -75,7 +74,6 @@ impl Pace {
         Self {
             speed,
             frame: Duration::from_secs_f64(frame_s),
-            began: now,
             due: now,
             over_since: None,
             lateness: Lateness::new(),

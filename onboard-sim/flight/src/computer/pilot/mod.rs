@@ -7,6 +7,7 @@
 mod ascent;
 pub mod planner;
 mod prediction;
+mod rehearsal;
 mod step;
 mod vehicle_model;
 mod vertical_speed;
@@ -33,7 +34,7 @@ use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Frames between plans.
+/// Frames between plans, if none takes longer.
 pub const FRAMES_PER_PLAN: u64 = 10;
 
 /// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
@@ -68,6 +69,8 @@ pub struct Pilot {
     planner: Option<Box<Planner>>,
     /// When something was posed that was not taken over yet, s.
     posed_at_s: Option<f64>,
+    /// The frame from which on the next landing is posed.
+    plan_due: u64,
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
@@ -120,6 +123,7 @@ impl Pilot {
             prediction: Prediction::default(),
             planner: Self::planner(&model, search),
             posed_at_s: None,
+            plan_due: 0,
             powered,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,

@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
-use super::vehicle_model::VehicleModel;
 use super::Pilot;
+use super::vehicle_model::VehicleModel;
 use crate::computer::Input;
 use crate::estimation::estimator::Estimate;
 use crate::estimation::sensor_watch::SensorWatch;
@@ -120,19 +120,15 @@ impl VehicleModel {
     }
 
     /// The whole prediction.
-    pub(super) fn prediction(
-        &self,
-        estimate: &Estimate,
-        fins_rad: &[f64; 4],
-        apogee_m: f64,
-    ) -> Prediction {
+    pub(super) fn prediction(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
         let fall = self.fall(estimate, fins_rad, apogee_m);
-        let (settings, curve, fins_m2) = (&self.mission.ignition, &self.mission.motor_curve, self.fins_m2(fins_rad));
+        let (settings, curve, fins_m2) =
+            (&self.mission.ignition, &self.mission.motor_curve, self.fins_m2(fins_rad));
         let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
         let (height_m, vertical_m_s) = (fall.height_m, estimate.state.velocity_m_s.z);
         let ignition = settings.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
-        let lands_ahead = ignition.band.is_some()
-            || settings.lands_ahead(&column, curve, height_m, vertical_m_s, fins_m2);
+        let lands_ahead =
+            ignition.band.is_some() || settings.lands_ahead(&column, curve, height_m, vertical_m_s, fins_m2);
         Prediction { ignition, lands_ahead, ..fall }
     }
 

@@ -90,12 +90,14 @@ impl Pilot {
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Poses a landing in every tenth frame of the burn.
+    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer.
     pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) {
-        let due = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
+        let due = input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
-        if let Some((burning, estimate)) = burning.zip(self.estimate) {
-            self.pose_landing(input.time_s, &estimate, burning);
+        if let Some((burning, estimate)) = burning.zip(self.estimate)
+            && self.pose_landing(input.time_s, &estimate, burning)
+        {
+            self.plan_due = input.frame + FRAMES_PER_PLAN;
         }
     }
 
@@ -117,7 +119,8 @@ impl Pilot {
                 },
             };
             let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-            self.fins_rad = self.fins(mode, estimate, &mass, self.model.density_kg_m3(estimate), burning.is_some());
+            self.fins_rad =
+                self.fins(mode, estimate, &mass, self.model.density_kg_m3(estimate), burning.is_some());
         }
         let level = if flying { self.powered.report().level } else { ControlLevel::Idle };
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }

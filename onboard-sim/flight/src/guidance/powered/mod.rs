@@ -20,8 +20,8 @@ use serde::{Deserialize, Serialize};
 
 pub use self::plan::Plan;
 pub use self::report::{ControlLevel, PoweredReport, PoweredSettings};
-pub use self::search::{LandingSolved, Search};
 use self::search::MOST_INTERVALS;
+pub use self::search::{LandingSolved, Search};
 pub use self::situation::PoweredSituation;
 use crate::control::aim::Aim;
 use crate::vehicle::rigid::RigidState;

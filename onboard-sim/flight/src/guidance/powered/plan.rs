@@ -168,6 +168,15 @@ impl Plan {
         self.settled_nodes = problem.end.settled_nodes;
     }
 
+    /// Planned velocity over the ground, m/s, and the direction of the nose at a time; `None` after the end.
+    pub(crate) fn at(&self, time_s: f64) -> Option<(Vector3<f64>, Aim)> {
+        let since = (time_s - self.begins_s).max(0.0) / self.step_s;
+        let k = since as usize;
+        let (before, after) = self.states.get(k).zip(self.states.get(k + 1))?;
+        let between = |i: usize| before[i] + (since - k as f64) * (after[i] - before[i]);
+        Some((Vector3::new(between(3), between(4), between(5)), self.aim(time_s)?))
+    }
+
     /// The wanted direction of the nose at a time; `None` after the end.
     pub(super) fn aim(&self, time_s: f64) -> Option<Aim> {
         let since_s = (time_s - self.begins_s).max(0.0);

@@ -85,7 +85,7 @@ pub struct PoweredReport {
     pub passes: usize,
     /// When the landing was posed, s since the release.
     pub posed_at_s: f64,
-    /// From then until the plan was ready to be flown, s. Longer than a period: the ticks between posed nothing.
+    /// From then until the plan was taken over, s. The next one waits for that, if it is longer than a period.
     pub took_s: f64,
     /// Residuals of the optimality conditions.
     pub kkt_stationarity: f64,

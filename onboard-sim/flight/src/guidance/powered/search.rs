@@ -68,6 +68,18 @@ impl Search {
         self.from.is_flown_out(settings, time_s)
     }
 
+    /// The plan that was flown when the landing was posed; without intervals if there was none.
+    pub(crate) fn from(&self) -> &Plan {
+        &self.from
+    }
+
+    /// The next search starts from what was found, if it is finite.
+    pub(crate) fn fly_on(&mut self) {
+        if self.found.is_finite() {
+            self.from.copy(&self.found);
+        }
+    }
+
     /// Passes of the last search.
     pub(crate) fn passes(&self) -> usize {
         self.workspace.passes()
@@ -86,7 +98,8 @@ impl Search {
     ) -> Option<Outcome> {
         let height_m = state.position_m.z - situation.feet_below_cg_m;
         let (earliest_s, latest_s) = situation.ends_s(settings.latest_after_s, height_m)?;
-        let mut final_time_s = if self.from.intervals() > 0 { self.from.left_s(time_s) } else { earliest_s }.clamp(earliest_s, latest_s);
+        let mut final_time_s = if self.from.intervals() > 0 { self.from.left_s(time_s) } else { earliest_s }
+            .clamp(earliest_s, latest_s);
         let most = self.room.unwrap_or(MOST_INTERVALS);
         let intervals =
             (libm::round(final_time_s / settings.interval_s) as usize).clamp(LEAST_INTERVALS, most);

@@ -6,7 +6,6 @@ mod pad;
 mod space;
 
 use std::ops::{Deref, DerefMut};
-use std::time::Duration;
 
 use flight::computer::crew::{Answer, Asked, Request};
 use flight::rules::phase::Phase;
@@ -60,8 +59,7 @@ impl Told {
 
     /// A frame in which the vehicle's own programme asks for something.
     pub(crate) fn request(&mut self, asked: Asked) -> Answer {
-        let VehicleStep { events, mut answers } =
-            self.vehicle.step(&[Request::of_the_programme(asked)]);
+        let VehicleStep { events, mut answers } = self.vehicle.step(&[Request::of_the_programme(asked)]);
         self.unread.extend(events);
         answers.remove(0)
     }
