@@ -18,20 +18,23 @@ use crate::vehicle::rigid::RigidState;
 /// Time between looks for the ignition in the fall, s, and how many.
 const LOOK_S: f64 = 0.1;
 const LOOKS: u32 = 200;
+/// More plans than the longest burn has.
+const MOST_PLANS: u32 = 200;
 
 impl Planner {
     /// Rehearses the landing, with no plan flown. It takes some seconds on a board.
     pub(super) fn rehearse(&mut self) -> Rehearsed {
         let (mut plans, mut converged) = (0, 0);
         let mut flown = self.model().lit();
-        while let Some((estimate, burning)) = flown.take() {
+        while let Some((estimate, burning)) = flown.take().filter(|_| plans < MOST_PLANS) {
             self.ask(estimate.time_s, &estimate, Asked::Landing(burning.clone()));
             self.solve();
+            // It moves as planned before, until the plan is ready.
+            let (estimate, burning) = self.later(&estimate, &burning);
             let Some(lands) = self.fly_on() else { break };
             plans += 1;
             converged += u32::from(lands);
-            // Twice the time of a plan is the period of plans.
-            let (estimate, burning) = self.later(&estimate, &burning);
+            // Twice that time is the period of plans.
             flown = Some(self.later(&estimate, &burning));
         }
         let limits = Limits::from(&self.model().mission.leg_limits);

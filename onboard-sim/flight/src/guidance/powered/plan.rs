@@ -172,7 +172,8 @@ impl Plan {
     pub(crate) fn at(&self, time_s: f64) -> Option<(Vector3<f64>, Aim)> {
         let since = (time_s - self.begins_s).max(0.0) / self.step_s;
         let k = since as usize;
-        let (before, after) = self.states.get(k).zip(self.states.get(k + 1))?;
+        // Without a plan `k` is the largest number.
+        let [before, after, ..] = self.states.get(k..)? else { return None };
         let between = |i: usize| before[i] + (since - k as f64) * (after[i] - before[i]);
         Some((Vector3::new(between(3), between(4), between(5)), self.aim(time_s)?))
     }
