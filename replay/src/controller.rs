@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Output};
-use flight::guidance::powered::{ControlLevel, LandingSolved, Plan};
+use flight::guidance::powered::{ControlLevel, Plan};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 pub use flight_log::again::FrameError;
@@ -120,21 +120,6 @@ impl LoggedComputer {
         Ok(self.record(frame, &read, &output))
     }
 
-    /// Runs a recorded frame again, and solves the landing that it plans separately; see [`Computer::step_inspected`].
-    ///
-    /// # Errors
-    /// As [`run_again`](Self::run_again).
-    ///
-    /// [`Computer::step_inspected`]: flight::computer::Computer::step_inspected
-    pub fn run_inspected(
-        &mut self,
-        frame: &ComputerFrame,
-    ) -> Result<(ComputerFrame, Option<LandingSolved>), FrameError> {
-        let read = self.read(frame)?;
-        let (output, solved) = self.computer.step_inspected(&read);
-        Ok((self.record(frame, &read, &output), solved))
-    }
-
     fn record(&mut self, frame: &ComputerFrame, read: &LoggedInput, output: &Output) -> ComputerFrame {
         let again = self.computer.record(read, output);
         if self.compares_digests {
@@ -178,9 +163,8 @@ impl LoggedComputer {
     }
 }
 
-/// The plan that a flight computer made in the frame it has just run, in which `level` decided; `None` if it flies an
-/// earlier plan or none.
-pub fn new_plan(pilot: &Pilot, time_s: f64, level: u32) -> Option<&Plan> {
-    let planned = level != u32::from(ControlLevel::Idle.index());
-    pilot.powered().planned().filter(|plan| planned && plan.begins_s() >= time_s)
+/// The plan that a flight computer took over in the frame it has just run; `None` if it flies an earlier plan or none.
+pub fn new_plan<'a>(pilot: &'a Pilot, output: &ComputerOutput) -> Option<&'a Plan> {
+    let posed_at_s = pilot.report().posed_at_s;
+    pilot.powered().planned().filter(|plan| output.planned && plan.begins_s() >= posed_at_s)
 }

@@ -14,8 +14,6 @@ use board::radio::Radio;
 use board::recorded::{Board, VehicleKind};
 use board::stream::{Answer, Reader};
 use clap::{Parser, Subcommand};
-use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
 
 /// The flight computer as a program for a board.
 #[derive(Parser)]
@@ -46,7 +44,7 @@ enum Command {
         #[arg(required = true)]
         folders: Vec<PathBuf>,
     },
-    /// Say what frames and plans cost, from the files `costs` and `recorded` of flights on a Cortex-M7
+    /// Say what frames and plans cost, from the files `costs` of flights on a Cortex-M7
     #[command(after_help = "Example: board costs flights/0 flights/1")]
     Costs {
         #[arg(required = true)]
@@ -180,20 +178,13 @@ fn compare(machines: &[String], folders: &[PathBuf]) -> Result<ExitCode> {
 fn costs(folders: &[PathBuf]) -> Result<()> {
     let mut classes: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
     for folder in folders {
-        let answers = answers_of(&folder.join("recorded"))?;
         let path = folder.join("costs");
         let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        for (answer, (number, line)) in answers.iter().zip(text.lines().enumerate()) {
+        for (number, line) in text.lines().enumerate() {
             let wrong = || format!("{}, line {}: '{line}'", path.display(), number + 1);
             let words: Vec<&str> = line.split(' ').collect();
-            let [_, planned, instructions, _] = words[..] else { anyhow::bail!("{}", wrong()) };
-            let class = if planned == "0" {
-                "frames without a plan"
-            } else if plans_a_landing(answer) {
-                "landings planned, from the arming of the motor on"
-            } else {
-                "other plans: prediction in the fall, rehearsal on the pad"
-            };
+            let [_, posed, instructions, _] = words[..] else { anyhow::bail!("{}", wrong()) };
+            let class = if posed == "0" { "frames" } else { "plans and predictions" };
             classes.entry(class).or_default().push(instructions.parse().with_context(wrong)?);
         }
     }
@@ -209,8 +200,4 @@ fn costs(folders: &[PathBuf]) -> Result<()> {
         );
     }
     Ok(())
-}
-
-fn plans_a_landing(answer: &Answer) -> bool {
-    phase_of(&answer.output).is_some_and(|phase| phase == Phase::LandArmed || phase.in_landing_burn())
 }

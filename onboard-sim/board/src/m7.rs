@@ -13,7 +13,6 @@ use board::recorded::{Board, FlyError, VehicleKind, Watch};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{SCB, SYST};
 use cortex_m_rt::{entry, exception};
-use flight::computer::Output;
 use flight::computer::saved::Saved;
 use linked_list_allocator::LockedHeap;
 use semihosting::fs::File;
@@ -155,7 +154,8 @@ impl Radio for Serial {
     }
 }
 
-/// Writes a line for each frame: its number, 1 if it planned, its instructions, and the bytes on the heap after it.
+/// Writes a line for each frame and for each plan: the frame's number, 1 for a plan that it has posed, the instructions, and the bytes
+/// on the heap after it.
 struct Costs {
     file: File,
     begun: u64,
@@ -197,13 +197,13 @@ impl Watch for Costs {
         self.begun = counted();
     }
 
-    fn ended(&mut self, frame: u64, output: &Output) {
+    fn ended(&mut self, frame: u64, posed: bool) {
         let instructions = counted().saturating_sub(self.begun) * INSTRUCTIONS_PER_COUNT;
         let bytes = HEAP.lock().used();
         self.most_bytes = self.most_bytes.max(bytes);
         let mut line = Line { text: [0; 80], length: 0 };
         // The longest line has 64 characters.
-        let _ = writeln!(line, "{frame} {} {instructions} {bytes}", u8::from(output.planned));
+        let _ = writeln!(line, "{frame} {} {instructions} {bytes}", u8::from(posed));
         if let Err(error) = self.file.write_all(&line.text[..line.length]) {
             self.failed.get_or_insert(error);
         }

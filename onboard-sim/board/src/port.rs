@@ -1,7 +1,15 @@
-//! What a board must offer to fly the flight computer, and the loop that flies it.
+//! What a board must offer to fly the flight computer, and the frames that fly it.
+//!
+//! A board has two contexts. A timer calls [`Frames::fly`] every 5 ms, which never waits. The main context computes what a frame has
+//! [posed](Board::pose), which takes up to 20 frames, and is interrupted by them: it receives a [`Planner`], calls
+//! [`Planner::solve`], and sends it back. The planner is a box that moves through the board's own channels, such as two queues of
+//! `heapless::spsc`: nothing is shared.
+
+use alloc::boxed::Box;
 
 use flight::computer::news::CrewMessage;
-use flight::computer::{Commands, Computer, Input, Output, flight_time_s};
+use flight::computer::pilot::planner::Planner;
+use flight::computer::{Commands, Computer, Input, Output, Rehearsed, flight_time_s};
 use flight_log::frame::{LoggedInput, frame_to_log};
 use protocol::records::computer_v1::ComputerFrame;
 
@@ -9,13 +17,13 @@ use protocol::records::computer_v1::ComputerFrame;
 pub trait Board {
     type Error;
 
-    /// Waits for the end of the frame, 5 ms after the last one, and reads everything: gyro and accelerometer in every frame,
+    /// Reads everything at the end of a frame, 5 ms after the last one, and does not wait: gyro and accelerometer in every frame,
     /// barometer, satellites and lidar if they have something new; gimbal and fins, which are not read if the airframe says
-    /// that their servos do not tell where they are. [`Input`] says what each value is; its number and its time are set by the
-    /// loop. `None`: the flight is over.
+    /// that their servos do not tell where they are. [`Input`] says what each value is; its number, its time, the rehearsal and whether a plan is ready are set by
+    /// [`Frames`]. `None`: the flight is over.
     ///
     /// # Errors
-    /// A device without which nothing can be decided has failed: the loop ends.
+    /// A device without which nothing can be decided has failed.
     fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error>;
 
     /// Moves servos and switches currents: gimbal, fins, both igniters, separation, parachute. It acts on every command
@@ -25,6 +33,12 @@ pub trait Board {
     /// As [`sense`](Self::sense).
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error>;
 
+    /// Sends to the main context what it has to compute. It does not wait: there is never more than one.
+    fn pose(&mut self, posed: Box<Planner>);
+
+    /// Receives what the main context has computed, once.
+    fn solved(&mut self) -> Option<Box<Planner>>;
+
     /// Tells the crew.
     fn tell(&mut self, news: &[CrewMessage]);
 
@@ -32,20 +46,54 @@ pub trait Board {
     fn keep(&mut self, frame: &ComputerFrame);
 }
 
-/// Flies the computer on the board until the flight is over.
-///
-/// # Errors
-/// The board has failed.
-pub fn fly<B: Board>(computer: &mut Computer, board: &mut B) -> Result<(), B::Error> {
-    let (mut frame, mut rehearsed_before) = (0, false);
-    while let Some(read) = board.sense()? {
-        frame += 1;
-        let input = Input { frame, time_s: flight_time_s(frame), ..read.input() };
-        let output: Output = computer.step(&input);
-        board.act(&output.commands)?;
-        board.tell(&output.news);
-        board.keep(&frame_to_log(&input, &output, computer, rehearsed_before));
-        rehearsed_before |= input.rehearsed.is_some();
+/// The frames of a flight.
+#[derive(Debug)]
+pub struct Frames {
+    computer: Computer,
+    frame: u64,
+    rehearsed: Option<Rehearsed>,
+    /// The rehearsal is in the log.
+    kept: bool,
+}
+
+impl Frames {
+    /// Before the first frame. A computer that was not released rehearses its landing now, which takes some seconds.
+    pub fn new(mut computer: Computer) -> Self {
+        let rehearsed = computer.rehearse();
+        Self { computer, frame: 0, rehearsed, kept: false }
     }
-    Ok(())
+
+    /// The computer after the last frame.
+    pub fn computer(&self) -> &Computer {
+        &self.computer
+    }
+
+    /// Flies one frame. Returns `false` if the flight is over.
+    ///
+    /// # Errors
+    /// The board has failed.
+    pub fn fly<B: Board>(&mut self, board: &mut B) -> Result<bool, B::Error> {
+        let Some(read) = board.sense()? else { return Ok(false) };
+        self.frame += 1;
+        let solved = board.solved();
+        let input = Input {
+            frame: self.frame,
+            time_s: flight_time_s(self.frame),
+            rehearsed: self.rehearsed.as_ref(),
+            plan_ready: solved.is_some(),
+            ..read.input()
+        };
+        if let Some(planner) = solved {
+            self.computer.give_back(planner);
+        }
+        let output: Output = self.computer.step(&input);
+        board.act(&output.commands)?;
+        if let Some(posed) = self.computer.take_posed() {
+            board.pose(posed);
+        }
+        board.tell(&output.news);
+        board.keep(&frame_to_log(&input, &output, &self.computer, self.kept));
+        self.kept |= input.rehearsed.is_some();
+        Ok(true)
+    }
 }

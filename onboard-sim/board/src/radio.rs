@@ -96,7 +96,6 @@ impl Crewed {
             battery: input.battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
             rehearsed: None,
             parachute_ejected: self.parachute_ejected,
-            plan_took_s: 0.0,
             judged: None,
         };
         self.endpoint.on_answers(&output.answers, &flown);

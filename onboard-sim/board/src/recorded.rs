@@ -4,7 +4,6 @@ use alloc::boxed::Box;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
-use flight::computer::Output;
 use flight::computer::saved::Saved;
 use flight_log::again::{FrameError, RecordedComputer, mission_flown};
 use flight_log::frame::output_to_log;
@@ -20,10 +19,10 @@ use crate::stream::{Answer, Begin, Frame, Reader, put};
 pub trait Watch {
     /// The computer is built: from here on it flies.
     fn is_set_up(&mut self) {}
-    /// The next frame is flown now.
+    /// The next frame is flown now, or what the last one has posed is computed.
     fn begins(&mut self) {}
-    /// The frame of this number was flown.
-    fn ended(&mut self, _frame: u64, _output: &Output) {}
+    /// The frame of this number was flown, or what it has `posed` was computed.
+    fn ended(&mut self, _frame: u64, _posed: bool) {}
     /// What was saved before the machine was reset; `None` at power-up.
     fn saved(&mut self) -> Option<Saved> {
         None
@@ -145,7 +144,7 @@ impl Flying {
         };
         watch.begins();
         let output = computer.step(&read);
-        watch.ended(number, &output);
+        watch.ended(number, false);
         let computer = computer.computer();
         let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
         let decided = Answer {
@@ -159,6 +158,11 @@ impl Flying {
         put(&decided, &mut bytes);
         answer(&bytes);
         self.answered = Some((number, bytes));
+        // A frame on its own timer would go on meanwhile. The frame that takes it over is said by the world.
+        watch.begins();
+        if self.computer.computer_mut().solve_posed().is_some() {
+            watch.ended(number, true);
+        }
         Ok(true)
     }
 

@@ -2,13 +2,17 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::cell::Cell;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
 
-use board::port;
+use board::port::{self, Frames};
 use board::radio::Radio;
 use board::recorded::{Board, FlyError, VehicleKind, Watch};
 use board::stream::{Answer, Begin, Frame, LONGEST_BYTES, OnTheAir, Reader, put};
-use flight::computer::Commands;
+use flight::computer::crew::{Asked, Request};
 use flight::computer::news::CrewMessage;
+use flight::computer::pilot::planner::Planner;
+use flight::computer::{Commands, Computer};
 use flight::rules::outputs::Line;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::{LoggedInput, input_from_log};
@@ -155,23 +159,52 @@ fn every_frame_before_a_reset_is_answered_before_it() {
     assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
 }
 
-/// A board that senses what was recorded, and notes its commands.
+/// A board whose main context is a thread. It senses what was recorded, has a plan in the frame in which the recorded computer had it,
+/// and notes its commands.
 struct Recorded<'f> {
     frames: std::slice::Iter<'f, ComputerFrame>,
+    ready: bool,
+    to_main: Sender<Box<Planner>>,
+    from_main: Receiver<Box<Planner>>,
     commanded: Vec<Commands>,
     kept: u64,
+}
+
+impl<'f> Recorded<'f> {
+    fn sensing(frames: &'f [ComputerFrame]) -> Self {
+        let ((to_main, posed), (solve, from_main)) = (channel::<Box<Planner>>(), channel());
+        thread::spawn(move || {
+            for mut planner in posed {
+                planner.solve();
+                if solve.send(planner).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { frames: frames.iter(), ready: false, to_main, from_main, commanded: Vec::new(), kept: 0 }
+    }
 }
 
 impl port::Board for Recorded<'_> {
     type Error = core::convert::Infallible;
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error> {
-        Ok(self.frames.next().map(|frame| input_from_log(&frame.input).unwrap()))
+        let Some(frame) = self.frames.next() else { return Ok(None) };
+        self.ready = frame.input.plan_ready;
+        Ok(Some(input_from_log(&frame.input).unwrap()))
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error> {
         self.commanded.push(*commands);
         Ok(())
+    }
+
+    fn pose(&mut self, posed: Box<Planner>) {
+        self.to_main.send(posed).unwrap();
+    }
+
+    fn solved(&mut self) -> Option<Box<Planner>> {
+        self.ready.then(|| self.from_main.recv().unwrap())
     }
 
     fn tell(&mut self, _: &[CrewMessage]) {}
@@ -186,23 +219,67 @@ fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
     RecordedComputer::started(&recipe.mission, &flight_log::sortie::start(sortie))
 }
 
-#[test]
-fn a_board_that_senses_the_same_commands_the_same() {
-    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
-    let mut computer = started(&recipe(), &sortie).computer().clone();
-    let frames = flown(&mut sortie);
-    let mut board = Recorded { frames: frames.iter(), commanded: Vec::new(), kept: 0 };
-    port::fly(&mut computer, &mut board).unwrap();
-    assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()));
+/// Flies the board to its end, and compares every command with the recorded one.
+fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
+    let (mut flight, mut board) = (Frames::new(computer), Recorded::sensing(frames));
+    while flight.fly(&mut board).unwrap() {}
+    assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()), "no frame is lost");
     for (frame, commands) in frames.iter().zip(&board.commanded) {
         let (recorded, number) = (&frame.output, frame.input.frame);
         let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&commands.gimbal_rad), bits(&recorded.gimbal_rad), "frame {number}");
         assert_eq!(bits(&commands.fins_rad), bits(&recorded.fins_rad), "frame {number}");
-        let on = [Line::LandingIgniter, Line::Parachute].map(|line| commands.outputs.is_on(line));
-        assert_eq!(on, [recorded.ignite, recorded.parachute]);
+        let lines = [Line::LandingIgniter, Line::Parachute, Line::AscentIgniter, Line::Separation];
+        let recorded =
+            [recorded.ignite, recorded.parachute, recorded.ignite_booster, recorded.separate_booster];
+        assert_eq!(lines.map(|line| commands.outputs.is_on(line)), recorded, "frame {number}");
     }
-    assert_eq!(computer.digest(), frames.last().unwrap().state_digest);
+    flight
+}
+
+/// However late the plans are, a board whose main context plans decides what the simulator has decided with plans as late.
+#[test]
+fn a_board_that_senses_the_same_commands_the_same() {
+    for slower in [1, 4] {
+        let mut sortie = Sortie::new(&recipe(), 0).unwrap().planning_slower(slower);
+        let computer = started(&recipe(), &sortie).computer().clone();
+        let frames = flown(&mut sortie);
+        let ready = frames.iter().filter(|frame| frame.input.plan_ready).count();
+        assert!(ready > 20, "{ready} plans and predictions, {slower} times as late");
+        let flight = commands_the_same(computer, &frames);
+        assert_eq!(flight.computer().digest(), frames.last().unwrap().state_digest);
+    }
+}
+
+/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is moved by a computer that decides the
+/// same in every frame.
+#[test]
+fn a_board_rehearses_arms_and_lands() {
+    let mut sortie = Sortie::on_the_pad(&recipe(), 0).unwrap();
+    let computer = started(&recipe(), &sortie).computer().clone();
+    let (mut frames, mut last, mut armed) = (Vec::new(), LastFrame::default(), false);
+    let asks = |asked| [Request::of_the_programme(asked)];
+    let (arm, start) = (asks(Asked::Arm), asks(Asked::Start));
+    // The simulated rehearsal is over after some seconds.
+    while sortie.goes_on() || sortie.computer().released_at_s().is_none() {
+        let requests: &[Request] = match sortie.frame() {
+            4_000 => &arm,
+            4_010 => &start,
+            _ => &[],
+        };
+        sortie.step_with(&Outside { requests, ..Outside::NOBODY }, &mut last);
+        let mut frame = *last.take().unwrap();
+        // A board has no simulated world.
+        frame.input.rehearsed = None;
+        frames.push(frame);
+        armed |= sortie.computer().mode().interlocks.armed;
+        assert!(frames.len() < 40_000);
+    }
+    assert!(armed && sortie.outcome().landing.stands, "{:?}", sortie.outcome());
+    let flight = commands_the_same(computer, &frames);
+    let rehearsed = flight.computer().rehearsed().unwrap();
+    assert!(rehearsed.warm, "{rehearsed:?}");
+    assert_eq!(flight.computer().mode().phase, sortie.computer().mode().phase);
 }
 
 /// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame. vlr wants

@@ -7,7 +7,6 @@
 #![expect(clippy::print_stdout, reason = "the table is its output")]
 
 use campaign::run::in_parallel;
-use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
@@ -64,9 +63,7 @@ fn passes(recipe: &Recipe, number: u64) -> (Vec<usize>, bool) {
     let mut flight = Sortie::new(recipe, number).unwrap();
     let mut passes = Vec::new();
     loop {
-        flight.step();
-        if flight.frame().is_multiple_of(FRAMES_PER_PLAN) && flight.computer().mode().phase == Phase::Powered
-        {
+        if flight.step().planned() && flight.computer().mode().phase == Phase::Powered {
             passes.push(flight.pilot().report().passes);
         }
         if !flight.goes_on() {

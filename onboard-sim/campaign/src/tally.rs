@@ -1,7 +1,6 @@
 //! Flies one flight of a campaign and collects the values of its row; and finds the ignition height of the simpler guidance
 //! laws before the flight.
 
-use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::LegLimits;
@@ -83,12 +82,12 @@ impl Tally {
 
     /// Flies one frame, which somebody watches.
     pub fn step_watched(&mut self, watch: &mut dyn Watch) -> bool {
-        self.flight.step_with(&Outside::NOBODY, watch);
-        self.count();
+        let planned = self.flight.step_with(&Outside::NOBODY, watch).planned();
+        self.count(planned);
         self.flight.goes_on()
     }
 
-    fn count(&mut self) {
+    fn count(&mut self, planned: bool) {
         let (flight, world) = (&self.flight, self.flight.world());
         let pilot = flight.pilot();
         if self.ignition.is_none() && pilot.ignited_at_s().is_some() {
@@ -119,7 +118,7 @@ impl Tally {
         let stop_rad = AT_STOP_SHARE * self.gimbal_limit_rad;
         self.saturated_frames +=
             u64::from(computer.commands().gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
-        if flight.frame().is_multiple_of(FRAMES_PER_PLAN) {
+        if planned {
             let report = pilot.report();
             self.plans[usize::from(computer.level().index())] += 1;
             self.solver_iterations += report.iterations as u64;

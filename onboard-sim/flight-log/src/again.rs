@@ -2,7 +2,6 @@
 
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Output, flight_time_s};
-use flight::guidance::powered::LandingSolved;
 use flight::vehicle::mission::Mission;
 use protocol::records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
 
@@ -93,12 +92,6 @@ impl RecordedComputer {
     /// Flies the frame that was just [read](Self::read).
     pub fn step(&mut self, read: &LoggedInput) -> Output {
         self.computer.step(&read.input())
-    }
-
-    /// Flies the frame that was just [read](Self::read), and solves the landing that it plans separately; see
-    /// [`Computer::step_inspected`].
-    pub fn step_inspected(&mut self, read: &LoggedInput) -> (Output, Option<LandingSolved>) {
-        self.computer.step_inspected(&read.input())
     }
 
     /// Frame `number` is next: a computer that missed frames before it is restarted.

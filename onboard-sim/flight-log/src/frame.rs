@@ -92,6 +92,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         people,
         requests,
         rehearsed,
+        plan_ready,
     } = input;
     v1::ComputerInput {
         frame,
@@ -110,6 +111,7 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
         people: people.to_log(),
         requests: requests.iter().map(Logged::to_log).collect(),
         rehearsed: rehearsed.map(Logged::to_log),
+        plan_ready,
     }
 }
 
@@ -137,6 +139,7 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordEr
         people: Logged::from_log(&input.people, at("people"))?,
         requests: &[],
         rehearsed: None,
+        plan_ready: input.plan_ready,
     };
     let requests = input.requests.iter().map(|request| Logged::from_log(request, at("request")));
     let rehearsed = Logged::from_log(&input.rehearsed, at("rehearsed"))?;
@@ -306,7 +309,7 @@ mod tests {
         fn an_input_survives_the_log_bit_for_bit(
             frame: u64,
             numbers in prop::collection::vec(any_bits(), 18),
-            flags: [bool; 8],
+            flags: [bool; 9],
             space_bytes: u64,
             uplink in any_uplink(),
             commander in prop::option::of((any_station(), prop::option::of(any_operator()))),
@@ -351,6 +354,7 @@ mod tests {
                 requests: &requests,
                 rehearsed: rehearsed.as_ref(),
                 booster_attached: flags[6],
+                plan_ready: flags[8],
             };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();

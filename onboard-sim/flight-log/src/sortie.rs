@@ -2,7 +2,6 @@
 //! flight computer again from the frames.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
@@ -66,10 +65,6 @@ impl LastFrame {
 }
 
 impl Watch for LastFrame {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
         // A computer that has restarted takes the rehearsal again.
         let known = self.rehearsed && input.frame == self.next;

@@ -6,16 +6,12 @@
 //! judge begins from its own guesses, and from the plan that flew. Prints a table in Markdown.
 
 use std::io::Write as _;
-use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 use campaign::run::in_parallel;
 use campaign::statistics::quantile;
-use flight::computer::pilot::FRAMES_PER_PLAN;
-use flight::computer::{Computer, Input, Output};
 use flight::guidance::powered::LandingSolved;
 use judge::{Judgement, Score};
-use sim::outside::{Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
@@ -62,39 +58,14 @@ fn main() -> Result<()> {
 fn flown(recipe: &Recipe, number: u64, every: u64) -> Result<Vec<LandingSolved>> {
     let mut flight = Sortie::new(recipe, number)?;
     // Other flights give other plans of their burns.
-    let mut inspector = Inspector { before: None, planned: number, every, plans: Vec::new() };
-    loop {
-        let plans = (flight.frame() + 1).is_multiple_of(FRAMES_PER_PLAN)
-            && flight.computer().mode().phase.in_landing_burn();
-        inspector.before = plans.then(|| flight.computer().clone());
-        flight.step_with(&Outside::NOBODY, &mut inspector);
-        if !flight.goes_on() {
-            return Ok(inspector.plans);
+    let (mut planned, mut plans) = (number, Vec::new());
+    while flight.goes_on() {
+        if flight.step().planned() {
+            planned += 1;
+            plans.extend(flight.pilot().landing_solved().filter(|_| planned.is_multiple_of(every)));
         }
     }
-}
-
-/// Solves again what a frame plans.
-struct Inspector {
-    /// The computer before a frame that may plan.
-    before: Option<Computer>,
-    planned: u64,
-    every: u64,
-    plans: Vec<LandingSolved>,
-}
-
-impl Watch for Inspector {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-
-    fn decided(&mut self, input: &Input<'_>, _: &Output, _: &Computer) {
-        let Some(mut before) = self.before.take() else { return };
-        self.planned += 1;
-        if self.planned.is_multiple_of(self.every) {
-            self.plans.extend(before.step_inspected(input).1);
-        }
-    }
+    Ok(plans)
 }
 
 /// A plan that flew, and the judge's.

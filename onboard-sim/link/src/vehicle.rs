@@ -105,8 +105,6 @@ pub struct VehicleState<'a> {
     pub rehearsed: Option<&'a PoweredReport>,
     /// The parachute was thrown out, in this phase or before it.
     pub parachute_ejected: bool,
-    /// How long the last plan took, s.
-    pub plan_took_s: f64,
     /// `None` before the landing is judged, and on a vehicle that nobody simulates.
     pub judged: Option<Judged>,
 }
@@ -186,9 +184,9 @@ impl<'a> VehicleState<'a> {
         self.airborne().map_or(0.0, |air| air.burning_s.map_or(0.0, |burning_s| air.burn.thrust_n(burning_s)))
     }
 
-    /// How long the last plan took, s; 0 before the flight.
+    /// How long the last plan took, s; 0 before the first.
     pub fn solve_time_s(&self) -> f64 {
-        self.airborne().map_or(0.0, |_| self.plan_took_s)
+        self.computer.pilot().report().took_s
     }
 
     /// Number, level and report of what the controller did last.

@@ -1,7 +1,5 @@
 //! The input from the crew and the ground in one frame, and the result of that frame.
 
-use std::time::Duration;
-
 use flight::computer::crew::{People, Request};
 use flight::computer::{Commander, Computer, Input, LogState, Output};
 use flight::rules::arming::Uplink;
@@ -36,22 +34,15 @@ impl Outside<'_> {
 
 /// An observer of the flight computer.
 pub trait Watch {
-    /// Any clock: only differences of it are used, to time the flight computer.
-    fn now(&mut self) -> Duration;
-
     /// A frame that `computer` has just decided.
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer);
 }
 
-/// No observer and no clock.
+/// No observer.
 #[derive(Debug, Clone, Copy)]
 pub struct Unwatched;
 
 impl Watch for Unwatched {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-
     fn decided(&mut self, _: &Input<'_>, _: &Output, _: &Computer) {}
 }
 
@@ -60,12 +51,10 @@ impl Watch for Unwatched {
 pub struct Flown {
     /// What the flight computer decided; `None` while it is dead.
     pub output: Option<Output>,
-    /// How long the decision took, by the observer's clock.
-    pub took: Duration,
 }
 
 impl Flown {
-    /// Whether the flight computer planned.
+    /// Whether the flight computer took over a plan of a landing.
     pub fn planned(&self) -> bool {
         self.output.as_ref().is_some_and(|output| output.planned)
     }

@@ -4,8 +4,6 @@
 //! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
 //! On the pad the same flight is rehearsed with nominal data.
 
-use std::time::Duration;
-
 use crate::world::sensors::SensorParamError;
 use crate::world::whole::WorldError;
 use crate::world::{Battery, World};
@@ -67,6 +65,10 @@ pub struct Sortie {
     /// Frames until the dead flight computer starts again.
     frames_down: u64,
     dead: bool,
+    /// The frame in which a board has computed what was posed last.
+    plan_ready_at: Option<u64>,
+    /// How many times as long as a Cortex-M7 it takes for that.
+    slower: u64,
     /// Frames since power-up.
     frame: u64,
     abort: bool,
@@ -123,6 +125,12 @@ impl Sortie {
         Self { rehearsal: None, ..self }
     }
 
+    /// The same flight with a board on which plans take so many times as long as on a Cortex-M7.
+    #[must_use]
+    pub fn planning_slower(self, times: u64) -> Self {
+        Self { slower: times, ..self }
+    }
+
     /// The same flight of a vehicle that was aborted on its pad in an earlier power-up, at this vehicle time, s: before zero.
     #[must_use]
     pub fn aborted_before(self, at_s: f64) -> Self {
@@ -142,6 +150,8 @@ impl Sortie {
             radio: Radio::default(),
             frames_down: 0,
             dead: false,
+            plan_ready_at: None,
+            slower: 1,
             frame: 0,
             abort: false,
             largest_errors: EstimatorErrors::default(),
@@ -186,11 +196,12 @@ impl Sortie {
             self.frames_down -= 1;
             if self.frames_down == 0 {
                 self.computer.restart(flight_time_s(self.frame));
+                self.plan_ready_at = None;
             }
-            return Flown { output: None, took: Duration::ZERO };
+            return Flown { output: None };
         }
         // Without a sample there is no frame; what was commanded goes on.
-        let Some(measured) = measured else { return Flown { output: None, took: Duration::ZERO } };
+        let Some(measured) = measured else { return Flown { output: None } };
         let abort = [Request::of_the_programme(Asked::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {
@@ -218,10 +229,12 @@ impl Sortie {
             people: outside.people,
             requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
+            plan_ready: self.plan_ready_at.take_if(|at| self.frame >= *at).is_some(),
         };
-        let began = watch.now();
         let mut output = self.computer.step(&input);
-        let took = watch.now().saturating_sub(began);
+        if let Some(frames) = self.computer.solve_posed() {
+            self.plan_ready_at = Some(self.frame + self.slower * frames);
+        }
         watch.decided(&input, &output, &self.computer);
         // An abort from `abort` has no station that waits for its answer.
         output.answers.truncate(outside.requests.len());
@@ -229,7 +242,7 @@ impl Sortie {
         if output.released {
             self.begin();
         }
-        Flown { output: Some(output), took }
+        Flown { output: Some(output) }
     }
 
     fn command(&mut self, commands: &Commands) {

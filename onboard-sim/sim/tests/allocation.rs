@@ -1,7 +1,5 @@
 //! In the air the flight computer allocates only for the buffers of its first plans and for its messages.
 
-use std::time::Duration;
-
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
 use sim::outside::{Outside, Watch};
@@ -18,10 +16,6 @@ struct Shadow {
 }
 
 impl Watch for Shadow {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
         let mut again = None;
         let allocated = allocation_counter::measure(|| again = Some(self.computer.step(input)));

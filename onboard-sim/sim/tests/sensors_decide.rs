@@ -1,7 +1,5 @@
 //! What the flight computer detects on the way up, it detects from sensors.
 
-use std::time::Duration;
-
 use flight::computer::{Computer, Input, Output};
 use flight::estimation::estimator::Measurements;
 use flight::rules::phase::Phase;
@@ -14,10 +12,6 @@ use sim::sortie::Sortie;
 struct Frames(Vec<Input<'static>>);
 
 impl Watch for Frames {
-    fn now(&mut self) -> Duration {
-        Duration::ZERO
-    }
-
     fn decided(&mut self, input: &Input<'_>, _: &Output, _: &Computer) {
         assert!(input.requests.is_empty() && input.rehearsed.is_none());
         self.0.push(Input { requests: &[], rehearsed: None, ..*input });

@@ -1,8 +1,5 @@
 //! A recorded flight, flown again frame by frame from the facts in its log.
 
-use std::time::Duration;
-
-use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::vehicle::mission::Mission;
 use flight_log::frame::accepts_abort;
@@ -44,19 +41,13 @@ struct Seen {
     last: LastFrame,
     /// Added to a frame's number for its number in the log.
     release_frame: u64,
-    /// The computer before a frame that may plan a landing.
-    before: Option<Computer>,
     broken: Vec<BrokenPlan>,
 }
 
 impl Watch for Seen {
-    fn now(&mut self) -> Duration {
-        self.last.now()
-    }
-
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
         self.last.decided(input, output, computer);
-        let solved = self.before.take().and_then(|mut before| before.step_inspected(input).1);
+        let solved = computer.pilot().landing_solved().filter(|_| output.planned);
         let frame = self.release_frame + input.frame;
         self.broken.extend(solved.and_then(|solved| BrokenPlan::of(frame, input.time_s, &solved)));
     }
@@ -132,8 +123,6 @@ impl Rerun {
         if self.aborts.binary_search(&number).is_ok() {
             self.flight.abort();
         }
-        let plans = number.is_multiple_of(FRAMES_PER_PLAN) && phase.in_landing_burn();
-        self.seen.before = plans.then(|| self.flight.computer().clone());
         self.flight.step_with(&Outside::NOBODY, &mut self.seen);
         let records = sortie_log::frame_and_phase(&self.flight, &mut self.seen.last, phase);
         self.records.extend(records.into_iter().map(|record| (time_s, record)));

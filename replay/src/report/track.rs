@@ -97,17 +97,14 @@ impl Flight {
         let (mut thoughts, mut test_ratios, mut broken) = (Vec::new(), <[Series; 4]>::default(), Vec::new());
         let again = findings::run_again(&recording, |computer, recorded| {
             let (number, time_s) = (recording.release_frame + recorded.input.frame, recorded.input.time_s);
-            let (frame, solved) = if plans(recorded) {
-                computer.run_inspected(recorded)?
-            } else {
-                (computer.run_again(recorded)?, None)
-            };
-            broken.extend(solved.and_then(|solved| BrokenPlan::of(number, time_s, &solved)));
+            let frame = computer.run_again(recorded)?;
             let pilot = computer.pilot();
+            let solved = pilot.landing_solved().filter(|_| plans(&frame));
+            broken.extend(solved.and_then(|solved| BrokenPlan::of(number, time_s, &solved)));
             for ((_, aid), ratios) in named_aids(pilot).iter().zip(&mut test_ratios) {
                 ratios.extend(aid.fresh.then_some((time_s, aid.test_ratio)));
             }
-            if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) {
+            if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
                 thoughts.push(Thought::of(pilot, &frame));
             }
             Ok(frame)
@@ -239,7 +236,7 @@ impl Thought {
             level,
             iterations: pilot.report().iterations,
             thrust_n: burning.then(|| pilot.motor().predict(curve, time_s, time_s).thrust_n),
-            plan: new_plan(pilot, time_s, level).cloned(),
+            plan: new_plan(pilot, &frame.output).cloned(),
         }
     }
 }

@@ -10,7 +10,6 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use campaign::run::in_parallel;
 use campaign::stopwatch::Stopwatch;
-use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::guidance::powered::{ControlLevel, LandingSolved};
 use flight_log::frame::level_of;
 use judge::{Judgement, Score};
@@ -137,12 +136,12 @@ fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>,
     let mut explained = Vec::new();
     for recorded in frames {
         let number = logged(recorded);
+        let again = controller.run_again(recorded)?;
         if only.is_some_and(|only| only != number) || only.is_none() && !planned.contains(&number) {
-            controller.run_again(recorded)?;
             continue;
         }
-        let (again, solved) = controller.run_inspected(recorded)?;
         let pilot = controller.pilot();
+        let solved = pilot.landing_solved().filter(|_| plans(&again));
         let path = |solved: &LandingSolved| {
             let time_s = |node: usize| node as f64 * solved.plan.step_s();
             solved.plan.states().iter().enumerate().map(|(node, state)| (time_s(node), *state)).collect()
@@ -178,10 +177,9 @@ fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>,
     }
 }
 
-/// Whether a landing is planned in a frame.
+/// Whether a frame took over the plan of a landing, and flies.
 pub(crate) fn plans(frame: &ComputerFrame) -> bool {
-    let idle = u32::from(ControlLevel::Idle.index());
-    frame.input.frame.is_multiple_of(FRAMES_PER_PLAN) && frame.output.level != idle
+    frame.output.planned && frame.output.level != u32::from(ControlLevel::Idle.index())
 }
 
 /// Solves one recorded frame again.

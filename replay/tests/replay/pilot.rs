@@ -76,6 +76,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             people: None,
             requests: &[],
             rehearsed: None,
+            plan_ready: frame % 10 == 5,
         };
         let output = computer.step(&input);
         frames.push(frame_to_log(&input, &output, &computer, false));

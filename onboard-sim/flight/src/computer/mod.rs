@@ -35,13 +35,14 @@ use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::PadCheck;
+use self::pilot::planner::Planner;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::control::silent::SilentServo;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::powered::{ControlLevel, LandingSolved};
+use crate::guidance::powered::ControlLevel;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
@@ -104,7 +105,7 @@ pub struct Computer {
 }
 
 impl Computer {
-    /// One frame. In the air: estimate, predict, answer the crew, decide, plan, point. On the pad: answer the crew, and wait.
+    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On the pad: answer the crew, and wait.
     /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         let input = &self.with_silent_servos(input);
@@ -125,6 +126,8 @@ impl Computer {
             }
         }
         let flown = self.flown();
+        let planned =
+            flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
         if let Some(flown) = &flown {
             self.pilot.estimate_state(self.table.mode().phase, flown);
             self.pilot.predict(&mut self.table, flown);
@@ -132,10 +135,9 @@ impl Computer {
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
         self.watch_the_commander(input);
         self.watch_the_taps();
-        let mut planned = false;
         if let Some(flown) = &flown {
             self.pilot.decide(&mut self.table, flown, &self.sensors);
-            planned = self.pilot.plan(self.table.mode(), flown);
+            self.pilot.plan(self.table.mode(), flown);
             let pointed = self.pilot.point(self.table.mode(), flown);
             self.take_over(pointed);
         } else {
@@ -184,13 +186,27 @@ impl Computer {
             || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
     }
 
-    /// One frame. Also returns the landing that the pilot plans in it, solved separately; `None` if it plans none.
-    pub fn step_inspected(&mut self, input: &Input<'_>) -> (Output, Option<LandingSolved>) {
-        let before = self.pilot.clone();
-        let output = self.step(input);
-        let solved =
-            self.flown().and_then(|flown| self.pilot.landing_planned(&before, self.table.mode(), &flown));
-        (output, solved)
+    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
+    pub fn solve_posed(&mut self) -> Option<u64> {
+        let planner = self.pilot.posed()?;
+        planner.solve();
+        Some(planner.frames_on_a_board())
+    }
+
+    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released. It
+    /// takes some seconds on a board, and leaves no memory.
+    pub fn rehearse(&mut self) -> Option<Rehearsed> {
+        if self.release.is_some() { None } else { self.pilot.rehearse() }
+    }
+
+    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
+    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
+        self.pilot.take_posed()
+    }
+
+    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
+    pub fn give_back(&mut self, planner: Box<Planner>) {
+        self.pilot.give_back(planner);
     }
 
     /// Reports what the input changes: the pin, and a log that has stopped.
@@ -357,7 +373,7 @@ impl LogState {
     pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
-/// Result of a rehearsal of the landing. The simulation rehearses, not the flight computer: it takes a simulated world.
+/// Result of a rehearsal of the landing: of a [planned](Computer::rehearse) one, or of one in a simulated world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rehearsed {
     /// It found plans, and landed on its legs.
@@ -410,6 +426,8 @@ pub struct Input<'a> {
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
+    /// What was posed last is computed: this frame takes it over.
+    pub plan_ready: bool,
 }
 
 impl Input<'_> {
@@ -431,6 +449,7 @@ impl Input<'_> {
         people: None,
         requests: &[],
         rehearsed: None,
+        plan_ready: false,
     };
 
     /// The same input without what lives for one frame only.
@@ -452,6 +471,7 @@ impl Input<'_> {
             people,
             requests: _,
             rehearsed: _,
+            plan_ready: _,
         } = self;
         Input {
             frame,
@@ -470,6 +490,7 @@ impl Input<'_> {
             people,
             requests: &[],
             rehearsed: None,
+            plan_ready: false,
         }
     }
 
@@ -504,6 +525,6 @@ pub struct Output {
     pub answers: Vec<Answer>,
     /// Reports, in order.
     pub news: Vec<CrewMessage>,
-    /// A plan was made.
+    /// A plan of a landing was taken over.
     pub planned: bool,
 }

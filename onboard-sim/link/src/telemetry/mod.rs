@@ -12,7 +12,7 @@ mod ours;
 
 use alloc::vec::Vec;
 
-use flight::computer::FRAME_S;
+use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::rules::phase::Phase;
 use mavlink::MessageData as _;
 use mavlink::types::CharArray;
@@ -129,7 +129,7 @@ fn sys_status(state: &VehicleState<'_>) -> MavMessage {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
         onboard_control_sensors_health: healthy,
-        load: (1000.0 * state.solve_time_s() / FRAME_S).clamp(0.0, 1000.0) as u16,
+        load: (1000.0 * state.solve_time_s() / PLAN_WITHIN_S).clamp(0.0, 1000.0) as u16,
         voltage_battery: millivolts(state),
         current_battery: centiamperes(state),
         battery_remaining: percent(state),

@@ -1,10 +1,11 @@
 //! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew, check on the pad,
 //! and what went wrong.
 
+use flight::computer::AbortEffect;
 use flight::computer::crew::People;
 use flight::computer::findings::Findings;
 use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
-use flight::computer::{AbortEffect, FRAME_S};
+use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::rules::operator::{Operator, Role};
 use flight::rules::phase::{HoldCause, Latch, Mode, MotorStatus, Phase};
 use flight::rules::two_person::Act;
@@ -161,7 +162,7 @@ pub(super) fn controller(state: &VehicleState<'_>) -> Option<MavMessage> {
         kkt_feasibility: report.kkt_feasibility as f32,
         thrust_scale: thrust_scale as f32,
         solve_time_us: microseconds(solve_time_s) as u32,
-        deadline_margin_us: microseconds(FRAME_S - solve_time_s) as i32,
+        deadline_margin_us: microseconds(PLAN_WITHIN_S - solve_time_s) as i32,
         iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
         level: td_level(level),
         solver_status: td_status(report.status),

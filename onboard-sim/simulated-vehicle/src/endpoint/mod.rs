@@ -1,7 +1,5 @@
 //! A frame of the simulated vehicle and of its end of MAVLink.
 
-use std::time::Duration;
-
 use flight::computer::crew::{Answer, Request};
 pub use vehicle_link::endpoint::{Outgoing, Path, UplinkState, VehicleEndpoint, gives_out_its_log};
 pub use vehicle_link::vehicle::VehicleKind;
@@ -14,12 +12,11 @@ pub fn step(
     endpoint: &mut VehicleEndpoint,
     vehicle: &mut Vehicle,
     own: &[Request],
-    stopwatch: &mut dyn FnMut() -> Duration,
 ) -> (Vec<VehicleEvent>, Vec<Answer>) {
     let UplinkState { uplink, commander, mut requests } = endpoint.heard(vehicle.time_s());
     vehicle.set_uplink(uplink, commander);
     requests.extend_from_slice(own);
-    let VehicleStep { events, mut answers } = vehicle.step(&requests, stopwatch);
+    let VehicleStep { events, mut answers } = vehicle.step(&requests);
     let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
     endpoint.on_answers(&answers, &vehicle.state());
     for event in &events {

@@ -106,14 +106,10 @@ impl OnBoard {
     }
 
     /// Steps the vehicle by one frame with what the board has heard; the board decides it, too.
-    pub(super) fn step(
-        &mut self,
-        vehicle: &mut Vehicle,
-        stopwatch: &mut dyn FnMut() -> Duration,
-    ) -> Result<Vec<VehicleEvent>, BoardError> {
+    pub(super) fn step(&mut self, vehicle: &mut Vehicle) -> Result<Vec<VehicleEvent>, BoardError> {
         let UplinkState { uplink, commander, requests } = self.heard()?;
         vehicle.set_uplink(uplink, commander);
-        let events = vehicle.step(&requests, stopwatch).events;
+        let events = vehicle.step(&requests).events;
         self.heard = None;
         self.decide(vehicle)?;
         Ok(events)

@@ -332,11 +332,9 @@ pub async fn fly_observed(
             hear(&mut endpoint, heard, &vehicle);
         }
         let own = own_start.requests(&vehicle);
-        let stopwatch = pace.clock();
-        let mut elapsed = || stopwatch.elapsed();
         let (events, answers) = match &mut on_board {
-            Some(on_board) => (on_board.step(&mut vehicle, &mut elapsed)?, Vec::new()),
-            None => endpoint::step(&mut endpoint, &mut vehicle, &own, &mut elapsed),
+            Some(on_board) => (on_board.step(&mut vehicle)?, Vec::new()),
+            None => endpoint::step(&mut endpoint, &mut vehicle, &own),
         };
         own_start.on_answers(&answers);
         let time_s = vehicle.time_s();

@@ -19,7 +19,6 @@ pub(super) enum Waiting {
 pub(super) struct Pace {
     speed: Speed,
     frame: Duration,
-    began: Instant,
     due: Instant,
     over_since: Option<Instant>,
     lateness: Lateness,
@@ -75,15 +74,10 @@ impl Pace {
         Self {
             speed,
             frame: Duration::from_secs_f64(frame_s),
-            began: now,
             due: now,
             over_since: None,
             lateness: Lateness::new(),
         }
-    }
-
-    pub(super) fn clock(&self) -> Instant {
-        self.began
     }
 
     #[expect(clippy::disallowed_methods, reason = "the run loop owns the clock")]

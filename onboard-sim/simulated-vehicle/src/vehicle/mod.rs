@@ -2,16 +2,15 @@
 //!
 //! This module has the interface that the run loop uses; the radio takes a [`VehicleState`], and the log takes records.
 //!
-//! It is pure except for the stopwatch that its caller passes in to time the flight computer. Time is simulated.
+//! It is pure: time is simulated.
 
 mod ground;
-
-use std::time::Duration;
 
 use flight::computer::crew::{Answer, People, Request};
 use flight::computer::findings::Findings;
 use flight::computer::news::{CrewMessage, Severity};
-use flight::computer::{Commander, Computer, FRAME_S, Input, LogState, Output};
+use flight::computer::pilot::planner::PLAN_WITHIN_S;
+use flight::computer::{Commander, Computer, Input, LogState};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
@@ -20,7 +19,7 @@ use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
-use sim::outside::{Flown, Outside, Watch};
+use sim::outside::{Flown, Outside};
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
 pub use vehicle_link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
@@ -39,8 +38,6 @@ pub struct RocketFlight {
 pub struct Vehicle {
     sortie: Sortie,
     findings: Findings,
-    /// How long the last plan took, s.
-    took_s: f64,
     /// A frame of the flight computer was flown in the air just now.
     flown: bool,
     pin_out: bool,
@@ -56,22 +53,6 @@ pub struct Vehicle {
     /// How many frames the flight computer has decided.
     frames_decided: u64,
     last: LastFrame,
-}
-
-/// Times the flight computer, and keeps its frame.
-struct Watcher<'a> {
-    stopwatch: &'a mut dyn FnMut() -> Duration,
-    last: &'a mut LastFrame,
-}
-
-impl Watch for Watcher<'_> {
-    fn now(&mut self) -> Duration {
-        (self.stopwatch)()
-    }
-
-    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
-        self.last.decided(input, output, computer);
-    }
 }
 
 /// The result of one frame.
@@ -92,7 +73,6 @@ impl Vehicle {
         Ok(Self {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             findings: Findings::default(),
-            took_s: 0.0,
             flown: false,
             pin_out: false,
             log: LogState::NONE,
@@ -158,9 +138,8 @@ impl Vehicle {
         self.people
     }
 
-    /// Advances by one frame, in which these requests are decided. `stopwatch` may be any clock: only differences of
-    /// its values are used, to time the flight computer.
-    pub fn step(&mut self, requests: &[Request], stopwatch: &mut dyn FnMut() -> Duration) -> VehicleStep {
+    /// Advances by one frame, in which these requests are decided.
+    pub fn step(&mut self, requests: &[Request]) -> VehicleStep {
         let outside = Outside {
             pin_out: self.pin_out,
             log: self.log,
@@ -169,8 +148,7 @@ impl Vehicle {
             people: self.people,
             requests,
         };
-        let mut watcher = Watcher { stopwatch, last: &mut self.last };
-        let Flown { output, took } = self.sortie.step_with(&outside, &mut watcher);
+        let Flown { output } = self.sortie.step_with(&outside, &mut self.last);
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
         let mut events = Vec::new();
@@ -178,7 +156,7 @@ impl Vehicle {
         if let Some(output) = output {
             events.extend(output.news.into_iter().map(VehicleEvent::from));
             if output.planned {
-                events.extend(self.planned(took.as_secs_f64()));
+                events.extend(self.planned());
             }
             (released, answers) = (output.released, output.answers);
         }
@@ -189,12 +167,11 @@ impl Vehicle {
         VehicleStep { events, answers }
     }
 
-    /// The event for a frame in which the pilot planned.
-    fn planned(&mut self, took_s: f64) -> Option<VehicleEvent> {
-        self.took_s = took_s;
-        let input = self.sortie.computer().flown()?;
-        let (frame, time_s, deadline_s) = (input.frame, input.time_s, FRAME_S);
-        Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s })
+    /// The event for a frame in which the pilot took over a plan.
+    fn planned(&self) -> Option<VehicleEvent> {
+        let Input { frame, time_s, .. } = self.computer().flown()?;
+        let took_s = self.computer().pilot().report().took_s;
+        Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
     }
 
     /// Events that only the simulation knows: the start of the flight, contact with the ground, the verdict.
@@ -236,7 +213,6 @@ impl Vehicle {
             }),
             rehearsed: sortie.rehearsed().map(|(_, report)| report),
             parachute_ejected: sortie.world().parachute_ejected(),
-            plan_took_s: self.took_s,
             judged: self.judged(),
         }
     }
@@ -291,13 +267,13 @@ pub enum VehicleEvent {
         from: Phase,
         to: Phase,
     },
-    /// The pilot planned in this frame.
+    /// The pilot took over a plan in this frame.
     Planned {
         /// The frame's number, from the release.
         frame: u64,
         /// Its time since the release, s.
         time_s: f64,
-        /// Measured, s.
+        /// From the frame that posed the plan, s.
         took_s: f64,
         /// Allowed, s.
         deadline_s: f64,

@@ -124,7 +124,7 @@ fn plans(flight: &Flight, draw: &mut Pictures<'_>) {
     let timings = &flight.recording.timings;
     let took = timings.iter().map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s));
     let deadline = timings.first().map(|timing| 1e3 * timing.deadline_s);
-    let title = "Duration of each frame with a plan, ms";
+    let title = "From the frame that posed each plan to the one that took it over, ms";
     draw.draw("solver", Whole, title, deadline.as_slice(), [("", "a", took.collect())]);
 
     let [near, far] = AHEAD_S.map(|ahead_s| -> Series {

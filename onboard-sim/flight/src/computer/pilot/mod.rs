@@ -1,38 +1,40 @@
 //! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
 //!
 //! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms: estimate, watch
-//! the motor, move through the phases, point fins and gimbal. Every tenth frame it makes the prediction and plans the
-//! landing.
+//! the motor, move through the phases, point fins and gimbal. Every tenth frame poses the prediction, or a plan of the
+//! landing, to the [`planner`].
 
 mod ascent;
+pub mod planner;
 mod prediction;
+mod rehearsal;
 mod step;
 mod vehicle_model;
 mod vertical_speed;
 
 use alloc::boxed::Box;
 use alloc::string::String;
+use alloc::sync::Arc;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::ascent::{AscentWatch, FinWatch};
+use self::planner::Planner;
 pub use self::prediction::{ApogeeAhead, Prediction, touchdown_from_below_m, touchdown_m};
 use self::vehicle_model::VehicleModel;
 use self::vertical_speed::VerticalSpeeds;
-use crate::computer::Input;
 use crate::control::aim::AimLoop;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
-use crate::guidance::powered::{ControlLevel, LandingSolved, PoweredGuidance, PoweredReport};
+use crate::guidance::powered::{ControlLevel, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
-use crate::rules::phase::Mode;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Frames between plans.
+/// Frames between plans, if none takes longer.
 pub const FRAMES_PER_PLAN: u64 = 10;
 
 /// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
@@ -62,6 +64,13 @@ pub struct Pilot {
     ignited_at_s: Option<f64>,
     prediction: Prediction,
     powered: PoweredGuidance,
+    /// What it was posed was remembered in the frame in which it was posed. `None` while it computes in another context.
+    #[serde(skip)]
+    planner: Option<Box<Planner>>,
+    /// When something was posed that was not taken over yet, s.
+    posed_at_s: Option<f64>,
+    /// The frame from which on the next landing is posed.
+    plan_due: u64,
     aim_loop: AimLoop,
     fin_share: f64,
     fins_rad: [f64; 4],
@@ -87,7 +96,7 @@ impl Pilot {
         let airframe = &mission.airframe;
         let frame_s = mission.estimator.frame_s;
         let model = VehicleModel {
-            mission: mission.clone(),
+            mission: Arc::new(mission.clone()),
             mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
             motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
             others: OtherCurves::new(
@@ -95,6 +104,7 @@ impl Pilot {
                 &MotorPrior { frame_s, ..mission.unknown_motor() },
             ),
         };
+        let (powered, search) = model.guidance();
         Self {
             estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
             estimate: None,
@@ -111,7 +121,10 @@ impl Pilot {
             },
             ignited_at_s: None,
             prediction: Prediction::default(),
-            powered: model.guidance(),
+            planner: Self::planner(&model, search),
+            posed_at_s: None,
+            plan_due: 0,
+            powered,
             aim_loop: AimLoop::new(mission.aim, frame_s),
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
@@ -233,7 +246,7 @@ impl Pilot {
         Self {
             powered: self.powered.reconfigured(&mission.powered),
             aim_loop: self.aim_loop.reconfigured(mission.aim),
-            model: VehicleModel { mission: mission.clone(), mass, ..self.model.clone() },
+            model: VehicleModel { mission: Arc::new(mission.clone()), mass, ..self.model.clone() },
             ..self.clone()
         }
     }
@@ -241,21 +254,6 @@ impl Pilot {
     /// The mission it flies.
     pub fn mission(&self) -> &Mission {
         &self.model.mission
-    }
-
-    /// The landing planned in this frame, solved separately; `None` if none was planned. `before` is this pilot one
-    /// frame earlier.
-    pub(crate) fn landing_planned(
-        &self,
-        before: &Self,
-        mode: &Mode,
-        input: &Input<'_>,
-    ) -> Option<LandingSolved> {
-        let planned = input.frame.is_multiple_of(FRAMES_PER_PLAN) && mode.phase.in_landing_burn();
-        let estimate = self.estimate.as_ref()?;
-        let burning = self.burning(mode, input.time_s).filter(|_| planned)?;
-        let situation = self.model.situation_to_plan(estimate, &burning);
-        before.powered.inspect(input.time_s, &estimate.state, &situation)
     }
 }
 

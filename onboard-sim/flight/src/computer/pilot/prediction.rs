@@ -8,6 +8,7 @@ use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use super::Pilot;
+use super::vehicle_model::VehicleModel;
 use crate::computer::Input;
 use crate::estimation::estimator::Estimate;
 use crate::estimation::sensor_watch::SensorWatch;
@@ -91,6 +92,52 @@ pub fn touchdown_from_below_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64
     (place_m + velocity_m_s * (in_s + TAKES_THE_WIND_S)).xy()
 }
 
+impl VehicleModel {
+    /// The prediction without the ignition, for a moment: with the fins at these openings, rad, after a fall from this height, m.
+    pub(super) fn fall(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
+        let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
+        let state = &estimate.state;
+        let height_m = state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
+        let parachute = &self.airframe().parachute;
+        let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
+        // The speed after the fall from apogee so far, with drag as certified.
+        let terminal_m_s = column.terminal_speed_m_s(self.fins_m2(fins_rad));
+        let fallen_m = (apogee_m - state.position_m.z).max(0.0);
+        let shed = libm::exp(-2.0 * self.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
+        Prediction {
+            commit_height_m: commit_height_m(
+                state.velocity_m_s.norm(),
+                parachute.ejection_delay_s,
+                parachute.inflation_distance_m,
+            ),
+            height_m,
+            // Until it is known.
+            lands_ahead: true,
+            predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
+            touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
+            ..Prediction::default()
+        }
+    }
+
+    /// The whole prediction.
+    pub(super) fn prediction(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
+        let fall = self.fall(estimate, fins_rad, apogee_m);
+        let (settings, curve, fins_m2) =
+            (&self.mission.ignition, &self.mission.motor_curve, self.fins_m2(fins_rad));
+        let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
+        let (height_m, vertical_m_s) = (fall.height_m, estimate.state.velocity_m_s.z);
+        let ignition = settings.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
+        let lands_ahead =
+            ignition.band.is_some() || settings.lands_ahead(&column, curve, height_m, vertical_m_s, fins_m2);
+        Prediction { ignition, lands_ahead, ..fall }
+    }
+
+    /// Drag area of the fins in flight, m^2.
+    fn fins_m2(&self, fins_rad: &[f64; 4]) -> f64 {
+        self.motor.air_scale() * self.fin_drag_area_m2(fins_rad)
+    }
+}
+
 impl Pilot {
     /// The apogee as it is expected on the way up; `None` under the ascent motor, and after apogee.
     pub fn apogee_ahead(&self, phase: Phase) -> Option<ApogeeAhead> {
@@ -104,7 +151,7 @@ impl Pilot {
     pub fn impact_m_s(&self) -> Option<f64> {
         let estimate = self.estimate.as_ref()?;
         let (known, state) = (&self.model, &estimate.state);
-        let column = known.column(self.density_kg_m3(estimate), known.mission.soft_tilt_deg);
+        let column = known.column(known.density_kg_m3(estimate), known.mission.soft_tilt_deg);
         let fins_m2 = known.motor.air_scale() * known.largest_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
@@ -235,6 +282,7 @@ mod tests {
 
     /// The same after the estimate.
     fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
+        pilot.take_over(input.time_s);
         pilot.predict(table, input);
         if abort {
             let event = pilot.abort_event(table.mode(), Some(input), &SensorWatch::default());

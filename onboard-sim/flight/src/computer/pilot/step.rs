@@ -5,7 +5,6 @@ use alloc::format;
 use nalgebra::Vector3;
 
 use super::ascent::{AscentReadings, words_of_ascent};
-use super::prediction::{commit_height_m, touchdown_m};
 use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction};
@@ -60,11 +59,6 @@ fn on_the_way_up(
     (measurements, VehicleNow { motor_burning: shaken, air_density_kg_m3: 0.0, ..*vehicle })
 }
 
-/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and keep the vehicle in the
-/// middle of that band.
-const FIN_SIGMAS: f64 = 1.0;
-const FIN_PLACE: f64 = 0.5;
-
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &Input<'_>) {
@@ -83,22 +77,28 @@ impl Pilot {
         let dropped = self.model.mission.start.at == StartPoint::Drone;
         let far = table.mode().phase == Phase::AeroDescent && !dropped;
         let due = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
-        // Without an prediction, right after apogee and after a restart, an abort would not know whether the parachute has
-        // room.
-        if (due || self.prediction == Prediction::default()) && table.mode().phase.in_descent() {
-            self.update_prediction(&estimate, self.density_kg_m3(&estimate));
+        if table.mode().phase.in_descent() {
+            // Right after apogee and after a restart an abort would not know whether the parachute has room.
+            let unknown = self.prediction == Prediction::default();
+            if unknown {
+                self.prediction = self.model.fall(&estimate, &self.fins_rad, self.apogee_m);
+            }
+            if due || unknown {
+                self.pose_prediction(input.time_s, &estimate);
+            }
         }
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Plans the landing in every tenth frame of the burn. Returns whether this was a frame to plan or predict in.
-    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) -> bool {
-        let due = input.frame.is_multiple_of(FRAMES_PER_PLAN);
-        let burning = self.burning(mode, input.time_s).filter(|_| mode.phase.in_landing_burn());
-        if let (Some(burning), Some(estimate), true) = (burning, self.estimate, due) {
-            self.plan_landing(input.time_s, &estimate, &burning);
+    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer.
+    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) {
+        let due = input.frame >= self.plan_due && mode.phase.in_landing_burn();
+        let burning = self.burning(mode, input.time_s).filter(|_| due);
+        if let Some((burning, estimate)) = burning.zip(self.estimate)
+            && self.pose_landing(input.time_s, &estimate, burning)
+        {
+            self.plan_due = input.frame + FRAMES_PER_PLAN;
         }
-        due && (mode.phase.in_descent() || mode.phase.in_landing_burn())
     }
 
     /// Points fins and gimbal.
@@ -119,7 +119,8 @@ impl Pilot {
                 },
             };
             let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-            self.fins_rad = self.fins(mode, estimate, &mass, self.density_kg_m3(estimate), burning.is_some());
+            self.fins_rad =
+                self.fins(mode, estimate, &mass, self.model.density_kg_m3(estimate), burning.is_some());
         }
         let level = if flying { self.powered.report().level } else { ControlLevel::Idle };
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
@@ -131,14 +132,9 @@ impl Pilot {
         Some(Burning {
             burning_s,
             mass: self.model.mass_now(Some(burning_s)),
-            density_kg_m3: self.density_kg_m3(self.estimate.as_ref()?),
+            density_kg_m3: self.model.density_kg_m3(self.estimate.as_ref()?),
             lands_in_place: mode.interlocks.lands_in_place,
         })
-    }
-
-    /// Of the air at the estimated height, kg/m3.
-    pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
-        Air::at_height_m(self.model.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
     }
 
     fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
@@ -188,7 +184,7 @@ impl Pilot {
         let vehicle = VehicleNow::of(
             self.model.airframe(),
             &mass,
-            self.density_kg_m3(estimate),
+            self.model.density_kg_m3(estimate),
             input.fins_rad,
             burning,
             self.model.mission.lidar_ahead_of_feet_m,
@@ -206,48 +202,6 @@ impl Pilot {
             may_burn: burning,
         };
         self.model.learn(&sample);
-    }
-
-    fn update_prediction(&mut self, estimate: &Estimate, density_kg_m3: f64) {
-        let column = self.model.column(density_kg_m3, self.model.mission.soft_tilt_deg);
-        let state = &estimate.state;
-        let height_m = state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0));
-        let vertical_m_s = state.velocity_m_s.z;
-        let fins_m2 = self.model.motor.air_scale() * self.model.fin_drag_area_m2(&self.fins_rad);
-        let ignition = self.model.mission.ignition.prediction(
-            &column,
-            &self.model.mission.motor_curve,
-            height_m,
-            vertical_m_s,
-            fins_m2,
-        );
-        let lands_ahead = ignition.band.is_some()
-            || self.model.mission.ignition.lands_ahead(
-                &column,
-                &self.model.mission.motor_curve,
-                height_m,
-                vertical_m_s,
-                fins_m2,
-            );
-        let parachute = &self.model.airframe().parachute;
-        let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
-        // The speed after the fall from apogee so far, with drag as certified.
-        let terminal_m_s = column.terminal_speed_m_s(fins_m2);
-        let fallen_m = (self.apogee_m - state.position_m.z).max(0.0);
-        let shed =
-            libm::exp(-2.0 * self.model.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
-        self.prediction = Prediction {
-            ignition,
-            commit_height_m: commit_height_m(
-                state.velocity_m_s.norm(),
-                parachute.ejection_delay_s,
-                parachute.inflation_distance_m,
-            ),
-            height_m,
-            lands_ahead,
-            predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
-            touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
-        };
     }
 
     fn watch_the_speeds(&mut self, input: &Input<'_>, estimate: &Estimate) {
@@ -473,29 +427,6 @@ impl Pilot {
             self.ignited_at_s = Some(time_s);
         }
         Ok(effects)
-    }
-
-    fn plan_landing(&mut self, time_s: f64, estimate: &Estimate, situation: &Burning) {
-        let planned = self.model.situation_to_plan(estimate, situation);
-        self.powered.plan(time_s, &estimate.state, &planned);
-        if self.powered.fin_share(time_s).is_none() {
-            self.fin_share = self.fin_share_of_band(estimate, situation);
-        }
-    }
-
-    /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
-    fn fin_share_of_band(&self, estimate: &Estimate, situation: &Burning) -> f64 {
-        let column = self.model.column(situation.density_kg_m3, self.model.mission.fin_soft_tilt_deg);
-        let sigmas = FIN_SIGMAS;
-        let [weak, strong] =
-            [-sigmas, sigmas].map(|sigmas| self.model.doubted_burn(situation.burning_s, sigmas));
-        column.fin_share(
-            [&weak, &strong],
-            situation.burning_s,
-            estimate.state.velocity_m_s.z,
-            estimate.state.position_m.z - self.model.feet_below_cg_m(&situation.mass),
-            FIN_PLACE,
-        )
     }
 
     fn gimbal(

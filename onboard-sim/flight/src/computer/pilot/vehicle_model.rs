@@ -1,13 +1,15 @@
 //! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and drag.
 //! From that, the motor that a plan assumes.
 
+use alloc::sync::Arc;
+
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use crate::estimation::estimator::Estimate;
 use crate::estimation::motor_estimate::{MotorEstimate, MotorSample};
 use crate::estimation::other_curves::OtherCurves;
-use crate::guidance::powered::{PoweredGuidance, PoweredSituation};
+use crate::guidance::powered::{PoweredGuidance, PoweredSituation, Search};
 use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use crate::vehicle::atmosphere::Air;
@@ -21,7 +23,8 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 pub(super) struct VehicleModel {
     // What is skipped is a constant of the mission.
     #[serde(skip)]
-    pub(super) mission: Mission,
+    /// Shared, as a board's memory is small.
+    pub(super) mission: Arc<Mission>,
     #[serde(skip)]
     pub(super) mass: MassModel,
     /// Estimated motor and scale of the aerodynamic forces.
@@ -30,8 +33,8 @@ pub(super) struct VehicleModel {
     pub(super) others: OtherCurves,
 }
 
-// The mission, its motor and its masses come from the profile in the log; they do not change in flight.
 /// The vehicle with its motor burning, in one frame.
+#[derive(Debug, Clone)]
 #[expect(clippy::struct_field_names, reason = "the time since thrust began is called that everywhere")]
 pub(super) struct Burning {
     pub(super) burning_s: f64,
@@ -42,6 +45,17 @@ pub(super) struct Burning {
 }
 
 impl VehicleModel {
+    /// A copy for a plan: which curve the motor has, and not what decides it.
+    pub(super) fn without_filters(&self) -> Self {
+        let others = OtherCurves::chosen_before(self.others.chosen());
+        Self { mission: Arc::clone(&self.mission), others, ..*self }
+    }
+
+    /// Of the air at the estimated height, kg/m3.
+    pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
+        Air::at_height_m(self.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
+    }
+
     /// The motor's curve: the expected one, or another that its burn has turned out to have.
     pub(super) fn curve(&self) -> &ThrustCurve {
         self.others.flown(&self.mission)
@@ -128,8 +142,8 @@ impl VehicleModel {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
-    /// The guidance of the landing burn before its first plan, with room for every plan.
-    pub(super) fn guidance(&self) -> PoweredGuidance {
+    /// The guidance of the landing burn before its first plan, and the search of its plans, with room for every plan.
+    pub(super) fn guidance(&self) -> (PoweredGuidance, Search) {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
         let density_kg_m3 = Air::at_height_m(self.mission.pad_altitude_m).density_kg_m3;
@@ -168,6 +182,11 @@ impl VehicleModel {
         }
     }
 }
+
+/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and keep the vehicle in the
+/// middle of that band.
+const FIN_SIGMAS: f64 = 1.0;
+const FIN_PLACE: f64 = 0.5;
 
 // The motor that a plan assumes.
 //
@@ -224,5 +243,19 @@ impl VehicleModel {
             self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
         let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
         self.mission.caution_sigmas * (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0)
+    }
+
+    /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
+    pub(super) fn fin_share(&self, estimate: &Estimate, burning: &Burning) -> f64 {
+        let column = self.column(burning.density_kg_m3, self.mission.fin_soft_tilt_deg);
+        let [weak, strong] =
+            [-FIN_SIGMAS, FIN_SIGMAS].map(|sigmas| self.doubted_burn(burning.burning_s, sigmas));
+        column.fin_share(
+            [&weak, &strong],
+            burning.burning_s,
+            estimate.state.velocity_m_s.z,
+            estimate.state.position_m.z - self.feet_below_cg_m(&burning.mass),
+            FIN_PLACE,
+        )
     }
 }

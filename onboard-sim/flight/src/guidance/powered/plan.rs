@@ -6,6 +6,7 @@ use serde::Serialize;
 use nalgebra::Vector3;
 use nmpc::{INPUTS, Nose, Problem, STATES, Start, State, Workspace, last_multipliers};
 
+use super::PoweredSettings;
 use crate::control::aim::Aim;
 use crate::rules::verdict::Touchdown;
 
@@ -57,6 +58,11 @@ impl Plan {
         self.step_s * self.intervals() as f64
     }
 
+    /// Whether it is flown to its end without another plan, because it ends so soon.
+    pub(super) fn is_flown_out(&self, settings: &PoweredSettings, time_s: f64) -> bool {
+        self.intervals() > 0 && self.left_s(time_s) < settings.flown_out_s
+    }
+
     /// From a time to its end, s.
     pub fn left_s(&self, time_s: f64) -> f64 {
         self.begins_s + self.length_s() - time_s
@@ -97,6 +103,22 @@ impl Plan {
             limit_multipliers: &self.limits,
             condition_multipliers: &self.conditions,
         }
+    }
+
+    /// No plan, with the same room.
+    pub(super) fn clear(&mut self) {
+        self.copy(&Self::default());
+    }
+
+    /// Becomes another plan, in the room that it has.
+    pub(super) fn copy(&mut self, from: &Self) {
+        self.states.clone_from(&from.states);
+        self.inputs.clone_from(&from.inputs);
+        self.costates.clone_from(&from.costates);
+        self.limits.clone_from(&from.limits);
+        self.conditions.clone_from(&from.conditions);
+        self.turning_rad_s2.clone_from(&from.turning_rad_s2);
+        (self.begins_s, self.step_s, self.settled_nodes) = (from.begins_s, from.step_s, from.settled_nodes);
     }
 
     /// The last `intervals` intervals of an earlier plan. The conditions' multipliers are kept if their order is known.
@@ -146,6 +168,16 @@ impl Plan {
         self.settled_nodes = problem.end.settled_nodes;
     }
 
+    /// Planned velocity over the ground, m/s, and the direction of the nose at a time; `None` after the end.
+    pub(crate) fn at(&self, time_s: f64) -> Option<(Vector3<f64>, Aim)> {
+        let since = (time_s - self.begins_s).max(0.0) / self.step_s;
+        let k = since as usize;
+        // Without a plan `k` is the largest number.
+        let [before, after, ..] = self.states.get(k..)? else { return None };
+        let between = |i: usize| before[i] + (since - k as f64) * (after[i] - before[i]);
+        Some((Vector3::new(between(3), between(4), between(5)), self.aim(time_s)?))
+    }
+
     /// The wanted direction of the nose at a time; `None` after the end.
     pub(super) fn aim(&self, time_s: f64) -> Option<Aim> {
         let since_s = (time_s - self.begins_s).max(0.0);
@@ -174,7 +206,7 @@ impl Plan {
     }
 
     /// Planned share of the fins' drag area at a time; `None` after the end.
-    pub(super) fn fin_share(&self, time_s: f64) -> Option<f64> {
+    pub(crate) fn fin_share(&self, time_s: f64) -> Option<f64> {
         let k = ((time_s - self.begins_s).max(0.0) / self.step_s) as usize;
         self.inputs.get(k).map(|input| input[2])
     }

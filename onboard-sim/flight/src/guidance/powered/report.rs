@@ -83,6 +83,10 @@ pub struct PoweredReport {
     pub iterations: usize,
     /// Work of the tick: the solver's passes over an interval, as in [`PoweredSettings::max_passes`].
     pub passes: usize,
+    /// When the landing was posed, s since the release.
+    pub posed_at_s: f64,
+    /// From then until the plan was taken over, s. The next one waits for that, if it is longer than a period.
+    pub took_s: f64,
     /// Residuals of the optimality conditions.
     pub kkt_stationarity: f64,
     /// Largest defect or complementarity.
@@ -107,6 +111,8 @@ impl PoweredReport {
             status: Status::NotRun,
             iterations: 0,
             passes: 0,
+            posed_at_s: 0.0,
+            took_s: 0.0,
             kkt_stationarity: 0.0,
             kkt_feasibility: 0.0,
             cost: 0.0,

@@ -35,7 +35,7 @@ static READY: LazyLock<Vehicle> = LazyLock::new(|| {
     vehicle.set_pin_out(true);
     while !all_passed(&vehicle.arming_checks()) {
         assert!(vehicle.time_s() < 20.0, "{:?}", vehicle.arming_checks());
-        vehicle.step(&[], &mut || Duration::ZERO);
+        vehicle.step(&[]);
     }
     vehicle
 });
@@ -60,7 +60,7 @@ fn frame(
     own: &[Asked],
 ) -> (Vec<VehicleEvent>, Vec<Outgoing>) {
     let own: Vec<Request> = own.iter().copied().map(Request::of_the_programme).collect();
-    let (events, _) = step(endpoint, vehicle, &own, &mut || Duration::ZERO);
+    let (events, _) = step(endpoint, vehicle, &own);
     (events, endpoint.poll(&vehicle.state()))
 }
 

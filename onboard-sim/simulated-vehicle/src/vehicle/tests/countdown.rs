@@ -2,6 +2,7 @@
 
 use super::space::flight_of;
 use super::*;
+use flight::computer::FRAME_S;
 use flight::rules::phase::HoldCause;
 use flight::vehicle::mission::StartPoint;
 use sim::fault::{Breakage, TimedFault};

@@ -6,7 +6,6 @@ mod pad;
 mod space;
 
 use std::ops::{Deref, DerefMut};
-use std::time::Duration;
 
 use flight::computer::crew::{Answer, Asked, Request};
 use flight::rules::phase::Phase;
@@ -60,19 +59,14 @@ impl Told {
 
     /// A frame in which the vehicle's own programme asks for something.
     pub(crate) fn request(&mut self, asked: Asked) -> Answer {
-        let VehicleStep { events, mut answers } =
-            self.vehicle.step(&[Request::of_the_programme(asked)], &mut || Duration::ZERO);
+        let VehicleStep { events, mut answers } = self.vehicle.step(&[Request::of_the_programme(asked)]);
         self.unread.extend(events);
         answers.remove(0)
     }
 
     fn advance(&mut self) -> Vec<VehicleEvent> {
-        self.advance_timed(&mut || Duration::ZERO)
-    }
-
-    fn advance_timed(&mut self, stopwatch: &mut dyn FnMut() -> Duration) -> Vec<VehicleEvent> {
         let mut events = std::mem::take(&mut self.unread);
-        events.extend(self.vehicle.step(&[], stopwatch).events);
+        events.extend(self.vehicle.step(&[]).events);
         events
     }
 

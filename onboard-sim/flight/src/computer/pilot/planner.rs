@@ -1,0 +1,255 @@
+//! What takes longer than a frame: the landing under thrust, and the prediction in the fall.
+//!
+//! A frame poses one of them, and goes on; a later frame, whose input says that it is ready, takes it over. What is posed is a
+//! copy of all that it depends on, so that whoever computes it, at whatever time, finds the same. A board computes it in its main
+//! context, while a timer flies the frames; a simulator or a replay computes it at once and holds it back.
+
+use alloc::boxed::Box;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use nmpc::{Outcome, Status};
+
+use super::vehicle_model::{Burning, VehicleModel};
+use super::{Pilot, Prediction};
+use crate::computer::{FRAME_MS, Rehearsed};
+use crate::estimation::estimator::Estimate;
+use crate::guidance::powered::{LandingSolved, Plan, Search};
+use crate::rules::verdict::Touchdown;
+
+/// Within this time after it was posed a plan is ready, s: a board that needs longer is too slow. Twice the period of plans; the bound
+/// on a plan's work (`powered.max_passes`) is made for it.
+pub const PLAN_WITHIN_S: f64 = 0.1;
+
+/// A plan is expected to be ready after this time, s, and is made for the vehicle as it will be then: the median of mk2's plans. Of 300
+/// `real` flights of mk2 (seed 7001) 268 land, 242 if plans are made for the present, and 261 with 40 ms.
+const EXPECTED_S: f64 = 0.025;
+
+/// Instructions that a Cortex-M7 executes in a frame: 600 MHz, and 0.67 instructions a cycle, which is assumed.
+const INSTRUCTIONS_PER_FRAME: u64 = 400_000 * FRAME_MS as u64;
+/// Instructions of a prediction at most, on an emulated Cortex-M7. A landing without its search takes half of a prediction's time on
+/// x86-64. With each pass of the search it is 33.7 million at the bound of 2,200 passes, where the emulated plans had at most 34.0.
+const PREDICTION: u64 = 8_100_000;
+const LANDING: u64 = 4_000_000;
+const PASS: u64 = 13_500;
+
+/// What is asked.
+#[derive(Debug, Clone)]
+pub(super) enum Asked {
+    Landing(Burning),
+    /// With the fins' openings, rad, and the height from which it falls, m.
+    Prediction {
+        fins_rad: [f64; 4],
+        apogee_m: f64,
+    },
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+enum Found {
+    /// The search's outcome (none if the thrust never carries the vehicle), unless the flown plan is flown to its end; whether the
+    /// vehicle was high; and the share of the fins' drag area if no plan says it.
+    Landing {
+        searched: Option<(Option<Outcome>, bool)>,
+        fin_share: Option<f64>,
+    },
+    Prediction(Prediction),
+}
+
+/// What was posed, and what computes it. It may be moved to another context, and has to come back.
+#[derive(Debug, Clone)]
+pub struct Planner {
+    model: VehicleModel,
+    /// Its time is that of its frame since the release.
+    posed: Option<(Estimate, Asked)>,
+    search: Search,
+    found: Option<Found>,
+}
+
+impl Planner {
+    /// Computes what was posed, once.
+    pub fn solve(&mut self) {
+        let Self { model, posed: Some((estimate, asked)), search, found: found @ None } = self else {
+            return;
+        };
+        *found = Some(match asked {
+            Asked::Prediction { fins_rad, apogee_m } => {
+                Found::Prediction(model.prediction(estimate, fins_rad, *apogee_m))
+            }
+            Asked::Landing(burning) => {
+                let (settings, time_s) = (&model.mission.powered, estimate.time_s);
+                let searched = (!search.is_flown_out(settings, time_s)).then(|| {
+                    let (later, burning) = model.later(search.from(), estimate, burning);
+                    let situation = model.situation_to_plan(&later, &burning);
+                    (search.search(settings, later.time_s, &later.state, &situation), situation.high)
+                });
+                let outcome = searched.as_ref().and_then(|(outcome, _)| outcome.as_ref());
+                let says_none = search.to_be_flown(outcome).fin_share(time_s).is_none();
+                let fin_share = says_none.then(|| model.fin_share(estimate, burning));
+                Found::Landing { fin_share, searched }
+            }
+        });
+    }
+
+    /// Asks it.
+    pub(super) fn ask(&mut self, time_s: f64, estimate: &Estimate, asked: Asked) {
+        self.posed = Some((Estimate { time_s, ..*estimate }, asked));
+        self.found = None;
+    }
+
+    /// The next landing starts from the plan that was found, or goes on with the last one. Returns whether the search converged on a
+    /// landing; `None` if there was none, because the last plan is flown to its end or the thrust never carries the vehicle.
+    pub(super) fn fly_on(&mut self) -> Option<bool> {
+        let Some(Found::Landing { searched: Some((Some(outcome), _)), .. }) = &self.found else {
+            return None;
+        };
+        self.search.fly_on();
+        Some(outcome.status == Status::Converged && outcome.miss <= self.model.mission.powered.landing_miss)
+    }
+
+    /// The end of the plan from which the next landing starts.
+    pub(super) fn end(&self) -> Touchdown {
+        self.search.from().touchdown()
+    }
+
+    pub(super) fn model(&self) -> &VehicleModel {
+        &self.model
+    }
+
+    /// The vehicle of an estimate when its plan is expected to be ready.
+    pub(super) fn later(&self, estimate: &Estimate, burning: &Burning) -> (Estimate, Burning) {
+        self.model.later(self.search.from(), estimate, burning)
+    }
+
+    /// In how many frames a Cortex-M7 has computed what was found.
+    pub fn frames_on_a_board(&self) -> u64 {
+        let instructions = match &self.found {
+            Some(Found::Landing { searched: Some((Some(_), _)), .. }) => {
+                LANDING + PASS * self.search.passes() as u64
+            }
+            Some(Found::Landing { .. }) => LANDING,
+            Some(Found::Prediction(_)) => PREDICTION,
+            None => 0,
+        };
+        instructions.div_ceil(INSTRUCTIONS_PER_FRAME)
+    }
+}
+
+impl VehicleModel {
+    /// The vehicle when its plan is expected to be ready: until then it moves as the flown plan does, or without one keeps its
+    /// force and its rates.
+    fn later(&self, flown: &Plan, estimate: &Estimate, burning: &Burning) -> (Estimate, Burning) {
+        let time_s = estimate.time_s;
+        let later_s = time_s + EXPECTED_S;
+        let mut state = estimate.state;
+        let gained_m_s = match flown.at(time_s).zip(flown.at(later_s)) {
+            Some(((from_m_s, from), (to_m_s, to))) => {
+                let rate = state.world_from_body * state.rate_rad_s;
+                // What it turns otherwise than planned, it goes on to turn.
+                let astray = UnitQuaternion::from_scaled_axis((rate - from.rate_in_world_rad_s) * EXPECTED_S);
+                let turned = UnitQuaternion::rotation_between(&from.nose_in_world, &to.nose_in_world);
+                state.world_from_body = astray * turned.unwrap_or_default() * state.world_from_body;
+                state.rate_rad_s = state
+                    .world_from_body
+                    .inverse_transform_vector(&(rate + to.rate_in_world_rad_s - from.rate_in_world_rad_s));
+                to_m_s - from_m_s
+            }
+            None => {
+                let turned = UnitQuaternion::from_scaled_axis(state.rate_rad_s * EXPECTED_S);
+                let force_m_s2 = state.world_from_body * estimate.specific_force_m_s2;
+                state.world_from_body *= turned;
+                (force_m_s2 - Vector3::z() * self.mission.gravity_m_s2) * EXPECTED_S
+            }
+        };
+        state.position_m += (state.velocity_m_s + gained_m_s * 0.5) * EXPECTED_S;
+        state.velocity_m_s += gained_m_s;
+        let burning_s = burning.burning_s + EXPECTED_S;
+        let mass = self.mass_now(Some(burning_s));
+        (Estimate { time_s: later_s, state, ..*estimate }, Burning { burning_s, mass, ..burning.clone() })
+    }
+}
+
+impl Pilot {
+    /// A planner with a copy of what the pilot knows, before it is asked.
+    pub(super) fn planner(model: &VehicleModel, search: Search) -> Option<Box<Planner>> {
+        Some(Box::new(Planner { model: model.without_filters(), posed: None, search, found: None }))
+    }
+
+    /// Poses the prediction in the fall.
+    pub(super) fn pose_prediction(&mut self, time_s: f64, estimate: &Estimate) {
+        let (fins_rad, apogee_m) = (self.fins_rad, self.apogee_m);
+        self.pose(time_s, estimate, Asked::Prediction { fins_rad, apogee_m });
+    }
+
+    /// Poses a landing. Returns whether it could.
+    pub(super) fn pose_landing(&mut self, time_s: f64, estimate: &Estimate, burning: Burning) -> bool {
+        self.pose(time_s, estimate, Asked::Landing(burning))
+    }
+
+    /// Nothing is posed before the last has been taken over.
+    fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Asked) -> bool {
+        let Some(planner) = self.planner.as_mut().filter(|_| self.posed_at_s.is_none()) else { return false };
+        self.posed_at_s = Some(time_s);
+        self.powered.begin(&mut planner.search);
+        planner.model = self.model.without_filters();
+        planner.ask(time_s, estimate, asked);
+        true
+    }
+
+    /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a landing.
+    pub(in crate::computer) fn take_over(&mut self, time_s: f64) -> bool {
+        let Some((posed_at_s, planner)) = self.posed_at_s.zip(self.planner.as_mut()) else { return false };
+        self.posed_at_s = None;
+        planner.solve();
+        match &planner.found {
+            Some(Found::Landing { searched, fin_share }) => {
+                self.fin_share = fin_share.unwrap_or(self.fin_share);
+                if let Some((outcome, high)) = searched {
+                    let times_s = [posed_at_s, time_s];
+                    self.powered.take_over(&mut planner.search, outcome.as_ref(), *high, times_s);
+                }
+                searched.is_some()
+            }
+            Some(Found::Prediction(prediction)) => {
+                self.prediction = *prediction;
+                false
+            }
+            None => false,
+        }
+    }
+
+    /// What is posed and not computed yet.
+    pub(in crate::computer) fn posed(&mut self) -> Option<&mut Box<Planner>> {
+        self.posed_at_s?;
+        self.planner.as_mut().filter(|planner| planner.found.is_none())
+    }
+
+    pub(in crate::computer) fn take_posed(&mut self) -> Option<Box<Planner>> {
+        self.posed()?;
+        self.planner.take()
+    }
+
+    pub(in crate::computer) fn give_back(&mut self, planner: Box<Planner>) {
+        // One of a computer that has restarted meanwhile has its own.
+        self.planner.get_or_insert(planner);
+    }
+
+    /// The landing that was taken over last, and its problem; none before the first, and while the next one is posed.
+    pub fn landing_solved(&self) -> Option<LandingSolved> {
+        let planner = self.planner.as_ref()?;
+        let (estimate, Asked::Landing(burning)) = planner.posed.as_ref()? else { return None };
+        let Some(Found::Landing { searched: Some((Some(outcome), _)), .. }) = &planner.found else {
+            return None;
+        };
+        let (later, burning) = planner.later(estimate, burning);
+        let situation = planner.model.situation_to_plan(&later, &burning);
+        let settings = &planner.model.mission.powered;
+        planner.search.solved(settings, later.time_s, outcome, self.powered.planned()?, &situation)
+    }
+
+    /// Rehearses the landing on the pad, from power-up on; `None` while something is posed.
+    pub(in crate::computer) fn rehearse(&mut self) -> Option<Rehearsed> {
+        let planner = self.planner.as_mut().filter(|_| self.posed_at_s.is_none())?;
+        self.powered.begin(&mut planner.search);
+        Some(planner.rehearse())
+    }
+}

@@ -1,0 +1,98 @@
+//! The rehearsal of the landing at power-up, on a board: no world is simulated there, so the vehicle falls as its model does, and
+//! then moves as it plans.
+//!
+//! It shows whether the planner works on this machine, and whether a landing is possible with this vehicle, motor and mission.
+
+use alloc::format;
+
+use nalgebra::{Vector2, Vector3};
+
+use super::planner::{Asked, Planner};
+use super::vehicle_model::{Burning, VehicleModel};
+use crate::computer::Rehearsed;
+use crate::estimation::estimator::Estimate;
+use crate::rules::arming::PredictedLanding;
+use crate::rules::verdict::{LandingVerdict, Limits};
+use crate::vehicle::rigid::RigidState;
+
+/// Time between looks for the ignition in the fall, s, and how many.
+const LOOK_S: f64 = 0.1;
+const LOOKS: u32 = 200;
+/// More plans than the longest burn has.
+const MOST_PLANS: u32 = 200;
+
+impl Planner {
+    /// Rehearses the landing, with no plan flown. It takes some seconds on a board.
+    pub(super) fn rehearse(&mut self) -> Rehearsed {
+        let (mut plans, mut converged) = (0, 0);
+        let mut flown = self.model().lit();
+        while let Some((estimate, burning)) = flown.take().filter(|_| plans < MOST_PLANS) {
+            self.ask(estimate.time_s, &estimate, Asked::Landing(burning.clone()));
+            self.solve();
+            // It moves as planned before, until the plan is ready.
+            let (estimate, burning) = self.later(&estimate, &burning);
+            let Some(lands) = self.fly_on() else { break };
+            plans += 1;
+            converged += u32::from(lands);
+            // Twice that time is the period of plans.
+            flown = Some(self.later(&estimate, &burning));
+        }
+        let limits = Limits::from(&self.model().mission.leg_limits);
+        let verdict = LandingVerdict::judge_plan(&limits, &self.end());
+        Rehearsed {
+            warm: converged > 0 && verdict.is_inside(),
+            found: format!("planned, {converged} of {plans} plans converged"),
+            landing: (plans > 0).then(|| PredictedLanding::from(&verdict)),
+        }
+    }
+}
+
+impl VehicleModel {
+    /// The vehicle as its motor takes thrust, at time zero, after a fall with open fins in still air; `None` if no height suits the
+    /// motor.
+    fn lit(&self) -> Option<(Estimate, Burning)> {
+        let (mission, mass, fins_m2) = (&self.mission, self.mass.at(0.0), self.largest_fin_drag_area_m2());
+        let feet_m = self.feet_below_cg_m(&mass);
+        let exact = |state| Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
+        let density_kg_m3 = self.density_kg_m3(&exact(RigidState::upright(0.0)));
+        let column = self.column(density_kg_m3, mission.soft_tilt_deg);
+        let lit = (0..LOOKS).find_map(|look| {
+            let after_s = f64::from(look) * LOOK_S;
+            let (height_m, vertical_m_s) =
+                column.fallen(mission.start.height_m - feet_m, 0.0, fins_m2, after_s);
+            let curve = &mission.motor_curve;
+            let looked = mission.ignition.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
+            looked.overdue_s(looked.onset_height_m).map(|_| looked)
+        })?;
+        let mut estimate = exact(RigidState::upright(lit.onset_height_m + feet_m));
+        estimate.state.velocity_m_s.z = lit.onset_vertical_m_s;
+        // As without air.
+        estimate.specific_force_m_s2.x = self.burn().mean_thrust_n(0.0, 0.05) / mass.mass_kg;
+        Some((estimate, Burning { burning_s: 0.0, mass, density_kg_m3, lands_in_place: false }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::computer::Computer;
+    use crate::vehicles::mission::{BUILTIN, builtin};
+
+    /// Every mission that can be flown can be armed on a board, and the rehearsal leaves no memory.
+    #[test]
+    fn every_built_in_mission_rehearses_a_landing() {
+        for (name, _) in BUILTIN {
+            let mission = builtin(name).unwrap().unwrap();
+            let believed = RigidState::upright(mission.start.height_m);
+            let mut computer = Computer::at_power_up(&mission, &believed);
+            let before = computer.digest();
+            let rehearsed = computer.rehearse().unwrap();
+            assert!(
+                rehearsed.warm && rehearsed.landing.as_ref().is_some_and(|landing| landing.lands),
+                "{name}: {rehearsed:?}"
+            );
+            assert_eq!(computer.digest(), before, "{name}");
+            assert_eq!(computer.released(0).rehearse(), None, "{name}");
+        }
+    }
+}
