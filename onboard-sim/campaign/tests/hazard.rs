@@ -68,7 +68,9 @@ fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
     assert_eq!(alone, flown(2));
     // A parachute drifts with the wind; what falls without one does not.
     let (way, radius) = widest(&alone).unwrap();
-    assert_eq!((way, radius.flights), (Way::ParachuteFromApogee, 3));
+    // From the apogee or a moment after it: which of the two reaches further is decided by metres.
+    assert!(matches!(way, Way::ParachuteFromApogee | Way::AbortInDescent), "{way:?}");
+    assert_eq!(radius.flights, 3);
     let falls = Radius::of_way(&alone, Way::Ballistic).unwrap();
     assert!(falls.flights == 1 && falls.farthest_m < radius.farthest_m, "{falls:?}");
 }
