@@ -284,7 +284,7 @@ fn every_command_answers_about_every_mission() {
     let mut cases = side_by_side(BUILTIN, |(mission, _)| flights(mission));
     let faults = [("abort@3", Ends::Aborted), ("lidar-out@3", Ends::Landed)];
     cases.extend(faults.map(|(fault, ends)| Case::fly("mk3", StartPoint::Apogee, Some(fault), ends)));
-    assert_eq!(cases.len(), 15, "7 from apogee, 2 from the pad, 4 below a drone, 2 with a fault");
+    assert_eq!(cases.len(), 16, "7 from apogee, 2 from the pad, 5 below a drone, 2 with a fault");
     // `cargo test -p replay-rerun` tests what it writes.
     let rerun_is_built = Path::new(REPLAY).with_file_name("replay-rerun").exists();
     let wrong = side_by_side(&cases, |case| {
