@@ -22,40 +22,6 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A map's files appear complete, and replace existing ones only on request.
-#[test]
-fn a_map_overwrites_no_file_without_force() {
-    let directory = tempfile::tempdir().unwrap();
-    let map = |force: Option<&str>| {
-        Command::new(env!("CARGO_BIN_EXE_onboard-sim"))
-            .current_dir(directory.path())
-            .args([
-                "campaign",
-                "map",
-                "--attainable",
-                "--x",
-                "thrust-scale=1:1.1:2",
-                "--y",
-                "height=290:300:2",
-            ])
-            .args(["--csv", "map.csv", "--svg", "map.svg"])
-            .args(force)
-            .output()
-            .unwrap()
-    };
-    let csv = directory.path().join("map.csv");
-    fs::write(&csv, "notes").unwrap();
-    let refused = map(None);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(stderr(&refused).contains("map.csv exists already; --force"), "{}", stderr(&refused));
-    assert_eq!(fs::read_to_string(&csv).unwrap(), "notes");
-    assert!(!directory.path().join("map.svg").exists());
-    let forced = map(Some("--force"));
-    assert_eq!(forced.status.code(), Some(0), "{}", stderr(&forced));
-    assert!(fs::read_to_string(&csv).unwrap().starts_with("thrust"));
-    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2);
-}
-
 #[test]
 fn a_campaign_without_a_flight_is_refused() {
     let directory = tempfile::tempdir().unwrap();

@@ -80,15 +80,6 @@ pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Wind
     Some(Window { low_m: edge_m(first, first - 1), high_m })
 }
 
-/// The window in heights of the feet where the thrust begins, m, instead of where it is commanded.
-pub fn onset_window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
-    let Window { low_m, high_m } = window(mission, drawn, fall)?;
-    let vertical = vertical(mission, drawn)?;
-    let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
-    let fall = Fall::new(&vertical, apogee_m, fall.velocity_m_s.z.min(0.0), drawn.truth.ignition_delay_s)?;
-    Some(Window { low_m: fall.onset(low_m).0, high_m: fall.onset(high_m).0 })
-}
-
 /// Heights are found this closely, m: far below what decides a landing (a metre of height is 0.2 m/s at the ground).
 const ROUNDING_M: f64 = 1e-3;
 

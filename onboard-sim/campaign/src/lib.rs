@@ -6,7 +6,6 @@
 //! * [`stopwatch`]: how far something long is.
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
-//! * [`map`]: where a vehicle lands, over two quantities.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
 //! * [`motors`]: which motor an airframe lands on, and the landing card.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
@@ -17,7 +16,6 @@
 pub mod attainable;
 pub mod figure;
 pub mod hazard;
-pub mod map;
 pub mod motors;
 pub mod row;
 pub mod run;

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::map::{self, Axis, By};
 use campaign::run::{self, Progress};
 use campaign::scenario::{Expected, Scenario};
 use campaign::store::{Order, Shard, Store, merge};
@@ -67,9 +66,6 @@ pub(crate) struct CampaignArguments {
 
 #[derive(Subcommand)]
 enum CampaignCommand {
-    /// Map where a mission lands, over two quantities: one simulated flight for each cell.
-    #[command(after_help = "Example: onboard-sim campaign map --svg mk3.svg")]
-    Map(MapOfMission),
     /// Merge the parts of a campaign that was flown in shards.
     #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
     Merge {
@@ -83,10 +79,8 @@ enum CampaignCommand {
 }
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
-    match &arguments.command {
-        Some(CampaignCommand::Merge { parts, out }) => return gather(parts, out),
-        Some(CampaignCommand::Map(map)) => return map_mission(map),
-        None => {}
+    if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
+        return gather(parts, out);
     }
     let (order, expected) = order(arguments)?;
     if let Some(number) = arguments.only {
@@ -148,79 +142,6 @@ fn program() -> anyhow::Result<String> {
     let build = build_info();
     let commit = build.get("git_commit").map_or("unknown", String::as_str);
     Ok(format!("{} {commit} {short}", env!("CARGO_PKG_VERSION")))
-}
-
-#[derive(Args)]
-struct MapOfMission {
-    /// Built-in mission or TOML file.
-    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    profile: String,
-    /// Columns: QUANTITY=FROM:TO:COUNT.
-    ///
-    /// Quantities: ignition-height (m, of the feet where the thrust begins; without it the guidance chooses), thrust-scale, wind
-    /// (m/s), tilt (deg, at the start), height (m, of the start).
-    #[arg(long, value_name = "AXIS", default_value = "thrust-scale=0.8:1.2:21")]
-    x: Axis,
-    /// Rows, in the same form.
-    #[arg(long, value_name = "AXIS", default_value = "wind=0:10:11")]
-    y: Axis,
-    /// Write the cells as CSV.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-    /// Write the map as a picture.
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
-    /// Cells computed at the same time; the map does not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
-    /// Map what perfect information could land, instead of the mission's own guidance: an upper bound in vertical motion
-    /// alone, some forty times cheaper. It knows no wind, so it needs --y.
-    #[arg(long, requires = "y")]
-    attainable: bool,
-    /// Built-in set of dispersions or TOML file, of which the cells all have the same draw; the quantities on the axes
-    /// replace what is drawn for them.
-    #[arg(long, default_value = "none", value_name = "NAME|FILE")]
-    dispersion: String,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
-
-fn map_mission(arguments: &MapOfMission) -> anyhow::Result<ExitCode> {
-    let MapOfMission { ref profile, x, y, ref csv, ref svg, force, jobs, attainable, ref dispersion, seed } =
-        *arguments;
-    for path in [csv, svg].into_iter().flatten() {
-        refuse_loss(path, force)?;
-    }
-    let recipe = recipe(profile, None, dispersion, seed)?;
-    let (by, asked, how) = if attainable {
-        let how = "an upper bound: vertical motion, no wind, no attitude";
-        (By::PerfectInformation, "could it be landed with perfect information?", how)
-    } else {
-        (
-            By::Guidance,
-            "does its own guidance leave it standing undamaged?",
-            "one simulated flight for each cell",
-        )
-    };
-    let title = format!("{}: {asked}", recipe.mission.name);
-    let stopwatch = Stopwatch::start();
-    let show = |done| stopwatch.show(done, x.count * y.count, "cells");
-    let map = on_threads(jobs, || Ok(map::map(&recipe, by, [x, y], &show)?))?;
-    let mut stdout = std::io::stdout().lock();
-    writeln!(stdout, "{title} ({how})").context("standard output")?;
-    map.write_table(&mut stdout)?;
-    if let Some(path) = csv {
-        write_file(path, force, |out| map.write_csv(out))?;
-    }
-    if let Some(path) = svg {
-        let picture = map::svg(&map, &title)?;
-        write_file(path, force, |out| out.write_all(picture.as_bytes()))?;
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Cost of a run.
