@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
 
 use flight::computer::crew::{Asked, People, Request};
 use flight::computer::{Commander, LogState};
@@ -125,7 +124,7 @@ impl Flown {
                 vehicle.set_uplink(reached.uplink, commander);
                 vehicle.set_pin_out(reached.pin_out);
             }
-            let events = vehicle.step(&requests, &mut || Duration::ZERO).events;
+            let events = vehicle.step(&requests).events;
             flown.record(&vehicle, &events);
             let waits = vehicle.phase().on_pad() && frame > last + 3_000;
             if vehicle.is_over() || waits {

@@ -141,8 +141,8 @@ impl VehicleModel {
         let time_s = estimate.time_s;
         let later_s = time_s + EXPECTED_S;
         let mut state = estimate.state;
-        let gained_m_s = match flown.at(time_s).zip(flown.at(later_s)) {
-            Some(((from_m_s, from), (to_m_s, to))) => {
+        let gained_m_s =
+            if let Some(((from_m_s, from), (to_m_s, to))) = flown.at(time_s).zip(flown.at(later_s)) {
                 let rate = state.world_from_body * state.rate_rad_s;
                 // What it turns otherwise than planned, it goes on to turn.
                 let astray = UnitQuaternion::from_scaled_axis((rate - from.rate_in_world_rad_s) * EXPECTED_S);
@@ -152,14 +152,12 @@ impl VehicleModel {
                     .world_from_body
                     .inverse_transform_vector(&(rate + to.rate_in_world_rad_s - from.rate_in_world_rad_s));
                 to_m_s - from_m_s
-            }
-            None => {
+            } else {
                 let turned = UnitQuaternion::from_scaled_axis(state.rate_rad_s * EXPECTED_S);
                 let force_m_s2 = state.world_from_body * estimate.specific_force_m_s2;
                 state.world_from_body *= turned;
                 (force_m_s2 - Vector3::z() * self.mission.gravity_m_s2) * EXPECTED_S
-            }
-        };
+            };
         state.position_m += (state.velocity_m_s + gained_m_s * 0.5) * EXPECTED_S;
         state.velocity_m_s += gained_m_s;
         let burning_s = burning.burning_s + EXPECTED_S;
@@ -170,8 +168,8 @@ impl VehicleModel {
 
 impl Pilot {
     /// A planner with a copy of what the pilot knows, before it is asked.
-    pub(super) fn planner(model: &VehicleModel, search: Search) -> Option<Box<Planner>> {
-        Some(Box::new(Planner { model: model.without_filters(), posed: None, search, found: None }))
+    pub(super) fn planner(model: &VehicleModel, search: Search) -> Box<Planner> {
+        Box::new(Planner { model: model.without_filters(), posed: None, search, found: None })
     }
 
     /// Poses the prediction in the fall.
