@@ -72,7 +72,7 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             &[]
         };
         let own: Vec<Request> = asked.iter().copied().map(Request::of_the_programme).collect();
-        drop(step(&mut endpoint, &mut vehicle, &own, &mut || Duration::ZERO));
+        drop(step(&mut endpoint, &mut vehicle, &own));
         for outgoing in endpoint.poll(&vehicle.state()) {
             drop(update(model, Msg::Frame(outgoing.frame), now));
         }

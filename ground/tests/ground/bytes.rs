@@ -70,7 +70,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let (mut tick_at, mut over_at, mut fresh_at) = (Duration::ZERO, None, Duration::ZERO);
     loop {
         let now = Duration::from_secs_f64(vehicle.time_s());
-        step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
+        step(&mut endpoint, &mut vehicle, &[]);
         let mut msgs = Vec::new();
         for leaving in endpoint.poll(&vehicle.state()) {
             let frame = leaving.frame;

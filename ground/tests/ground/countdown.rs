@@ -22,7 +22,7 @@ static READY: LazyLock<Vehicle> = LazyLock::new(|| {
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
     vehicle.set_pin_out(true);
     while !all_passed(&vehicle.arming_checks()) && vehicle.time_s() < 20.0 {
-        vehicle.step(&[], &mut || Duration::ZERO);
+        vehicle.step(&[]);
     }
     vehicle
 });
@@ -110,7 +110,7 @@ impl Pad {
             for frame in arrived(&mut self.up) {
                 self.endpoint.on_frame(0, &frame, &self.vehicle.state());
             }
-            step(&mut self.endpoint, &mut self.vehicle, &[], &mut || Duration::ZERO);
+            step(&mut self.endpoint, &mut self.vehicle, &[]);
             for leaving in self.endpoint.poll(&self.vehicle.state()) {
                 if !matches!(self.lost, Some(Loss::Station | Loss::Downlink | Loss::Link)) {
                     self.down.push((now + self.delay, leaving.frame));

@@ -40,7 +40,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
         let ready = rocket.phase().on_pad() && rocket.state().checks_failed() == 0;
         let own = if ready { vec![Asked::Arm, Asked::Start] } else { asks(&rocket).into_iter().collect() };
         let own: Vec<Request> = own.into_iter().map(Request::of_the_programme).collect();
-        step(&mut endpoint, &mut rocket, &own, &mut || Duration::ZERO);
+        step(&mut endpoint, &mut rocket, &own);
         if rocket.is_over() {
             stands_s += 0.005;
         }

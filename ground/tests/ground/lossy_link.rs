@@ -83,7 +83,7 @@ fn run(seed: u64) -> Run {
             for frame in up.arrived(now) {
                 endpoint.on_frame(0, &frame, &vehicle.state());
             }
-            step(&mut endpoint, &mut vehicle, &[], &mut || Duration::ZERO);
+            step(&mut endpoint, &mut vehicle, &[]);
             for leaving in endpoint.poll(&vehicle.state()) {
                 down.send(leaving.frame, now);
             }
