@@ -121,7 +121,7 @@ impl Pilot {
             },
             ignited_at_s: None,
             prediction: Prediction::default(),
-            planner: Self::planner(&model, search),
+            planner: Some(Self::planner(&model, search)),
             posed_at_s: None,
             plan_due: 0,
             powered,

@@ -7,6 +7,7 @@ mod space;
 
 use std::ops::{Deref, DerefMut};
 
+use flight::computer::FRAME_S;
 use flight::computer::crew::{Answer, Asked, Request};
 use flight::rules::phase::Phase;
 

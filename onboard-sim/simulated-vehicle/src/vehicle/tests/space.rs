@@ -1,8 +1,8 @@
 //! The rocket: pad, arming, the flight from apogee, what is said of the motor behind it, and an abort in every phase.
 
 use campaign::tally;
+use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
-use flight::computer::{AbortEffect, FRAME_S};
 use flight::rules::outputs::Line;
 use flight::rules::phase::MotorStatus;
 use protocol::dialect::TdChute;
