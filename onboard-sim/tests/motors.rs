@@ -27,7 +27,7 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The built-in motor F10; its header is line 10.
+/// The built-in motor F10; its header is line 11.
 const F10: &str = include_str!("../flight/vehicles/motors/Apogee_F10.eng");
 
 #[test]
@@ -54,7 +54,7 @@ fn motors_of_a_folder_are_ranked_into_files_that_are_not_overwritten() {
     assert_eq!(ranked.status.code(), Some(0), "{}", stderr(&ranked));
     let table = stdout(&ranked);
     assert!(table.lines().nth(1).unwrap().contains("Apogee F10"), "{table}");
-    assert!(table.contains("line 10: propellant mass is '40.7 kg"), "{table}");
+    assert!(table.contains("line 11: propellant mass is '40.7 kg"), "{table}");
     assert!(stderr(&ranked).contains("2 of 2 motors") && stderr(&ranked).contains("1 of 1 flights"));
     let csv = fs::read_to_string(directory.path().join("motors.csv")).unwrap();
     assert_eq!(csv.lines().count(), 3, "{csv}");
@@ -147,7 +147,10 @@ fn the_mission_of_a_card_is_the_one_that_flies_and_another_mass_is_a_proposal() 
         assert!(file("card.txt").contains(&hash) && file("card.html").contains(&hash), "{name}");
     }
     let proposed = fs::read_to_string(directory.path().join("mk3/proposal.toml")).unwrap();
-    assert!(proposed.contains("name = \"mk3-h45w\"") && proposed.contains("loaded_kg = 3.377"), "{proposed}");
+    assert!(
+        proposed.contains("name = \"mk3-hp-h45w\"") && proposed.contains("loaded_kg = 3.925"),
+        "{proposed}"
+    );
 }
 
 #[test]
@@ -162,7 +165,7 @@ fn what_cannot_land_gets_no_card_but_the_reason() {
     fs::write(directory.path().join("bad.eng"), overlap).unwrap();
     let broken = run(directory.path(), &["card", "--mission", "mini-f10", "--motor", "bad.eng"]);
     assert!(
-        stderr(&broken).contains("--motor bad.eng: line 14: time is '0.1'; times must"),
+        stderr(&broken).contains("--motor bad.eng: line 15: time is '0.1'; times must"),
         "{}",
         stderr(&broken)
     );

@@ -19,7 +19,7 @@ use sha2::Digest as _;
 use sim::dispersion;
 use sim::fault::{TimedFault, how_to_write};
 
-use super::{Stopwatch, on_threads, recipe, refuse_loss, single, write_file};
+use super::{Stopwatch, on_threads, recipe, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]

@@ -277,6 +277,8 @@ mod tests {
             propellant_station_m: 0.1,
         };
         mission.motor_curve = motor(0.5, 0.2);
+        // Long motors have room for little.
+        mission.airframe.gimbal.limit_deg = 2.0;
         mission
     }
 
@@ -320,6 +322,8 @@ mod tests {
         let frame = Frame::of(&mission()).unwrap();
         let heavy = frame.with(&motor(30.0, 0.6), Ballast { mass_kg: 0.0, station_m: 0.4 });
         assert!(heavy.is_ok_and(|mass| mass.loaded_cg_station_m < 0.33), "nearly all of it is motor");
+        let wide = frame.with(&motor(0.5, 1.0), Ballast { mass_kg: 0.0, station_m: 0.4 });
+        assert_eq!(wide.unwrap_err().key, "gimbal.limit_deg");
         let tail = frame.with(&motor(0.5, 0.2), Ballast { mass_kg: 40.0, station_m: 0.0 });
         assert_eq!(tail.unwrap_err().key, "mass.propellant_station_m");
     }
@@ -349,10 +353,10 @@ mod tests {
     #[test]
     fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
         let (name, text) = flight::vehicles::mission::BUILTIN[1];
-        let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.15 }";
+        let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.65 }";
         let text = format!("{text}\n[lot]\n{lot}\n");
         let mission = flight::vehicles::mission::from_toml(&text, name).unwrap();
-        let mass = Mass { loaded_kg: 3.2, ..mission.airframe.mass };
+        let mass = Mass { loaded_kg: 3.75, ..mission.airframe.mass };
         let changes = Changes {
             name: "x",
             summary: "y",
@@ -367,7 +371,7 @@ mod tests {
         assert_eq!((&kept.motor_curve, kept.airframe.mass), (&mission.motor_curve, mass));
         let other = read(&Changes { motor: "G33", keeps_lot: false, ..changes });
         assert!(other.lot.is_none() && other.motor_burns() == 0);
-        assert!(kept.other_motors == ["HP-H45W"] && other.other_curves.is_empty());
+        assert!(kept.other_motors == ["H45W"] && other.other_curves.is_empty());
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 

@@ -31,6 +31,8 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
     airframe.gimbal.servo.rate_deg_s = 1e6;
     airframe.gimbal.servo.delay_s = 0.0;
     airframe.gimbal.servo.slop_deg = 0.0;
+    // The paper turns the thrust at the nozzle, and its motor weighs nothing.
+    airframe.gimbal.pivot_station_m = 0.0;
     // No motor file may have so little propellant: it is not read from one.
     let motor = ThrustCurve::new(MotorData {
         name: "C".to_owned(),
@@ -38,7 +40,7 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
         diameter_m: 0.038,
         length_m: 0.194,
         propellant_mass_kg: 1e-9,
-        total_mass_kg: 0.1,
+        total_mass_kg: 2e-9,
         points: [0.0, 5.0].map(|time_s| ThrustPoint { time_s, thrust_n: THRUST_N }).to_vec(),
     })
     .unwrap();

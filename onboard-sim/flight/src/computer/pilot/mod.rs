@@ -454,7 +454,7 @@ mod tests {
             }
         }
         let resumed = powered_up().resumed(&pilot.saved(), 1.2);
-        assert_eq!((resumed.other_curve(), resumed.curve()), (Some("HP-H45W"), other));
+        assert_eq!((resumed.other_curve(), resumed.curve()), (Some("H45W"), other));
         assert_eq!(resumed.scales().map(f64::to_bits), pilot.scales().map(f64::to_bits));
     }
 }
