@@ -159,34 +159,6 @@ pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stat
     vec![plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)]
 }
 
-// The panel of the touchdown, predicted or reached, with its limits.
-
-/// Title and rows: the verdict once there is one, before that the prediction. The last row says it in words.
-pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    if let Some(verdict) = model.vehicle.verdict() {
-        let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
-        rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
-        return ("Touchdown", rows);
-    }
-    let Some(prediction) = model.vehicle.prediction else {
-        return ("Touchdown predicted", vec![theme.line("no prediction", TextRole::Label)]);
-    };
-    let (mark, role) = age_mark(&prediction, now);
-    let mut rows = limit_lines(model, &prediction.value.touchdown, theme, mark, role);
-    let in_s = model.vehicle.touchdown_in_s(now);
-    let in_s = in_s.map_or_else(|| "--".to_owned(), |left| fixed(left.value, 1));
-    rows.push(Line::from(vec![
-        theme.label("in      "),
-        theme.span(format!("{mark}{in_s:>6}"), role),
-        theme.label(" s"),
-    ]));
-    rows.push(match prediction.value.touchdown.violations() {
-        None => theme.line("inside the envelope", TextRole::Good),
-        Some(names) => theme.line(format!("OUTSIDE {names}"), TextRole::Alarm),
-    });
-    ("Touchdown predicted", rows)
-}
-
 /// How the flight ended.
 pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
     let ending = Ending::of(&model.vehicle, now)?;
@@ -197,26 +169,6 @@ pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
         Ending::Upright | Ending::Hard | Ending::Lost => TextRole::Alarm,
     };
     Some((ending, role))
-}
-
-fn limit_lines(
-    model: &Model,
-    touchdown: &Touchdown,
-    theme: Theme,
-    mark: &'static str,
-    role: TextRole,
-) -> Vec<Line<'static>> {
-    let rows = limit_rows(touchdown, model.vehicle.limits().as_ref());
-    let line = |row: &LimitRow| {
-        let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
-        Line::from(vec![
-            theme.span(word, word_role),
-            theme.label(format!(" {:<8}", row.name)),
-            theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
-            theme.label(format!(" {} {}", row.unit, theme.either_side(&row.limit))),
-        ])
-    };
-    rows.iter().map(line).collect()
 }
 
 // Each limit of a touchdown with the value reached, as text for the screens and for the closing lines.

@@ -22,31 +22,17 @@ fn is_large(page: Page, phase: TdPhase) -> bool {
     timed && matches!(page, Page::Ascent | Page::Descent | Page::Landing)
 }
 
-/// The same line for the row of the state.
-pub fn next_event_beside(model: &Model, now: Duration) -> Option<String> {
+/// The next event of a flight; `None` on the pad, where the crew decides. Without its time if that is large `beside` it.
+pub fn next_event(model: &Model, now: Duration, beside: bool) -> Option<String> {
     let phase = model.vehicle.phase()?;
     let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
-    let left = if is_large(model.page(), phase.value) { String::new() } else { left };
+    let left = if beside && is_large(model.page(), phase.value) { String::new() } else { left };
     let mark = if phase.is_stale(now) { STALE_MARK } else { " " };
     Some(format!(" next{mark}{event}{left}{rest}"))
 }
 
 /// A vehicle that is slower than this is not falling, m/s.
 const FALLS_M_S: f64 = 0.5;
-
-/// The next event of a flight; `None` on the pad, where the crew decides.
-pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
-    let phase = model.vehicle.phase()?;
-    let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
-
-    let stale = phase.is_stale(now);
-    let (mark, role) = if stale { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Title) };
-    Some(Line::from(vec![
-        theme.label(" next"),
-        theme.span(format!("{mark}{event}{left}"), role),
-        theme.span(rest, if stale { TextRole::Stale } else { TextRole::Plain }),
-    ]))
-}
 
 /// In how long it is at apogee, by its climb.
 fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {

@@ -89,28 +89,11 @@ pub fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mu
     attitude(model, Side::East, theme, now, frame, east);
 }
 
-/// Adds height and vertical speed before the second value. After the loss of the link the prediction shows them.
-pub fn insert_height(lines: &mut Vec<Line<'static>>, model: &Model, theme: Theme, now: Duration) {
-    if panels::is_lost(model, now) {
-        return;
-    }
-    lines.insert(1, row(theme, "height", model.vehicle.height_m(), 1, "m", now));
-    lines.insert(2, row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
-}
-
 // The ascent page.
 
 pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let values = ascent_values(model, theme, now);
     draw_flying(model, ("ascent", values), theme, now, frame, area)
-}
-
-/// For small screens: the values, with height and speed, which have no headline there.
-pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
-    lines.extend(ascent_values(model, theme, now));
-    insert_height(&mut lines, model, theme, now);
-    lines
 }
 
 /// The values, the most important first.
@@ -174,14 +157,6 @@ fn state_row(
 pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let values = descent_values(model, theme, now);
     draw_flying(model, ("descent", values), theme, now, frame, area)
-}
-
-/// For small screens: the values, with height and speed, which have no headline there.
-pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
-    lines.extend(descent_values(model, theme, now));
-    insert_height(&mut lines, model, theme, now);
-    lines
 }
 
 /// The values, the most important first.
