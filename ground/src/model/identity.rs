@@ -147,10 +147,6 @@ impl Foreign {
     pub(crate) fn hear(&mut self, message: &MavMessage, now: Duration) {
         let degrees = |rad: f32| f64::from(rad).to_degrees();
         let (name, text) = match message {
-            MavMessage::CURRENT_MODE(mode) => {
-                self.custom_mode = mode.custom_mode;
-                return;
-            }
             MavMessage::ATTITUDE(data) => {
                 let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(degrees);
                 ("attitude", format!("roll {roll:.0} deg, pitch {pitch:.0} deg, yaw {yaw:.0} deg"))

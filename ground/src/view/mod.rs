@@ -35,10 +35,6 @@ use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
 
-pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
-    draw(model, theme, now, frame);
-}
-
 /// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
     let area = frame.area();
@@ -157,7 +153,7 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         lines.push(Line::from(line));
     }
     lines.push(compact_abort(model, theme, now, area.width));
-    let keys = if open.is_none() && area.height >= KEYS_ROWS { 1 } else { 0 };
+    let keys = u16::from(open.is_none() && area.height >= KEYS_ROWS);
     if open.is_none() {
         let hands_off = top_lines::hands_off(model, theme, now);
         let columns = usize::from(area.width);

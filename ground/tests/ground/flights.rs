@@ -16,7 +16,7 @@ use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
-use crate::rig::{MONO, settings};
+use crate::rig::settings;
 
 /// Longer than any flight of mk2, s.
 const LONGEST_S: f64 = 120.0;

@@ -22,11 +22,7 @@ const BELOW_ROWS: u16 = 10;
 pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let room = Room::of(frame.area());
     let below = panels::controller_rows(model, theme, now).into_iter().next().unwrap_or_default();
-    let area = if headline::replaces_band(model, now) {
-        area
-    } else {
-        headline::draw_flight_band(model, below, theme, now, frame, area)
-    };
+    let area = headline::draw_flight_band(model, below, theme, now, frame, area);
     if room == Room::Small {
         let middle = if panels::is_lost(model, now) { LOST_COLUMNS } else { 17 };
         let [left, middle, right] = columns(area, [Fill(1), Length(middle), Length(32)]);

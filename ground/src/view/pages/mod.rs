@@ -24,8 +24,7 @@ use crate::model::{Model, Page};
 /// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     match model.page() {
-        Page::Ascent => return Some(flight::draw_ascent(model, theme, now, frame, area)),
-        Page::Descent => return Some(flight::draw_descent(model, theme, now, frame, area)),
+        Page::Ascent | Page::Descent => return Some(flight::draw_flying(model, theme, now, frame, area)),
         Page::Landing => return Some(landing::draw_landing(model, theme, now, frame, area)),
         Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
         Page::Review => landing::draw_review(model, theme, now, frame, area),
