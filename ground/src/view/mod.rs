@@ -172,8 +172,10 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     if let Some((_, text)) = open {
         return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), page);
     }
-    draw_lines(frame, page, &pages::lines(model, model.page(), theme, now, page));
-    dialog::draw_palette(model, theme, now, frame, page);
+    let palette = dialog::palette_lines(model, theme, now, usize::from(page.height).saturating_sub(1));
+    let lines =
+        if palette.is_empty() { pages::lines(model, model.page(), theme, now, page) } else { palette };
+    draw_lines(frame, page, &lines);
     footer::draw_keys(model, theme, now, frame, keys);
 }
 
