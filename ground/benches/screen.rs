@@ -6,8 +6,8 @@ use divan::Bencher;
 use ground::key::Key;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
+use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
-use ground::view::view;
 use protocol::dialect::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage};
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
@@ -54,7 +54,12 @@ fn frame(bencher: Bencher, page: char, columns: u16, rows: u16) {
     let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("memory");
     let theme = Theme { palette: Palette::Dark, ascii: false };
     bencher.bench_local(|| {
-        terminal.draw(|frame| view(&model, theme, NOW, frame)).map(|drawn| drawn.count).expect("memory")
+        terminal
+            .draw(|frame| {
+                draw(&model, theme, NOW, frame);
+            })
+            .map(|drawn| drawn.count)
+            .expect("memory")
     });
 }
 

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
+use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
-use ground::view::view;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavAutopilot, MavMessage, MavSeverity,
     MavType, TD_FLIGHT_STATUS_DATA, TdPhase,
@@ -84,7 +84,9 @@ fn ten_hours_take_no_more_memory_than_one() {
         if second % 60 == 0 {
             let now = Duration::from_secs(second);
             terminal
-                .draw(|frame| view(&model, Theme { palette: Palette::Dark, ascii: false }, now, frame))
+                .draw(|frame| {
+                    draw(&model, Theme { palette: Palette::Dark, ascii: false }, now, frame);
+                })
                 .unwrap();
         }
         if second == 3_600 {

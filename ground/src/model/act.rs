@@ -95,7 +95,7 @@ pub const DEFINITIONS: [Definition; 41] = [
     define(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
     define(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
     define(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
-    define(Act::Show(Page::Review), "review", '4', "page: verdict, greatest values, timeline"),
+    define(Act::Show(Page::Review), "review", '4', "page: verdict, limits, greatest values"),
     define(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
     define(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
     define(Act::Show(Page::Parameters), "parameters", '7', "page: parameters of the vehicle"),
@@ -300,22 +300,6 @@ impl Bindings {
     pub fn meant_as_capital(&self, letter: char) -> Option<Act> {
         self.exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_confirmation())
     }
-
-    fn chosen<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> Result<Self, BindingError> {
-        let mut bindings = Self::default();
-        for (name, given) in pairs {
-            let place = DEFINITIONS.iter().position(|definition| definition.name == name);
-            let place = place.ok_or_else(|| BindingError::UnknownAction { given: name.to_owned() })?;
-            bindings.0[place] = key_for(&DEFINITIONS[place], given)?;
-        }
-        for (place, key) in bindings.0.iter().enumerate() {
-            if let Some(other) = bindings.0[..place].iter().position(|bound| bound == key) {
-                let (first, second) = (DEFINITIONS[other].name, DEFINITIONS[place].name);
-                return Err(BindingError::Twice { first, second, key: key.name() });
-            }
-        }
-        Ok(bindings)
-    }
 }
 
 fn key_for(definition: &Definition, given: &str) -> Result<Key, BindingError> {
@@ -335,8 +319,20 @@ fn key_for(definition: &Definition, given: &str) -> Result<Key, BindingError> {
 impl TryFrom<BTreeMap<String, String>> for Bindings {
     type Error = BindingError;
 
-    fn try_from(given: BTreeMap<String, String>) -> Result<Self, BindingError> {
-        Self::chosen(given.iter().map(|(name, key)| (name.as_str(), key.as_str())))
+    fn try_from(chosen: BTreeMap<String, String>) -> Result<Self, BindingError> {
+        let mut bindings = Self::default();
+        for (name, given) in chosen {
+            let place = DEFINITIONS.iter().position(|definition| definition.name == name);
+            let place = place.ok_or(BindingError::UnknownAction { given: name })?;
+            bindings.0[place] = key_for(&DEFINITIONS[place], &given)?;
+        }
+        for (place, key) in bindings.0.iter().enumerate() {
+            if let Some(other) = bindings.0[..place].iter().position(|bound| bound == key) {
+                let (first, second) = (DEFINITIONS[other].name, DEFINITIONS[place].name);
+                return Err(BindingError::Twice { first, second, key: key.name() });
+            }
+        }
+        Ok(bindings)
     }
 }
 
@@ -408,13 +404,18 @@ mod tests {
     use crate::model::Page;
     use proptest::prelude::*;
 
+    fn chosen(pairs: &[(&str, &str)]) -> Result<Bindings, BindingError> {
+        let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
+        Bindings::try_from(pairs.collect::<BTreeMap<_, _>>())
+    }
+
     #[test]
     fn the_usual_keys_are_each_used_once() {
         let usual = Bindings::default();
         for definition in &DEFINITIONS {
             assert_eq!(usual.act(definition.usual), Some(definition.act), "{}", definition.name);
         }
-        assert_eq!(Bindings::chosen(std::iter::empty()), Ok(usual));
+        assert_eq!(chosen(&[]), Ok(usual));
     }
 
     /// The ascent shares the key of the descent: it has no definition, and was the first action, which arms.
@@ -431,8 +432,7 @@ mod tests {
 
     #[test]
     fn a_wrong_choice_is_refused_with_what_would_do() {
-        let refused =
-            |given: &str| Bindings::chosen(given.split_once('=').into_iter()).unwrap_err().to_string();
+        let refused = |given: &str| chosen(&[given.split_once('=').unwrap()]).unwrap_err().to_string();
         assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
         assert!(refused("theme=Enter").contains("one printable ASCII character"));
         assert!(refused("theme=").contains("theme: ``"));
@@ -442,7 +442,7 @@ mod tests {
 
     #[test]
     fn shift_counts_unless_the_capital_letter_has_its_own_action() {
-        let keys = Bindings::chosen([("theme", "a"), ("hold", "J")].into_iter()).unwrap();
+        let keys = chosen(&[("theme", "a"), ("hold", "J")]).unwrap();
         assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
         assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
         assert_eq!(keys.act(Key::Char('P')), Some(Act::Show(Page::Path)));
@@ -460,7 +460,7 @@ mod tests {
         ) {
             let list: Vec<(&str, &str)> =
                 pairs.iter().map(|(place, key)| (DEFINITIONS[*place].name, key.as_str())).collect();
-            if let Ok(keys) = Bindings::chosen(list.into_iter()) {
+            if let Ok(keys) = chosen(&list) {
                 prop_assert_eq!(keys.act(Key::CtrlX), None);
                 prop_assert_eq!(keys.act(Key::Enter), None);
                 prop_assert_eq!(keys.act(Key::Escape), Some(Act::Follow));

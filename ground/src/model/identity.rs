@@ -115,9 +115,6 @@ impl Model {
 
 // A vehicle with another autopilot: it is shown as what its standard messages say, and never armed or started from here.
 
-/// The most names of modes that are kept; PX4 and ArduPilot have about thirty.
-const MODES_MAX: usize = 64;
-
 /// What another autopilot tells in standard messages.
 #[derive(Debug, Clone)]
 pub struct Foreign {
@@ -125,8 +122,6 @@ pub struct Foreign {
     pub mavtype: MavType,
     pub armed: bool,
     custom_mode: u32,
-    /// `AVAILABLE_MODES`: names by number.
-    modes: BTreeMap<u32, String>,
     /// The last heartbeat.
     pub heard_at: Duration,
     /// The newest text of each message, with its name.
@@ -137,13 +132,12 @@ impl Foreign {
     pub(crate) fn of(beat: &HEARTBEAT_DATA, before: Option<Self>, now: Duration) -> Self {
         let same =
             before.filter(|before| (before.autopilot, before.mavtype) == (beat.autopilot, beat.mavtype));
-        let (modes, told) = same.map_or_else(Default::default, |same| (same.modes, same.told));
+        let told = same.map_or_else(BTreeMap::new, |same| same.told);
         Self {
             autopilot: beat.autopilot,
             mavtype: beat.mavtype,
             armed: beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
             custom_mode: beat.custom_mode,
-            modes,
             heard_at: now,
             told,
         }
@@ -153,15 +147,6 @@ impl Foreign {
     pub(crate) fn hear(&mut self, message: &MavMessage, now: Duration) {
         let degrees = |rad: f32| f64::from(rad).to_degrees();
         let (name, text) = match message {
-            MavMessage::AVAILABLE_MODES(mode) if self.modes.len() < MODES_MAX => {
-                let end = mode.mode_name.iter().position(|byte| *byte == 0).unwrap_or(mode.mode_name.len());
-                self.modes.insert(mode.custom_mode, protocol::text::printable(&mode.mode_name[..end]));
-                return;
-            }
-            MavMessage::CURRENT_MODE(mode) => {
-                self.custom_mode = mode.custom_mode;
-                return;
-            }
             MavMessage::ATTITUDE(data) => {
                 let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(degrees);
                 ("attitude", format!("roll {roll:.0} deg, pitch {pitch:.0} deg, yaw {yaw:.0} deg"))
@@ -205,10 +190,9 @@ impl Foreign {
         format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
     }
 
-    /// The name of its mode, if it tells it; else its number.
+    /// The number of its mode.
     pub fn mode(&self) -> String {
-        let told = self.modes.get(&self.custom_mode).filter(|name| !name.is_empty());
-        told.cloned().unwrap_or_else(|| format!("mode {}", self.custom_mode))
+        format!("mode {}", self.custom_mode)
     }
 
     /// What `MAV_CMD_DO_FLIGHTTERMINATION` would do there.

@@ -17,7 +17,7 @@ pub enum Page {
     Descent,
     /// The burn: side view, controller, actuators.
     Landing,
-    /// The verdict, greatest values and timeline of the flight.
+    /// The verdict, limits and greatest values of the flight.
     Review,
     /// The link's figures and the age of every message.
     Link,

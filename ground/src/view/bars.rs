@@ -25,24 +25,15 @@ const NARROW: u16 = 44;
 
 /// What a thick line and dots mean, at the right end of a title.
 pub fn flown_legend(theme: Theme) -> Line<'static> {
-    let ink = |ink| theme.ground().fg(theme.ink(ink));
-    Line::from(vec![
-        Span::styled(" ━", ink(Ink::Measured)),
-        theme.label(" flown "),
-        Span::styled("┄", ink(Ink::Predicted)),
-        theme.label(" predicted "),
-    ])
+    legend([" ━", " flown "], ["┄", " predicted "], theme)
 }
 
-/// What the bars of fins and gimbal mean.
-fn legend(theme: Theme) -> Line<'static> {
-    let ink = |ink| theme.ground().fg(theme.ink(ink));
-    Line::from(vec![
-        Span::styled(" ▄", ink(Ink::Measured)),
-        theme.label(" is "),
-        Span::styled("│", ink(Ink::Predicted)),
-        theme.label(" asked "),
-    ])
+/// Two marks with their words.
+fn legend(measured: [&'static str; 2], predicted: [&'static str; 2], theme: Theme) -> Line<'static> {
+    let of = |[mark, words]: [&'static str; 2], ink| {
+        [Span::styled(mark, theme.ground().fg(theme.ink(ink))), theme.label(words)]
+    };
+    Line::from([of(measured, Ink::Measured), of(predicted, Ink::Predicted)].concat())
 }
 
 /// A bar in one row from one share of it to another, with a mark across it. Half a row high, so that rows stay apart.
@@ -125,7 +116,8 @@ fn limit(
 
 /// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
 pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let area = pages::framed("fins, gimbal", legend(theme), theme, frame, area);
+    let area =
+        pages::framed("fins, gimbal", legend([" ▄", " is "], ["│", " asked "], theme), theme, frame, area);
     let (fins, gimbal) = (model.vehicle.fins(), model.vehicle.gimbal());
     let limit_deg = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit_deg = limit_deg.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(20.0);

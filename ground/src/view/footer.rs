@@ -17,7 +17,7 @@ use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_on_p
 /// alarm rings, a message has a row of its own.
 pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) -> Vec<Line<'static>> {
     let columns = usize::from(columns);
-    let message = top_lines::message(model, theme, now);
+    let message = top_lines::message(model, theme, now, columns);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
     if let Some(alarm) = alarm_text(model, theme, now, columns).filter(|_| rings) {
         // In flight nothing moves for it.

@@ -232,7 +232,7 @@ fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     }
 }
 
-/// Draws the band of a flight, with a line under its number, and returns the area below.
+/// Draws the band of a flight, with a line under its number, and returns the area below; nothing while large words stand there.
 pub fn draw_flight_band(
     model: &Model,
     below: Line<'static>,
@@ -241,6 +241,9 @@ pub fn draw_flight_band(
     frame: &mut Frame,
     area: Rect,
 ) -> Rect {
+    if replaces_band(model, now) {
+        return area;
+    }
     let (main, others) = of_flight(model, now);
     draw_band(model, (&main, below, &others), theme, now, frame, area)
 }

@@ -27,17 +27,13 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::{Act, CommandKind, Model, TextEntry};
+use crate::model::{CommandKind, Model};
 pub use theme::{Ink, TextRole, Theme};
 use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
-
-pub fn view(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) {
-    draw(model, theme, now, frame);
-}
 
 /// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
@@ -131,16 +127,16 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     pictures.filter(|_| !is_covered)
 }
 
-// The layout for terminals smaller than 80x22: plain lines, the most important first.
+// The layout for terminals smaller than 80x22: plain lines, the most important first. Of a page of panels little is left.
 
 /// With fewer rows an open dialog replaces the line of countdown and link.
 const DIALOG_ROWS: u16 = 8;
-/// From this many rows on, the page name has a line of its own.
-const NAMED_ROWS: u16 = 10;
+/// From this many rows on, the last one has the keys.
+const KEYS_ROWS: u16 = 10;
 
 /// Draws the lines that fit.
 pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let mut lines = vec![top_lines::identity_line(model, theme, now)];
+    let mut lines = vec![top_lines::identity(model, theme, now)];
     lines.extend(
         headline::banner(model, now).map(|words| theme.line(format!(" {}", words.sentence()), words.role)),
     );
@@ -157,39 +153,30 @@ pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
         lines.push(Line::from(line));
     }
     lines.push(compact_abort(model, theme, now, area.width));
+    let keys = u16::from(open.is_none() && area.height >= KEYS_ROWS);
+    if open.is_none() {
+        let hands_off = top_lines::hands_off(model, theme, now);
+        let columns = usize::from(area.width);
+        let message = top_lines::message(model, theme, now, columns).filter(|_| hands_off.is_none());
+        let next = status_lines::next_event(model, now, false);
+        let ready = top_lines::readiness(model, now).filter(|_| next.is_none());
+        let ready = ready.map(|(words, role)| theme.line(format!(" {words}"), role));
+        let alarm = status_lines::alarm_text(model, theme, now, columns);
+        lines.extend(hands_off);
+        lines.extend(next.map(|words| theme.line(words, TextRole::Title)));
+        lines.extend(alarm.filter(|_| model.playing.is_none()));
+        lines.extend(message.or(ready));
+    }
+    let [top, page, keys] = stacked(area, [Length(lines.len() as u16), Fill(1), Length(keys)]);
+    draw_lines(frame, top, &lines);
     if let Some((_, text)) = open {
-        draw_lines(frame, area, &lines);
-        let fixed = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(area.height);
-        let below = Rect { y: area.y + fixed, height: area.height - fixed, ..area };
-        frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), below);
-        return;
+        return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), page);
     }
-    lines.extend(top_lines::hands_off(model, theme, now));
-    lines.extend(status_lines::next_event_line(model, theme, now));
-    let entry = model.pages.entry.as_ref();
-    lines.extend(model.playing.as_ref().map(|playing| status_lines::replay_line(playing, entry, theme)));
-    if model.playing.is_none() {
-        lines.extend(status_lines::alarm_text(model, theme, now, usize::from(area.width)));
-    }
-    let page = model.page();
-    let named = u16::from(area.height >= NAMED_ROWS);
-    let taken = u16::try_from(lines.len()).unwrap_or(u16::MAX).saturating_add(named);
-    let room = Rect { height: area.height.saturating_sub(taken), ..area };
-    let mut body = pages::lines(model, page, theme, now, room);
-    body.truncate(usize::from(room.height));
-    lines.extend(if matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
-        dialog::palette_lines(model, theme, now, usize::from(room.height).saturating_sub(1))
-    } else {
-        body
-    });
-    draw_lines(frame, area, &lines);
-    if named > 0 {
-        let held = if model.pages.held.is_some() { "HELD, 0 follows" } else { "auto" };
-        let key = model.settings.keys.name(Act::Show(page.keyed()));
-        let text = format!(" [{key}{}] 1-9 {held}  ? help", page.name());
-        let last = Rect { y: area.bottom().saturating_sub(1), height: 1, ..area };
-        frame.render_widget(theme.line(text, TextRole::Label), last);
-    }
+    let palette = dialog::palette_lines(model, theme, now, usize::from(page.height).saturating_sub(1));
+    let lines =
+        if palette.is_empty() { pages::lines(model, model.page(), theme, now, page) } else { palette };
+    draw_lines(frame, page, &lines);
+    footer::draw_keys(model, theme, now, frame, keys);
 }
 
 fn compact_abort(model: &Model, theme: Theme, now: Duration, columns: u16) -> Line<'static> {

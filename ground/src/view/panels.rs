@@ -17,7 +17,7 @@ use crate::model::{
 /// Title and rows: altitude, speeds and attitude; after the loss of the link the predicted position.
 pub fn flight_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     if is_lost(model, now) {
-        return (LOST_TITLE, lost_rows(model, theme, now));
+        return ("PREDICTED, not heard", lost_rows(model, theme, now));
     }
     ("Flight", flight_rows(model, theme, now))
 }
@@ -112,79 +112,40 @@ fn status_role(status: TdSolverStatus) -> TextRole {
 
 /// One row for each of the four fins.
 pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let fins = model.vehicle.fins();
-    let (mark, role) = fins.map_or((" ", TextRole::Label), |fins| age_mark(&fins, now));
-    (0..4)
-        .map(|k| {
-            let degrees = |pick: fn(&Deflection) -> f64| {
-                fins.map_or_else(|| "--".to_owned(), |fins| fixed(pick(&fins.value[k]).to_degrees(), 1))
-            };
-            Line::from(vec![
-                theme.label(format!(" fin {} ", k + 1)),
-                theme.span(
-                    format!(
-                        "{mark}{:>6} | {:>5}",
-                        degrees(|fin| fin.commanded_rad),
-                        degrees(|fin| fin.measured_rad)
-                    ),
-                    role,
-                ),
-                theme.label(" deg"),
-            ])
-        })
-        .collect()
+    let fin = |k: usize| model.vehicle.fins().map(|fins| fins.map(|fins| fins[k]));
+    (0..4).map(|k| deflection(&format!(" fin {} ", k + 1), fin(k), " deg", theme, now)).collect()
 }
 
 /// A row for each of the gimbal's two planes, with its stop.
 pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let gimbal = model.vehicle.gimbal();
     let limit = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
     let stop = limit.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
-    let (mark, role) = gimbal.map_or((" ", TextRole::Label), |gimbal| age_mark(&gimbal, now));
     let plane = |name: &str, pick: fn(&Gimbal) -> Deflection| {
-        let degrees = |pick_angle: fn(&Deflection) -> f64| {
-            gimbal.map_or_else(
-                || "--".to_owned(),
-                |gimbal| fixed(pick_angle(&pick(&gimbal.value)).to_degrees(), 1),
-            )
-        };
-        let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
-        Line::from(vec![
-            theme.label(format!(" {name:<5}")),
-            theme.span(format!("{mark}{commanded:>6} | {measured:>5}"), role),
-            theme.label(format!("{stop}°")),
-        ])
+        let angle = model.vehicle.gimbal().map(|gimbal| gimbal.map(pick));
+        deflection(name, angle, &format!("{stop}°"), theme, now)
     };
-    vec![plane("pitch", |g| g.pitch), plane("yaw", |g| g.yaw)]
+    vec![plane(" pitch", |g| g.pitch), plane(" yaw  ", |g| g.yaw)]
 }
 
-// The panel of the touchdown, predicted or reached, with its limits.
-
-/// Title and rows: the verdict once there is one, before that the prediction. The last row says it in words.
-pub fn touchdown_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    if let Some(verdict) = model.vehicle.verdict() {
-        let mut rows = limit_lines(model, &verdict.value.touchdown, theme, " ", TextRole::Plain);
-        rows.extend(ending_role(model, now).map(|(ending, role)| theme.line(ending.word(), role)));
-        return ("Touchdown", rows);
-    }
-    let Some(prediction) = model.vehicle.prediction else {
-        return ("Touchdown predicted", vec![theme.line("no prediction", TextRole::Label)]);
+/// An angle as commanded and as measured.
+fn deflection(
+    name: &str,
+    angle: Option<Sample<Deflection>>,
+    unit: &str,
+    theme: Theme,
+    now: Duration,
+) -> Line<'static> {
+    let (mark, role) = angle.map_or((" ", TextRole::Label), |angle| age_mark(&angle, now));
+    let degrees = |pick: fn(&Deflection) -> f64| {
+        angle.map_or_else(|| "--".to_owned(), |angle| fixed(pick(&angle.value).to_degrees(), 1))
     };
-    let (mark, role) = age_mark(&prediction, now);
-    let mut rows = limit_lines(model, &prediction.value.touchdown, theme, mark, role);
-    let in_s = model.vehicle.touchdown_in_s(now);
-    let in_s = in_s.map_or_else(|| "--".to_owned(), |left| fixed(left.value, 1));
-    rows.push(Line::from(vec![
-        theme.label("in      "),
-        theme.span(format!("{mark}{in_s:>6}"), role),
-        theme.label(" s"),
-    ]));
-    rows.push(match prediction.value.touchdown.violations() {
-        None => theme.line("inside the envelope", TextRole::Good),
-        Some(names) => theme.line(format!("OUTSIDE {names}"), TextRole::Alarm),
-    });
-    ("Touchdown predicted", rows)
+    let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
+    Line::from(vec![
+        theme.label(name.to_owned()),
+        theme.span(format!("{mark}{commanded:>6} | {measured:>5}"), role),
+        theme.label(unit.to_owned()),
+    ])
 }
 
 /// How the flight ended.
@@ -197,26 +158,6 @@ pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
         Ending::Upright | Ending::Hard | Ending::Lost => TextRole::Alarm,
     };
     Some((ending, role))
-}
-
-fn limit_lines(
-    model: &Model,
-    touchdown: &Touchdown,
-    theme: Theme,
-    mark: &'static str,
-    role: TextRole,
-) -> Vec<Line<'static>> {
-    let rows = limit_rows(touchdown, model.vehicle.limits().as_ref());
-    let line = |row: &LimitRow| {
-        let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
-        Line::from(vec![
-            theme.span(word, word_role),
-            theme.label(format!(" {:<8}", row.name)),
-            theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
-            theme.label(format!(" {} {}", row.unit, theme.either_side(&row.limit))),
-        ])
-    };
-    rows.iter().map(line).collect()
 }
 
 // Each limit of a touchdown with the value reached, as text for the screens and for the closing lines.
@@ -272,8 +213,6 @@ pub(super) fn decimals(value: f64) -> usize {
 }
 
 // The panel of the predicted position after the link is lost in flight.
-
-pub const LOST_TITLE: &str = "PREDICTED, not heard";
 
 /// Whether the position of a vehicle in flight is stale.
 pub fn is_lost(model: &Model, now: Duration) -> bool {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
+use protocol::link_stats::LinkFigures;
 use ratatui::text::{Line, Span};
 
 use super::{STALE_MARK, TextRole, Theme, fixed, shortest};
@@ -22,31 +23,17 @@ fn is_large(page: Page, phase: TdPhase) -> bool {
     timed && matches!(page, Page::Ascent | Page::Descent | Page::Landing)
 }
 
-/// The same line for the row of the state.
-pub fn next_event_beside(model: &Model, now: Duration) -> Option<String> {
+/// The next event of a flight; `None` on the pad, where the crew decides. Without its time if that is large `beside` it.
+pub fn next_event(model: &Model, now: Duration, beside: bool) -> Option<String> {
     let phase = model.vehicle.phase()?;
     let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
-    let left = if is_large(model.page(), phase.value) { String::new() } else { left };
+    let left = if beside && is_large(model.page(), phase.value) { String::new() } else { left };
     let mark = if phase.is_stale(now) { STALE_MARK } else { " " };
     Some(format!(" next{mark}{event}{left}{rest}"))
 }
 
 /// A vehicle that is slower than this is not falling, m/s.
 const FALLS_M_S: f64 = 0.5;
-
-/// The next event of a flight; `None` on the pad, where the crew decides.
-pub fn next_event_line(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
-    let phase = model.vehicle.phase()?;
-    let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
-
-    let stale = phase.is_stale(now);
-    let (mark, role) = if stale { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Title) };
-    Some(Line::from(vec![
-        theme.label(" next"),
-        theme.span(format!("{mark}{event}{left}"), role),
-        theme.span(rest, if stale { TextRole::Stale } else { TextRole::Plain }),
-    ]))
-}
 
 /// In how long it is at apogee, by its climb.
 fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
@@ -125,15 +112,12 @@ fn within(left_s: Option<f64>) -> String {
         .map_or_else(String::new, |left_s| format!(" in {} s", fixed(left_s, 1)))
 }
 
-// One line about the link and the log: rates, loss, rejected frames, radio, whether the log records.
+// One line about the link: rates, loss, rejected frames, each of several links, radio.
 
 /// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
 pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     if let Some(why) = &model.link.trouble {
         return theme.line(format!(" LINK DOWN {why}"), TextRole::Alarm);
-    }
-    if model.link.reports.len() > 1 {
-        return several_links(model, theme, now, columns);
     }
     let figures = model.link.stats.figures(now);
     let round_trip = match model.link.round_trip {
@@ -141,7 +125,7 @@ pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         None => "--".to_owned(),
     };
     let loss = model.link.loss(now);
-    let loss_role = if loss.is_some_and(|loss| loss > 0.05) { TextRole::Caution } else { TextRole::Plain };
+    let loss_role = |loss: Option<f64>| if loss > Some(0.05) { TextRole::Caution } else { TextRole::Plain };
     let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
     let rejected =
         model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
@@ -151,9 +135,19 @@ pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let refused = (rejected > 0 || model.link.send_drops > 0)
         .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), TextRole::Caution));
     // The most important parts first, so that they fit into the narrowest panel.
-    let mut pieces = vec![received, span(format!("  loss {}", percent(loss)), loss_role)];
-    pieces.push(log_state(model, theme));
+    let mut pieces = vec![received, span(format!("  loss {}", percent(loss)), loss_role(loss))];
     pieces.extend(refused);
+    let several = model.link.reports.iter().filter(|_| model.link.reports.len() > 1);
+    pieces.extend(several.map(|report| {
+        let kind = report.name.split(':').next().unwrap_or_default();
+        if report.trouble.is_some() {
+            return span(format!("  {kind} DOWN"), TextRole::Alarm);
+        }
+        let LinkFigures { rx_bytes_s, rx_frames_s, loss, .. } = report.figures;
+        let known = (rx_frames_s > 0.0).then_some(loss);
+        let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+        span(format!("  {kind} {rx_bytes_s:.0}{capacity} B/s {}", percent(known)), loss_role(known))
+    }));
     pieces.push(span(format!("  rtt {round_trip}"), TextRole::Plain));
     pieces.extend(radio(model, now).map(|words| span(words, TextRole::Plain)));
     pieces.push(span(format!("  tx {:.0} B/s", figures.tx_bytes_s), TextRole::Plain));
@@ -186,45 +180,6 @@ fn signal_or_unknown(value: u8) -> String {
     if value == u8::MAX { "--".to_owned() } else { value.to_string() }
 }
 
-/// The line for several links: the loss over all of them, then each link as far as there is room.
-fn several_links(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    let all = model.link.loss(now);
-    let role = |loss: f64| if loss > 0.05 { TextRole::Caution } else { TextRole::Plain };
-    let mut spans = vec![
-        theme.span(
-            format!(" {} links, loss {}", model.link.reports.len(), percent(all)),
-            role(all.unwrap_or(0.0)),
-        ),
-        log_state(model, theme),
-    ];
-    if let Some(refused) = model.link.signing.map(|signing| signing.rejected()).filter(|refused| *refused > 0)
-    {
-        spans.push(theme.span(format!("  refused {refused}"), TextRole::Caution));
-    }
-    let mut used: usize = spans.iter().map(Span::width).sum();
-    for report in &model.link.reports {
-        let kind = report.name.split(':').next().unwrap_or_default();
-        let span = if report.trouble.is_some() {
-            theme.span(format!("  {kind} DOWN"), TextRole::Alarm)
-        } else {
-            let (rate, loss) = (report.figures.rx_bytes_s, report.figures.loss);
-            let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-            let known = (report.figures.rx_frames_s > 0.0).then_some(loss);
-            let words = format!("  {kind} {rate:.0}{capacity} B/s {}", percent(known));
-            theme.span(words, role(loss))
-        };
-        used += span.width();
-        if used > columns {
-            break;
-        }
-        spans.push(span);
-    }
-    if let Some(words) = radio(model, now).filter(|words| used + words.len() <= columns) {
-        spans.push(theme.plain(words));
-    }
-    Line::from(spans)
-}
-
 /// Whether the log records, and for how long.
 pub fn recording(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     if model.settings.role == Role::Replaying {
@@ -249,21 +204,6 @@ pub fn rates(model: &Model, now: Duration) -> String {
         .link_capacity_bytes_s
         .map_or_else(String::new, |most| format!("/{:.1}", f64::from(most) / 1e3));
     format!("{rate_kb_s:.1}{capacity} kB/s, {} lost  ", percent(model.link.loss(now)))
-}
-
-fn log_state(model: &Model, theme: Theme) -> Span<'static> {
-    let (words, role) = if model.settings.role == Role::Replaying {
-        ("  replay".to_owned(), TextRole::Plain)
-    } else if model.settings.log_path.is_none() {
-        ("  no log".to_owned(), TextRole::Caution)
-    } else if model.log.failed {
-        ("  STATION LOG FAILED".to_owned(), TextRole::Alarm)
-    } else if model.log.dropped > 0 {
-        (format!("  log runs, {} DROPPED", model.log.dropped), TextRole::Caution)
-    } else {
-        ("  log ok".to_owned(), TextRole::Good)
-    };
-    theme.span(words, role)
 }
 
 // The alarm line above the page names, with the foremost alarm or the newest event.

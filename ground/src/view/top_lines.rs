@@ -40,14 +40,7 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     right.push(status_lines::recording(model, theme, now));
     let right = Line::from(right);
     let [left_area, right_area] = side_by_side(area, [Fill(1), Length(right.width() as u16)]);
-    let left = [
-        mode(model, theme),
-        Span::raw(" "),
-        vehicle(model, theme, now),
-        Span::raw(" "),
-        crew(model, theme, now),
-    ];
-    draw_line(frame, left_area, Line::from(left.to_vec()));
+    draw_line(frame, left_area, identity(model, theme, now));
     draw_line(frame, right_area, right);
 }
 
@@ -108,7 +101,7 @@ const SAID_SHOWN: Duration = Duration::from_secs(10);
 fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let seen = status_lines::alarm_text(model, theme, now, columns);
     let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
-    let next = || status_lines::next_event_beside(model, now);
+    let next = || status_lines::next_event(model, now, true);
     // The Pad page says it itself; there it is what has just been said.
     let is_pad = model.page() == Page::Pad;
     let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
@@ -139,19 +132,11 @@ fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, are
     draw_line(frame, key_area, Line::from(key));
 }
 
-/// The same for narrow screens.
-pub fn identity_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(words) = doubt(model, now) {
-        return Line::from(vec![mode(model, theme), theme.span(format!(" {words}"), TextRole::Alarm)]);
-    }
-    let number = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
-    let system = model.settings.vehicle.system_id;
-    Line::from(vec![
-        mode(model, theme),
-        theme.plain(format!(" {system} {number} ")),
-        crew(model, theme, now),
-        theme.label(format!(" {}", model.settings.link_name)),
-    ])
+/// Who is seen, and who commands.
+pub fn identity(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let space = Span::raw(" ");
+    let [vehicle, crew] = [vehicle, crew].map(|of| of(model, theme, now));
+    Line::from(vec![mode(model, theme), space.clone(), vehicle, space, crew])
 }
 
 /// A vehicle counts as real unless it has always reported to be simulated.
@@ -373,7 +358,7 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
         return theme.line(format!(" ENTER ABORTS (or Ctrl-X): {effect}"), TextRole::Alarm);
     }
     if let Some(track) = model.commands.of(CommandKind::Abort) {
-        return command_facts_within(track, columns, theme, now);
+        return command_facts(track, columns, theme, now);
     }
     let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
@@ -437,18 +422,8 @@ fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
     Some(theme.line(words, TextRole::Alarm))
 }
 
-/// The three facts of a command: commanded, acknowledged, observed.
-pub fn command_facts(track: &TrackedCommand, theme: Theme, now: Duration) -> Line<'static> {
-    command_facts_within(track, usize::MAX, theme, now)
-}
-
-/// The same in as many columns: first its time is left out.
-pub fn command_facts_within(
-    track: &TrackedCommand,
-    columns: usize,
-    theme: Theme,
-    now: Duration,
-) -> Line<'static> {
+/// The three facts of a command, in as many columns: commanded, acknowledged, observed. First its time is left out.
+fn command_facts(track: &TrackedCommand, columns: usize, theme: Theme, now: Duration) -> Line<'static> {
     // Other names are longer.
     let room = "DISARM".len().saturating_sub(track.kind.name().len());
     let at_s = track.commanded_at.as_secs_f64();
@@ -497,13 +472,14 @@ fn refusal(result: u8) -> &'static str {
 }
 
 /// What the row above the keys says instead of the flight: that a check moves the surfaces, a command, or a hold.
-pub fn message(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
+pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
     let shown = latest.filter(|track| !answered_long_ago(track, now) || open_command(model, now).is_some());
+    let facts = |track| command_facts(track, columns, theme, now);
     hands_off(model, theme, now)
-        .or_else(|| open_command(model, now).map(|track| command_facts(track, theme, now)))
+        .or_else(|| open_command(model, now).map(facts))
         .or_else(|| hold(model, theme))
-        .or_else(|| shown.map(|track| command_facts(track, theme, now)))
+        .or_else(|| shown.map(facts))
 }
 
 fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {

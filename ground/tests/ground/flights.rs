@@ -16,7 +16,7 @@ use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
 use simulated_vehicle::fly::load_flight;
 use simulated_vehicle::vehicle::Vehicle;
 
-use crate::rig::{MONO, settings};
+use crate::rig::settings;
 
 /// Longer than any flight of mk2, s.
 const LONGEST_S: f64 = 120.0;
@@ -121,7 +121,7 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
                 continue;
             }
             carried_since.get_or_insert(now);
-            let line = status_lines::next_event_line(&model, MONO, now).expect("it flies").to_string();
+            let line = status_lines::next_event(&model, now, false).expect("it flies");
             let (_, rest) = line.split_once("ground in ").unwrap_or_else(|| panic!("{line}"));
             let told_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
             let flown_s = down.saturating_sub(now).as_secs_f64();

@@ -42,7 +42,7 @@ fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     };
     rig.msg(links(None));
     let screen = rig.screen(140, 40);
-    assert!(screen.contains("2 links") && screen.contains("serial 1590/5760 B/s 12.5 %"), "{screen}");
+    assert!(screen.contains("all links") && screen.contains("serial 1590/5760 B/s 12.5 %"), "{screen}");
     rig.msg(links(Some("unplugged")));
     assert!(rig.screen(140, 40).contains("serial DOWN"));
     rig.msg(Msg::OneLinkDown("/dev/x: unplugged".to_owned()));

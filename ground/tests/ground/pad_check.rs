@@ -156,6 +156,7 @@ fn the_letter_ends_a_check_of_which_nothing_was_heard() {
         "{}",
         rig.screen(80, 24)
     );
+    assert!(rig.screen(20, 5).contains(" HANDS OFF: a check"), "{}", rig.screen(20, 5));
     rig.key(Key::Char('X'));
     assert_eq!(checks(&mut rig), [0.0], "no dialog, and no second start");
 }

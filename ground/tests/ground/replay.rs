@@ -9,7 +9,7 @@ use ground::model::{Page, Role, Settings};
 use ground::replay::Player;
 use ground::replay::recording::{RecordedEvent, Recording, RecordingError};
 use ground::update::{Action, Msg};
-use ground::view::view;
+use ground::view::draw;
 use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TdPhase};
 use protocol::frame::Encoder;
 use protocol::identity::{GROUND, VEHICLE};
@@ -74,7 +74,11 @@ fn player() -> Player {
 
 fn drawn(player: &Player) -> Terminal<TestBackend> {
     let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a test terminal");
-    terminal.draw(|frame| view(&player.model, MONO, player.position(), frame)).expect("drawing in memory");
+    terminal
+        .draw(|frame| {
+            draw(&player.model, MONO, player.position(), frame);
+        })
+        .expect("drawing in memory");
     terminal
 }
 
@@ -157,7 +161,11 @@ fn the_links_figures_are_the_recorded_ones() {
     player.on_key(Key::Char('8'));
     let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(80, 24)).unwrap();
     let now = player.position();
-    terminal.draw(|frame| ground::view::view(&player.model, MONO, now, frame)).unwrap();
+    terminal
+        .draw(|frame| {
+            draw(&player.model, MONO, now, frame);
+        })
+        .unwrap();
     let screen = terminal.backend().to_string();
     assert!(screen.contains("a recorded flight") && !screen.contains("recording"), "{screen}");
 }

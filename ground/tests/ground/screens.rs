@@ -250,7 +250,7 @@ fn a_quantity_has_one_value_on_a_screen() {
     rig.run(0.3);
     rig.state(4.0, 125.5, -0.6, -21.5, 88.0);
     let small = rig.screen(40, 12);
-    assert!(small.contains("height         125.5 m"), "{small}");
+    assert!(small.contains("altitude      125.50 m"), "{small}");
     assert!(small.contains(" next IGNITION in 3.1 s"), "{small}");
     assert!(rig.screen(140, 45).contains("ignite in        3.1 s"), "{}", rig.screen(140, 45));
     rig.key(Key::Char('v'));

@@ -216,6 +216,7 @@ fn an_abort_that_a_hung_station_has_not_sent_is_the_largest_word_of_every_page()
             assert!(screen.lines().nth(3).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
             assert!(screen.lines().nth(4).is_some_and(|row| row.contains('▀')), "{digit} large: {screen}");
         }
+        assert!(rig.screen(20, 5).contains("ABORT NOT SENT"), "{}", rig.screen(20, 5));
         hangs(&mut rig, 1);
         assert!(rig.screen(120, 36).contains("ALARM ABORT NOT SENT: the station hangs"));
         // The station goes on, and takes it.

@@ -6,8 +6,8 @@ use ground::app::terminal::Thrifty;
 use ground::key::Key;
 use ground::model::{Seat, Settings};
 use ground::update::Msg;
+use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
-use ground::view::view;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use ratatui::{TerminalOptions, Viewport, layout::Rect};
@@ -26,7 +26,11 @@ fn on_a_terminal(rig: &mut Rig, keys: &[Key]) -> (Vec<String>, Vec<String>) {
     let mut terminal = Terminal::with_options(backend, TerminalOptions { viewport }).expect("a terminal");
     for key in keys {
         rig.key(*key);
-        terminal.draw(|frame| view(&rig.model, theme, rig.now, frame)).expect("a frame");
+        terminal
+            .draw(|frame| {
+                draw(&rig.model, theme, rig.now, frame);
+            })
+            .expect("a frame");
     }
     drop(terminal);
     let size = |number| NonZero::new(number).expect("a terminal has a size");

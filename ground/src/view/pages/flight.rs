@@ -10,7 +10,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use super::{Room, Side, attitude, columns, events, framed, rows, table};
-use crate::model::{Model, Motion, Sample, words};
+use crate::model::{Model, Motion, Page, Sample, words};
 use crate::view::pictures::height::draw_height;
 use crate::view::pictures::map::draw_map;
 use crate::view::{TextRole, Theme, age_mark, bars, fixed, headline, panels, row, text_row};
@@ -22,23 +22,16 @@ pub const LOST_COLUMNS: u16 = 28;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
 
-/// Draws a page with these values. Returns where its pictures are.
-pub fn draw_flying(
-    model: &Model,
-    (title, values): (&str, Vec<Line<'static>>),
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) -> Rect {
+/// Draws the page of the ascent or of the descent. Returns where its pictures are.
+pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
+    let (title, values) = match model.page() {
+        Page::Ascent => ("ascent", ascent_values(model, theme, now)),
+        _ => ("descent", descent_values(model, theme, now)),
+    };
     let room = Room::of(frame.area());
     // What the newest report means, under the number.
     let below = values.first().cloned().unwrap_or_default();
-    let area = if headline::replaces_band(model, now) {
-        area
-    } else {
-        headline::draw_flight_band(model, below, theme, now, frame, area)
-    };
+    let area = headline::draw_flight_band(model, below, theme, now, frame, area);
     if room == Room::Small {
         let right = if panels::is_lost(model, now) { LOST_COLUMNS } else { SIDE_COLUMNS };
         let [left, middle, right] = columns(area, [Fill(5), Fill(3), Length(right)]);
@@ -89,29 +82,7 @@ pub fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mu
     attitude(model, Side::East, theme, now, frame, east);
 }
 
-/// Adds height and vertical speed before the second value. After the loss of the link the prediction shows them.
-pub fn insert_height(lines: &mut Vec<Line<'static>>, model: &Model, theme: Theme, now: Duration) {
-    if panels::is_lost(model, now) {
-        return;
-    }
-    lines.insert(1, row(theme, "height", model.vehicle.height_m(), 1, "m", now));
-    lines.insert(2, row(theme, "vertical", model.vehicle.vertical_m_s(), 1, "m/s", now));
-}
-
 // The ascent page.
-
-pub fn draw_ascent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    let values = ascent_values(model, theme, now);
-    draw_flying(model, ("ascent", values), theme, now, frame, area)
-}
-
-/// For small screens: the values, with height and speed, which have no headline there.
-pub fn ascent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
-    lines.extend(ascent_values(model, theme, now));
-    insert_height(&mut lines, model, theme, now);
-    lines
-}
 
 /// The values, the most important first.
 fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
@@ -170,19 +141,6 @@ fn state_row(
 }
 
 // The descent page.
-
-pub fn draw_descent(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    let values = descent_values(model, theme, now);
-    draw_flying(model, ("descent", values), theme, now, frame, area)
-}
-
-/// For small screens: the values, with height and speed, which have no headline there.
-pub fn descent_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
-    lines.extend(descent_values(model, theme, now));
-    insert_height(&mut lines, model, theme, now);
-    lines
-}
 
 /// The values, the most important first.
 fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {

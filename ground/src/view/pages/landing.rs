@@ -9,7 +9,7 @@ use ratatui::text::Line;
 
 use super::flight::{LOST_COLUMNS, both_sides_or_lost, map, side_or_lost};
 use super::{Room, Side, columns, events, framed, rows, table};
-use crate::model::{Act, Model, RED_AFTER, words};
+use crate::model::{Act, Model, RED_AFTER};
 use crate::view::band::draw_band;
 use crate::view::pictures::height::{draw_height, draw_sink};
 use crate::view::{TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked};
@@ -22,11 +22,7 @@ const BELOW_ROWS: u16 = 10;
 pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let room = Room::of(frame.area());
     let below = panels::controller_rows(model, theme, now).into_iter().next().unwrap_or_default();
-    let area = if headline::replaces_band(model, now) {
-        area
-    } else {
-        headline::draw_flight_band(model, below, theme, now, frame, area)
-    };
+    let area = headline::draw_flight_band(model, below, theme, now, frame, area);
     if room == Room::Small {
         let middle = if panels::is_lost(model, now) { LOST_COLUMNS } else { 17 };
         let [left, middle, right] = columns(area, [Fill(1), Length(middle), Length(32)]);
@@ -57,10 +53,8 @@ fn sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rec
     draw_sink(model, theme, now, frame, inside);
 }
 
-// The review page after a flight: verdict, limits, greatest values and timeline.
+// The review page after a flight: verdict, limits and greatest values.
 
-/// Columns of a phase with its time.
-const TIMELINE_COLUMNS: usize = 24;
 /// Columns of the time before a finding.
 const FINDING_TIME_COLUMNS: usize = 10;
 
@@ -69,10 +63,7 @@ const FINDINGS_TITLE: &str = "what went wrong";
 /// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let room = Room::of(frame.area());
-    let (words, role) = match panels::ending_role(model, now) {
-        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
-        None => ("no verdict received yet".to_owned(), TextRole::Caution),
-    };
+    let (words, role) = ended(model, now);
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let keys = &model.settings.keys;
     let again = Act::ReplayFlight.works(model, now).then(|| {
@@ -133,31 +124,19 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     events(model, theme, frame, right);
 }
 
-/// The verdict, then limits and greatest values, then the timeline.
-pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let (title, mut limits) = panels::touchdown_panel(model, theme, now);
-    if model.vehicle.verdict().is_some() {
-        // In the first line it has more room.
-        limits.pop();
-    }
-    let (words, role) = match panels::ending_role(model, now) {
+/// How the flight ended, in words.
+fn ended(model: &Model, now: Duration) -> (String, TextRole) {
+    match panels::ending_role(model, now) {
         Some((ending, role)) => (ending.sentence(&model.vehicle), role),
         None => ("no verdict received yet".to_owned(), TextRole::Caution),
-    };
-    let mut lines = vec![theme.line(format!(" {words}"), role), theme.line(title, TextRole::Title)];
-    lines.extend(limits);
-    let found = findings(model, theme, columns);
-    if !found.is_empty() {
-        lines.push(theme.line(format!(" {FINDINGS_TITLE}"), TextRole::Title));
-        lines.extend(found);
     }
-    let (title, maxima) = maxima(model, theme, now);
-    lines.push(theme.line(format!(" {title}"), TextRole::Title));
-    lines.extend(unheard(model, now).map(|words| theme.line(format!(" {words}"), TextRole::Caution)));
-    lines.extend(maxima);
-    lines.push(theme.line(" Timeline", TextRole::Title));
-    lines.extend(timeline(model, theme, columns));
-    lines
+}
+
+/// The verdict, and what went wrong.
+pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let (words, role) = ended(model, now);
+    let verdict = theme.line(format!(" {words}"), role);
+    std::iter::once(verdict).chain(findings(model, theme, columns)).collect()
 }
 
 /// What the vehicle says went wrong, each with its T+; nothing if it has not said anything of it.
@@ -221,21 +200,4 @@ fn maxima(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line
         row("silence", extremes.silence_s, 1, "s"),
     ];
     (title, lines)
-}
-
-/// Each phase and when it began, several on a line.
-fn timeline(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
-    let entries: Vec<String> = model
-        .history
-        .timeline
-        .iter()
-        .map(|(phase, at)| format!("{:>8.1} {:<14}", at.as_secs_f64(), words::phase(*phase)))
-        .collect();
-    if entries.is_empty() {
-        return vec![theme.line("  nothing heard", TextRole::Label)];
-    }
-    entries
-        .chunks((columns / TIMELINE_COLUMNS).max(1))
-        .map(|chunk| theme.line(chunk.concat(), TextRole::Plain))
-        .collect()
 }

@@ -14,8 +14,6 @@ use crate::view::{STALE_MARK, TextRole, Theme, lists, seconds};
 
 /// A loss above this share is marked.
 const LOSS_MARKED: f64 = 0.05;
-/// From this width on the values are in columns.
-const TABLE_COLUMNS: usize = 76;
 const NAME_WIDTH: usize = 27;
 /// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
 const MESSAGE_CELL_WIDTH: usize = 40;
@@ -41,12 +39,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     let mut lines = vec![link_line(model, theme, now, columns)];
     lines.push(directions(model, theme, now));
     lines.extend(rejected(model, theme));
-    lines.push(heading(theme, columns));
+    lines.push(heading(theme));
     for report in reports(model, now) {
-        lines.push(report_line(&report, theme, columns));
-        lines.extend(
-            report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme, columns)),
-        );
+        lines.push(report_line(&report, theme));
+        lines.extend(report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme)));
     }
     lines.push(theme.line(
         format!(" Age and rate of what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
@@ -139,19 +135,15 @@ fn reports(model: &Model, now: Duration) -> Vec<LinkReport> {
     std::iter::once(all).chain(each).collect()
 }
 
-fn heading(theme: Theme, columns: usize) -> Line<'static> {
-    let text = if columns >= TABLE_COLUMNS {
-        format!(
-            " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
-            "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
-        )
-    } else {
-        " Over 10 s: rate, loss, age".to_owned()
-    };
+fn heading(theme: Theme) -> Line<'static> {
+    let text = format!(
+        " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
+        "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
+    );
     theme.line(text, TextRole::Title)
 }
 
-fn report_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'static> {
+fn report_line(report: &LinkReport, theme: Theme) -> Line<'static> {
     let name = &report.name;
     if let Some(why) = &report.trouble {
         return theme.line(format!(" {name} DOWN {why}"), TextRole::Alarm);
@@ -160,36 +152,26 @@ fn report_line(report: &LinkReport, theme: Theme, columns: usize) -> Line<'stati
     let loss = (rx_frames_s > 0.0).then_some(loss);
     let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
     let rx = format!("{rx_bytes_s:.0}{capacity}");
-    let loss_words = percent(loss);
-    let text = if columns >= TABLE_COLUMNS {
-        let copies = report.copies;
-        format!(
-            " {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx_bytes_s:>6.0}{rx_frames_s:>9.1}{loss_words:>8}{copies:>8}"
-        )
-    } else {
-        let kind = name.split(':').next().unwrap_or_default();
-        format!(" {kind} {rx} B/s {loss_words}")
-    };
+    let (loss_words, copies) = (percent(loss), report.copies);
+    let text = format!(
+        " {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx_bytes_s:>6.0}{rx_frames_s:>9.1}{loss_words:>8}{copies:>8}"
+    );
     theme.line(text, loss_role(loss))
 }
 
-fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme, columns: usize) -> Line<'static> {
+fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme) -> Line<'static> {
     let SourceFigures { source: address, age, rx_frames_s, loss } = *source;
     let loss = (rx_frames_s > 0.0).then_some(loss);
     let Address { system_id, component_id } = address;
     let name = format!("  {system_id}/{component_id} {}", what(address, vehicle));
     let (loss_words, age_words) = (percent(loss), seconds(age));
     let mark = if age > STALE_AFTER { STALE_MARK } else { " " };
-    let text = if columns >= TABLE_COLUMNS {
-        format!(
-            " {name:<NAME_WIDTH$.NAME_WIDTH$}{:>17}{rx_frames_s:>9.1}{loss_words:>8}{:>8}{:>9}",
-            "",
-            "",
-            format!("{mark}{age_words}")
-        )
-    } else {
-        format!(" {name} {rx_frames_s:.1}/s {loss_words} {mark}{age_words}")
-    };
+    let text = format!(
+        " {name:<NAME_WIDTH$.NAME_WIDTH$}{:>17}{rx_frames_s:>9.1}{loss_words:>8}{:>8}{:>9}",
+        "",
+        "",
+        format!("{mark}{age_words}")
+    );
     let role = if age > STALE_AFTER { TextRole::Stale } else { loss_role(loss) };
     theme.line(text, role)
 }

@@ -1,4 +1,4 @@
-//! The pages. Each gives its content as lines for small terminals; pages with panels also draw them.
+//! The pages: of panels, or of lines, which also a small terminal shows.
 
 pub mod checks;
 pub mod flight;
@@ -18,14 +18,13 @@ use ratatui::widgets::{Block, Borders};
 
 use super::band::Room;
 use super::pictures::attitude::{Side, draw_attitude, tilt_words};
-use super::{TextRole, Theme, draw_lines};
+use super::{TextRole, Theme, draw_lines, panels};
 use crate::model::{Model, Page};
 
 /// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     match model.page() {
-        Page::Ascent => return Some(flight::draw_ascent(model, theme, now, frame, area)),
-        Page::Descent => return Some(flight::draw_descent(model, theme, now, frame, area)),
+        Page::Ascent | Page::Descent => return Some(flight::draw_flying(model, theme, now, frame, area)),
         Page::Landing => return Some(landing::draw_landing(model, theme, now, frame, area)),
         Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
         Page::Review => landing::draw_review(model, theme, now, frame, area),
@@ -40,16 +39,17 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
     None
 }
 
-/// The page as lines, the most important first.
+/// The page as lines. Of a page of panels it is what must be seen where there is no room for them.
 pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match page {
-        Page::Pad => match model.vehicle.as_foreign() {
-            Some(vehicle) => pad::foreign_lines(model, vehicle, theme, now, (columns, rows)),
-            None => pad::pad_lines(model, theme, now),
-        },
-        Page::Ascent => flight::ascent_lines(model, theme, now),
-        Page::Descent => flight::descent_lines(model, theme, now),
+        Page::Pad if let Some(vehicle) = model.vehicle.as_foreign() => {
+            pad::foreign_lines(model, vehicle, theme, now, (columns, rows))
+        }
+        Page::Pad if model.pages.checklist && model.checklist.is_some() => {
+            super::lists::checklist_rows(model, theme, now, (columns, rows))
+        }
+        Page::Pad => pad::checks(model, theme, now),
         Page::Review => landing::review_lines(model, theme, now, columns),
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
@@ -58,7 +58,9 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
-        Page::Landing | Page::Path | Page::Values | Page::Plot => plots::values_lines(model, theme, now),
+        Page::Ascent | Page::Descent | Page::Landing | Page::Path | Page::Values | Page::Plot => {
+            panels::flight_panel(model, theme, now).1
+        }
         Page::Help => lists::help_lines(model, theme, now),
     }
 }

@@ -20,9 +20,8 @@ use crate::view::{
     top_lines,
 };
 
-/// Columns and rows of the checks and of the checklist.
+/// Columns of the checks.
 const CHECK_COLUMNS: u16 = 49;
-const CHECK_ROWS: u16 = 16;
 /// Columns of the steps on a small and on a larger screen.
 const STEP_COLUMNS: [u16; 2] = [30, 38];
 /// Rows of the panels under the pictures.
@@ -150,36 +149,8 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
-/// Failing checks first, because a small screen must show them.
-pub fn pad_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    // In flight the next event is already shown above.
-    let is_said = status_lines::next_event_line(model, theme, now).is_some();
-    let ready = top_lines::readiness(model, now);
-    let ready = ready.map(|(words, role)| theme.line(format!(" {words}"), role));
-    let first = top_lines::message(model, theme, now).or(ready).filter(|_| !is_said);
-    let mut lines: Vec<Line> = first.into_iter().collect();
-    let (words, role) = summary(model, now);
-    lines.push(theme.line(format!(" {words}"), role));
-    let mut checks = checks(model, theme, now);
-    checks.sort_by_key(|line| line.spans.first().is_none_or(|span| !span.content.starts_with(" NO")));
-    lines.extend(checks);
-    if model.checklist.is_some() {
-        lines.push(theme.line(format!(" {}", lists::checklist_title(model, now)), TextRole::Title));
-        lines.extend(lists::checklist_rows(
-            model,
-            theme,
-            now,
-            (CHECK_COLUMNS.into(), usize::from(CHECK_ROWS)),
-        ));
-    }
-    // Before the first command two lines may be equal.
-    lines.dedup_by_key(|line| line.to_string());
-    lines.extend(ladder(model, theme, now));
-    lines
-}
-
 /// Each failing check with the value found and why it fails; how many pass; the measured values of those.
-fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
@@ -430,7 +401,7 @@ pub fn foreign_lines(
     let plain = |text: String| theme.line(text, TextRole::Plain);
     let mut lines = vec![
         theme.line(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), TextRole::Alarm),
-        plain(format!(" mode {}, {}", foreign.mode(), if foreign.armed { "ARMED" } else { "disarmed" })),
+        plain(format!(" {}, {}", foreign.mode(), if foreign.armed { "ARMED" } else { "disarmed" })),
         plain(" Nothing is armed or started there from here.".to_owned()),
         theme.line(format!(" An abort {}.", foreign.termination()), TextRole::Caution),
     ];

@@ -165,17 +165,6 @@ pub fn draw_values(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     panel("Descent", &descent_rows(model, theme, now), theme, frame, right);
 }
 
-/// The same as lines: on small screens also what the pages of pictures show.
-pub fn values_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = panels::lost_rows(model, theme, now);
-    lines.extend(panels::flight_rows(model, theme, now));
-    lines.extend(panels::controller_rows(model, theme, now));
-    lines.extend(descent_rows(model, theme, now));
-    lines.extend(panels::fin_rows(model, theme, now));
-    lines.extend(panels::gimbal_rows(model, theme, now));
-    lines
-}
-
 /// The estimates behind the descent.
 fn descent_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let of = |pick| model.vehicle.of_descent(pick);

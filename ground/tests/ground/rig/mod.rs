@@ -8,8 +8,8 @@ use std::time::Duration;
 use ground::key::Key;
 use ground::model::{KeyTiming, Model, Settings};
 use ground::update::{Action, Msg, update};
+use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
-use ground::view::view;
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
@@ -335,7 +335,11 @@ impl Rig {
 
     pub(crate) fn draw(&self, columns: u16, rows: u16, theme: Theme) -> Terminal<TestBackend> {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test terminal");
-        terminal.draw(|frame| view(&self.model, theme, self.now, frame)).expect("drawing in memory");
+        terminal
+            .draw(|frame| {
+                draw(&self.model, theme, self.now, frame);
+            })
+            .expect("drawing in memory");
         terminal
     }
 }
